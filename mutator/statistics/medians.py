@@ -16,7 +16,7 @@ from mutator.statistics.shares import CONFIDENCE
 RESAMPLES = 999
 _SEED = 1
 _CELLS = 500_000  # of one batch of draws: bounds the memory
-_BLOCK = 256  # values
+_BLOCK = 256  # values at least
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
@@ -44,9 +44,10 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
         return math.nan, math.nan
-    sorted_ = [_Sorted(sample, codes, len(names)) for sample in samples]
+    block = _block_of(len(names), codes.size)
+    sorted_ = [_Sorted(sample, codes, len(names), block) for sample in samples]
     found = []
-    for counts in _draws(len(names), codes.size):
+    for counts in _draws(len(names), max(codes.size // block + 1, block)):
         medians = [sample.medians(counts) for sample in sorted_]
         found.append(medians[0] - medians[1] if len(medians) > 1 else medians[0])
     tail = (1 - CONFIDENCE) / 2
@@ -54,10 +55,17 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
     return float(low), float(high)
 
 
-def _draws(clusters: int, runs: int) -> Iterator[np.ndarray]:
-    """How often each cluster is drawn: (draws, clusters), in batches."""
+def _block_of(clusters: int, runs: int) -> int:
+    """How many values a block has: the more runs and clusters, the more, as a product for each block and
+    cluster takes about a fiftieth of the look at a value of the block that has the median."""
+    return max(_BLOCK, math.isqrt(clusters * runs // 50))
+
+
+def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
+    """How often each cluster is drawn: (draws, clusters), in batches; each draw takes so many `others`
+    cells."""
     rng = np.random.default_rng(_SEED)
-    batch = max(1, _CELLS // max(clusters, runs // _BLOCK + 1, _BLOCK))
+    batch = max(1, _CELLS // max(clusters, others))
     for begin in range(0, RESAMPLES, batch):
         size = min(batch, RESAMPLES - begin)
         yield rng.multinomial(clusters, np.full(clusters, 1 / clusters), size=size)
@@ -67,11 +75,12 @@ class _Sorted:
     """Values in their order, with the number of each cluster's in every block of them: a median of a draw is
     looked for block by block, then in a block."""
 
-    def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int) -> None:
+    def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int, block: int) -> None:
+        self._block = block
         order = np.argsort(values, kind="stable")
         self._values, self._codes = values[order], codes[order]
-        blocks = -(-values.size // _BLOCK)
-        cells = np.arange(values.size) // _BLOCK * clusters + self._codes
+        blocks = -(-values.size // block)
+        cells = np.arange(values.size) // block * clusters + self._codes
         self._of = np.bincount(cells, minlength=blocks * clusters).reshape(blocks, clusters).astype(float)
 
     def medians(self, counts: np.ndarray) -> np.ndarray:
@@ -86,8 +95,8 @@ class _Sorted:
         """The value at a place of each draw's values."""
         block = (until <= place).sum(axis=1)
         before = np.take_along_axis(until, np.maximum(block - 1, 0)[:, None], axis=1)[:, 0]
-        at = np.minimum(block[:, None] * _BLOCK + np.arange(_BLOCK), self._values.size - 1)
+        at = np.minimum(block[:, None] * self._block + np.arange(self._block), self._values.size - 1)
         inside = np.cumsum(np.take_along_axis(counts, self._codes[at], axis=1), axis=1)
         within = (inside + np.where(block > 0, before, 0)[:, None] <= place).sum(axis=1)
-        found: np.ndarray = self._values[block * _BLOCK + within]
+        found: np.ndarray = self._values[block * self._block + within]
         return found
