@@ -16,6 +16,7 @@ from mutator.execution import single_run
 from mutator.faults.fault_models import FaultModels, SnippetKind
 from mutator.model import OPERATORS, VALUE_ANCHORS, Experiment, Fault, Injection, Outcome, Record, Status
 from mutator.mutants.anchors import ParsedFile, parsed
+from mutator.mutants.expressions import enclosed
 from mutator.mutants.injection_edits import injection_edit, replaced_value
 from mutator.mutants.probe import injection_id
 from mutator.mutants.splicing import Edit, Rank, in_lines, in_order
@@ -92,7 +93,8 @@ def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict
     name, span = injection_id(0, first), file.span(first.location)
     if first.location.anchor.kind in VALUE_ANCHORS:
         expression, changed = replaced_value(file, model, first, name)
-        return _located(file, expression.start, expression.end, changed)
+        # in parentheses where an operator beside it could tear it apart
+        return _located(file, expression.start, expression.end, enclosed(changed))
     if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the statement is left out
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())

@@ -333,6 +333,11 @@ def parts_of(expression: Expression) -> dict[str, object]:
     return {"left": sides[0], "right": sides[1], "called": called, "arguments": arguments}
 
 
+def enclosed(text: str) -> str:
+    """The source of an expression, in parentheses if an operator beside it could tear it apart."""
+    return text if isinstance(ast.parse(text, mode="eval").body, _ATOMS) else f"({text})"
+
+
 def _enclosed(node: ast.expr) -> str:
     text = ast.unparse(node)
     return text if isinstance(node, _ATOMS) else f"({text})"

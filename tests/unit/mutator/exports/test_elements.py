@@ -105,18 +105,21 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
         first = mutants.experiments[0]
-        place = replace(
-            first.fault.injections[0].location, anchor=Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="gas")
-        )
-        left_out = replace(
-            first.fault, fault_type="omission", injections=(Injection(location=place, model="omission"),)
-        )
-        experiments = [*mutants.experiments, replace(first, fault=left_out)]
+
+        def of(anchor: Anchor, model: str, **params: str) -> Experiment:
+            place = replace(first.fault.injections[0].location, anchor=anchor)
+            injection = Injection(location=place, model=model, params=tuple(params.items()))
+            return replace(first, fault=replace(first.fault, fault_type=model, injections=(injection,)))
+
+        minus = of(Anchor(kind=AnchorKind.VALUE, name="1.5 * speed"), "operator_infix", to="-")
+        left_out = of(Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="gas"), "omission")
+        experiments = [*mutants.experiments, minus, left_out]
         return replace(mutants, experiments=experiments, chunks=(len(experiments),))
 
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD, changed=changed)
     made = json.loads(export(run, Format.MUTATION_ELEMENTS, workspace=toycar).read_text())
-    *changes, omission = mutants(made)
+    *changes, (_, minus), (source, omission) = mutants(made)
+    assert minus["replacement"] == "(1.5 - speed)"  # after `gap - 5.0 -`
     assert len(changes) == 9  # operations with two sides in the file
     found = set()
     for source, mutant in changes:
@@ -128,11 +131,10 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
         assert f"{text} -> -({text})" in mutant["description"]
         found.add(text)
     assert {"1.2 * closing", "wanted / 3.0", "-wanted / 6.0"} <= found
-    source, mutant = omission
-    line = source.splitlines()[mutant["location"]["start"]["line"] - 1]
-    assert line[mutant["location"]["start"]["column"] - 1 :].startswith("gas = ")
-    assert mutant["location"]["end"]["column"] == len(line) + 1
-    assert (mutant["mutatorName"], mutant["replacement"]) == ("omission", "pass")
+    line = source.splitlines()[omission["location"]["start"]["line"] - 1]
+    assert line[omission["location"]["start"]["column"] - 1 :].startswith("gas = ")
+    assert omission["location"]["end"]["column"] == len(line) + 1
+    assert (omission["mutatorName"], omission["replacement"]) == ("omission", "pass")
 
 
 def test_killed_means_hazard(report: dict[str, Any]) -> None:
