@@ -356,6 +356,21 @@ def test_a_model_that_raises(blamed: Blamed) -> None:
 
 
 @pytest.mark.parametrize(
+    ("model", "params", "kind"),
+    [("repetition", (), "KeyError"), ("exception", (("error", "TimeoutError"),), "TimeoutError")],
+)
+def test_a_statement_of_the_target_raises_once_more(
+    blamed: Blamed, model: str, params: tuple[tuple[str, Value], ...], kind: str
+) -> None:
+    """A statement that is repeated stays the target's: what it raises the second time is a crash, as is what
+    a model is there to raise."""
+    seen = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="self.seen")
+    record = blamed.record(fault(Injection(location=at(seen), model=model, params=params)))
+    assert record.status is Status.CRASHED
+    assert record.error is not None and record.error.kind == kind
+
+
+@pytest.mark.parametrize(
     ("number", "detail"),
     [
         (0, "ValueError: no such gap"),
