@@ -259,6 +259,7 @@ def _base(node: ast.expr) -> _Pairs:
 def _of(node: ast.expr, *roles: _Role) -> _Pairs:
     """An expression, and those in it."""
     if isinstance(node, ast.JoinedStr):
+        yield node, roles  # what is in it has places of its own only from Python 3.12 on
         return
     if isinstance(node, ast.Call):
         roles = (*roles, (AnchorKind.RESULT, _text(node.func), None))

@@ -205,3 +205,10 @@ def test_a_file_in_another_encoding() -> None:
         '    return (é if _fi.active("a0") else "ü" + é) + 1  # fi:a0 was:    return "ü" + é + 1'
     )
     assert unsplice(data) == file.data
+
+
+def test_an_f_string_is_changed_as_a_whole() -> None:
+    """A text with values in it is a value, also one of several parts; what is in it is not told apart."""
+    source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
+    found = parse_file("m.py", source, Path()).expressions["f"]
+    assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
