@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-import yaml
 
 import mutator
 from mutator._common.text import counted
@@ -74,5 +73,7 @@ def _letter(number: int) -> str:
 def _yaml(at: Mapping[str, Any]) -> str:
     """The anchor on one line of YAML, without the file, which is the same for all."""
     told = {key: value for key, value in at.items() if key != "file"}
+    import yaml
+
     line = yaml.safe_dump(told, default_flow_style=True, sort_keys=False, width=math.inf, allow_unicode=True)
     return str(line).strip()

@@ -32,7 +32,7 @@ def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
 @pytest.mark.parametrize(
     ("words", "offered"),
     [
-        (["pl"], ["plan"]),
+        (["pl"], ["places", "plan"]),
         (["run", "sm"], ["small"]),
         (["plan", "toy"], ["toy"]),
         (["try", "sensor/dis"], ["sensor/distance"]),
