@@ -16,7 +16,7 @@ from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
 from mutator.mutants.imported_names import module_name
-from mutator.mutants.probe import parts_of, probe_path, tag_of
+from mutator.mutants.probe import parts_of, probe_path, sets_values, tag_of
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
@@ -105,12 +105,16 @@ def _in_file(
 
 def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
     """The module of a file and the code of its lines that tell the probe what to set, if it has any."""
+    if not sets_values(mutated):
+        return []
     lines = _only(mutated, sets=True)
     return [(module_name(path), _compiled(lines, filename))] if lines.strip() else []
 
 
 def _only(mutated: bytes, *, sets: bool) -> bytes:
     """A file's lines that tell the probe what to set, or the others, each where it was."""
+    if not sets and not sets_values(mutated):
+        return mutated
     lines = mutated.splitlines(keepends=True)
     chosen = [((tag := tag_of(line)) is not None and tag.sets) is sets for line in lines]
     if all(chosen):

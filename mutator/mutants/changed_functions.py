@@ -30,7 +30,10 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     outside: list[Edit] = []
     for edit in edits:
         function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
-        (outside if function is None else functions[function]).append(edit)
+        if function is None or edit.rank is Rank.AFTER_WHOLE:  # the latter stands between functions
+            outside.append(edit)
+        else:
+            functions[function].append(edit)
     return _compile_with(file, tuple(outside)) and all(
         _compiles(file, function, own) for function, own in functions.items()
     )

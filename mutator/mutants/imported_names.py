@@ -34,6 +34,7 @@ class _Imports:
     module: str
     names: tuple[_Import, ...]
     set: frozenset[str]
+    exported: frozenset[str] | None = None  # what `__all__` lists, if it lists it in words
 
 
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
@@ -43,13 +44,14 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     and those that set the name in another way, too.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
+    exported = {file.module: file.exported for file in files}
     found, refused = [(module_name(path), name)], set[str]()
     for known in found:  # which grows on the way: what is imported may be imported again
         for file in files:
             for one in file.names:
                 if (one.module, one.name) not in (known, (known[0], _ALL)):
                     continue
-                reason = _refused(one, file, known[1])
+                reason = _refused(one, file, known[1], exported.get(known[0]))
                 if reason:
                     refused.add(f"{file.path}:{one.line} {reason}")
                 elif one.name != _ALL and (file.module, one.known) not in found:
@@ -64,10 +66,11 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
     return tuple(".".join(one) for one in found[1:])
 
 
-def _refused(one: _Import, file: _Imports, name: str) -> str | None:
-    """Why what this imports cannot be set there."""
+def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
+    """Why what this imports cannot be set there; `exported` is what `*` stands for, if the module says so."""
     if one.name == _ALL:
-        return None if name.startswith("_") else "imports *"
+        meant = not name.startswith("_") if exported is None else name in exported
+        return "imports *" if meant else None
     if one.inside:
         return "imports it into a class"
     return f"imports it, and sets {one.known} in another way" if one.known in file.set else None
@@ -88,8 +91,26 @@ def _imports(path: str, data: bytes, root: Path) -> _Imports:
     assigned = {symbol.get_name() for symbol in table.get_symbols() if symbol.is_assigned()}
     several = {name for name, count in known.items() if count > 1}
     return _Imports(
-        path=path, module=module_name(path), names=names, set=set_by_functions(data) | assigned | several
+        path=path,
+        module=module_name(path),
+        names=names,
+        set=set_by_functions(data) | assigned | several,
+        exported=_exported(tree),
     )
+
+
+def _exported(tree: ast.Module) -> frozenset[str] | None:
+    """The names in `__all__`, if it is made once, of texts alone."""
+    made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
+    for node in tree.body:
+        if (
+            isinstance(node, ast.Assign)
+            and node.targets == made
+            and isinstance(node.value, ast.List | ast.Tuple)
+        ):
+            texts = [one.value for one in node.value.elts if isinstance(one, ast.Constant)]
+            return frozenset(map(str, texts)) if len(texts) == len(node.value.elts) else None
+    return None
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:

@@ -231,6 +231,11 @@ def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
     return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL}: {changed})'
 
 
+def sets_values(data: bytes) -> bool:
+    """Whether a file may have lines that tell the probe what to set: most have none."""
+    return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
+
+
 def tag_words() -> dict[str, Any]:
     """What a page needs to find injected lines: the mark before a tag, the tags of the probe's own lines."""
     return {"mark": _MARK, "probe": [IMPORT_TAG, OBSERVE_TAG]}

@@ -221,8 +221,10 @@ def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
         "b": "class C:\n    from limits import LIMIT\n",
         "c": "from limits import LIMIT\nLIMIT += 1\n",
     }
+    texts |= {"kept": "__all__ = ['other']\nLIMIT, other = 1, 2\n", "d": "from kept import *\n"}
     for name, text in texts.items():
         (tmp_path / f"{name}.py").write_text(text)
+    assert importers(read_tree(tmp_path, ["**"]), "kept.py", "LIMIT") == (), "`*` does not stand for it"
     words = (
         "a.py:1 imports \\*; b.py:2 imports it into a class; c.py:1 imports it, and sets LIMIT in another way"
     )
