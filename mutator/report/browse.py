@@ -159,12 +159,23 @@ def table(
     if paths:
         columns["through"] = [paths.through(r.experiment_id) for r in rows]
     if source:
-        columns["line"] = [source.places.get(line["fault_id"], "") for line in lines]
-        columns["lasting"] = [PERMANENT if r.trigger == ALWAYS else TRANSIENT for r in rows]
+        columns |= _of_operators(source, lines)
     checked = sorted({name for r in rows for name in r.checked})
     made = [{"name": name, **column(name, values)} for name, values in columns.items()]
     labels = {name: facts["label"] for name, facts in paths.components.items()} if paths else {}
     return {"schema": SCHEMA, "count": len(rows), "checked": checked, "labels": labels, "columns": made}
+
+
+def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
+    """`line` and `lasting` of each fault; where it is an operator's, the change stands as its value."""
+    changes = [source.changes.get(line["fault_id"], "") for line in lines]
+    both = list(zip(lines, changes, strict=True))
+    return {
+        "value": [change or line["value"] for line, change in both],
+        "variant": [line["variant"].removesuffix(f" {change}" if change else "") for line, change in both],
+        "line": [source.places.get(line["fault_id"], "") for line in lines],
+        "lasting": [PERMANENT if line["trigger"] == ALWAYS else TRANSIENT for line in lines],
+    }
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:

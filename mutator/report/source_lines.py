@@ -5,7 +5,7 @@ a fault was on, so nothing is shown.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from mutator.errors import MutatorError
@@ -66,11 +66,12 @@ class MarkedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, the worst one first, and the line of each fault by its id: `pkg/plan.py:42`.
-    Without files `why` says why there are none."""
+    """The files of a run, the worst one first; by the ids of faults the line of each, `pkg/plan.py:42`, and
+    what those of operators change, `a + b -> a - b`. Without files `why` says why there are none."""
 
     files: tuple[MarkedFile, ...] = ()
-    places: Mapping[str, str]
+    places: Mapping[str, str] = field(default_factory=dict)
+    changes: Mapping[str, str]
     why: str = ""
 
     @classmethod
@@ -78,27 +79,31 @@ class SourceLines:
         """Of a run with these results; None where no fault is an operator's."""
         if not (texts["module"] == OPERATORS).any():
             return None
+        faults = plan_file.read_faults(folder.path)
+        known = {name: faults[name] for name in texts["fault_id"].unique() if name in faults}
+        changes = {name: str(fault.value) for name, fault in known.items() if fault.module == OPERATORS}
         try:
             manifest = workspace.manifest(folder.head["target"]) if workspace else None
         except (MutatorError, KeyError):
             manifest = None
         if manifest is None:
-            return cls(places={}, why="The target is not found here, so its source is not shown.")
+            return cls(changes=changes, why="The target is not found here, so its source is not shown.")
         if manifest.tree.digest != folder.head["sources"]["target"]:
             return cls(
-                places={},
+                changes=changes,
                 why="The target has changed since this run was planned, so its source is not shown: lines "
                 "would be other ones. Put it back and write the report again (`mutator report`).",
             )
-        faults = plan_file.read_faults(folder.path)
-        known = {name: faults[name] for name in texts["fault_id"].unique() if name in faults}
-        return cls.marked(manifest, known, texts)
+        return cls._marked(manifest, known, texts, changes)
 
     @classmethod
-    def marked(
-        cls, manifest: TargetManifest, faults: Mapping[str, Fault], texts: "DataFrame"
+    def _marked(
+        cls,
+        manifest: TargetManifest,
+        faults: Mapping[str, Fault],
+        texts: "DataFrame",
+        changes: Mapping[str, str],
     ) -> "SourceLines":
-        """Of a target, and of faults with their results."""
         at = {name: _place(manifest, fault) for name, fault in faults.items()}
         marks: dict[str, dict[int, dict[str, Mark]]] = {path: {} for path, _ in at.values()}
         for (path, line), lasting, mark in _marks(at, texts):
@@ -107,6 +112,7 @@ class SourceLines:
         return cls(
             files=tuple(sorted(files, key=_badness)),
             places={name: f"{path}:{line}" for name, (path, line) in at.items()},
+            changes=changes,
         )
 
 

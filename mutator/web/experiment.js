@@ -158,9 +158,10 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
+    const tried = this.text("module") === "operators" ? [] // which no spec has
+      : [el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try())];
     return el("div", {}, el("p", {}, "Run it again and compare it with its record; show its diff, times and plot:"),
-      this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`),
-      el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try()));
+      this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
   /** `mutator try` of this fault; a time for what was triggered at random. The reading is always there: which one

@@ -82,6 +82,8 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     columns = {c["name"]: c for c in _tables(reported, rows, lines)[0]["columns"]}
     assert f"{DRIVER}:{line}" in columns["line"]["words"]
     assert columns["lasting"]["words"] == ["permanent", "transient"]
+    assert "1.2 * closing -> -(1.2 * closing)" in columns["value"]["words"]
+    assert columns["variant"]["words"] == ["toycar/driver.py::Driver.drive"]
 
 
 def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> None:
