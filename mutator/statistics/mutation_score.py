@@ -98,7 +98,7 @@ def score_sheet(
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
     without = f" {missing} of {len(planned)} mutants have no result and are in no count." if missing else ""
-    chosen = f" Chosen in {'; '.join(told)}." if told else ""
+    chosen = f" Chosen: {'; '.join(f'`{text}`' for text in told)}." if told else ""
     return Sheet(
         name="mutation_score",
         title="Mutation score",

@@ -94,7 +94,7 @@ def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
         drive("d", {}, status="invalid_mutant"),
     )
     sheet = score_sheet(frame, faults, GOLDEN, ["pkg/**: 4 of 9 mutants; left out: 5"])
-    assert "Chosen in pkg/**: 4 of 9 mutants; left out: 5." in sheet.note
+    assert "Chosen: `pkg/**: 4 of 9 mutants; left out: 5`." in sheet.note
     total = lines(sheet)["all", "mutants", "permanent"]
     assert (total["number"], total["not activated"]) == (2, 0)
     assert total["crash or timeout"] == share(1, 2)
