@@ -23,27 +23,8 @@ from .test_value_anchors import MANY, models, module
 
 FEW = ("colorsys", "shlex", "textwrap", "calendar", "fractions", "string", "csv", "gettext", "argparse")
 TOGETHER = 40  # values that one mutant sets
-MORE = ("smtpd", "imaplib", "poplib", "socketserver", "xdrlib", "wave", "aifc", "cgi", "codecs", "copyreg")
-MORE += ("dataclasses", "enum", "functools", "glob", "gzip", "logging", "numbers", "operator", "opcode")
-MORE += ("os", "platform", "posixpath", "pydoc", "queue", "quopri", "re", "reprlib", "selectors", "shutil")
-MORE += ("signal", "sndhdr", "socket", "ssl", "stat", "statistics", "stringprep", "subprocess", "tempfile")
-MORE += ("threading", "token", "types", "warnings", "weakref", "xmlrpc.client", "zipimport")
-MORE += ("asyncio.streams", "concurrent.futures.process", "curses.ascii", "distutils.dist", "idlelib.config")
-MORE += (
-    "importlib.metadata",
-    "lib2to3.pgen2.tokenize",
-    "logging.handlers",
-    "multiprocessing.pool",
-    "nturl2path",
-)
-MORE += (
-    "tkinter.ttk",
-    "tkinter.constants",
-    "sqlite3.dbapi2",
-    "unittest.main",
-    "wsgiref.handlers",
-    "xml.sax.handler",
-)
+MORE = ("imaplib", "logging", "logging.handlers", "pydoc", "shutil", "ssl", "subprocess", "tempfile")
+MORE += ("tkinter.constants", "token", "xmlrpc.client")
 
 
 def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
@@ -164,4 +145,4 @@ def test_what_the_probe_sets_is_put_back() -> None:
 def test_what_the_probe_sets_is_put_back_at_large() -> None:
     """The same of thousands of values; those of modules that do things when they are loaded are not run."""
     assert checked(FEW, 2000, run=True) > 250
-    assert checked((*MANY, *MORE), 5000, run=False) > 4000
+    assert checked((*MANY, *MORE), 3000, run=False) == 3000
