@@ -41,7 +41,6 @@ FAULTS: list[dict[str, Any]] = [
         "at": PUBLISH | {"entry": True},
         "model": "sign_flip",
         "params": {"target": "self.reading"},
-        "odd": True,
     },
     {
         "at": SENSE | {"assigned_value": "closing"},
