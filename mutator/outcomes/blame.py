@@ -85,14 +85,18 @@ def _source(raised: Raised, files: _Files) -> _Source | None:
 
 def _on_stack(stack: Stack, files: _Files) -> _Source | None:
     """The innermost line of it that is not the target's. What a helper of the probe cannot do with a value is
-    put down to the line that called it, and whether the fault is active to the probe."""
-    in_probe = False
+    put down to the line that called it, and whether the fault is active to the probe. What a changed value
+    calls the target calls as well, so its exceptions are the target's."""
+    in_probe = in_target = False
     for at in stack:
         place, tag = f"{at[0]}:{at[1]}", files.tag_at(at)
         if is_probe(at[0]):
             in_probe = True
+        elif tag and tag.was is not None and in_target:
+            continue
         elif tag and (ids := files.injected_at(at, tag, in_probe)):
             return _Source(place=place, tag=tag, ids=ids)
         elif in_probe or (tag and tag.was is None):
             return _Source(place=place)
+        in_target = in_target or (tag is None and not is_probe(at[0]))
     return _Source(place="") if in_probe else None

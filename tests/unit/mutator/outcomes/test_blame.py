@@ -77,7 +77,7 @@ CHANGED = {
     ("stack", "status"),
     [
         ((("car/radar.py", 2, 19),), Status.INVALID_MUTANT),
-        ((("car/can.py", 5, 0), ("car/radar.py", 2, 19)), Status.INVALID_MUTANT),
+        ((("car/can.py", 5, 0), ("car/radar.py", 2, 19)), Status.CRASHED),
         ((PROBE, ("car/radar.py", 2, 19)), Status.INVALID_MUTANT),
         ((PROBE, ("car/radar.py", 2, 41)), Status.HARNESS_ERROR),
         ((("car/radar.py", 2, 10),), Status.CRASHED),
