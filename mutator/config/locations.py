@@ -70,7 +70,11 @@ class AtModel(StrictModel, title="A place"):
     which: str | int | None = Field(
         None, description="Of an `argument`: its place in the call, from 1, or its keyword."
     )
-    nth: int | None = Field(None, ge=1, description="Which of several hits, counted from 1.")
+    nth: int | None = Field(
+        None,
+        ge=1,
+        description="Which of several hits, counted from 1; heads of blocks count after statements.",
+    )
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:
         """The location; errors point into `source` at `keys`."""

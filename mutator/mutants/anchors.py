@@ -227,9 +227,13 @@ def _choose(
     verb = anchor.kind.partition("_")[2]
     name = as_written(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
-    hits = [(f, s) for f, s in pairs if s.reason is None]
+    # heads of blocks count last: a number that chose a statement before heads were anchors still does
+    hits = sorted(
+        (pair for pair in pairs if pair[1].reason is None), key=lambda pair: pair[1].opens is not None
+    )
+    statements = sum(s.opens is None for _, s in hits)
     nth = anchor.nth
-    if hits and (len(hits) == 1 if nth is None else nth <= len(hits)):
+    if hits and (1 in (len(hits), statements) if nth is None else nth <= len(hits)):
         return hits[(nth or 1) - 1]
     raise _no_single_hit(file, location, functions, pairs, hits)
 

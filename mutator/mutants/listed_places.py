@@ -81,7 +81,8 @@ class _Lister:
             if function.entry is not None:
                 yield from self.statement(name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None)
         for verb, kinds in _VERBS.items():
-            statements = [s for f in functions for s in f.statements if not s.reason]
+            found = (s for f in functions for s in f.statements if not s.reason)
+            statements = sorted(found, key=lambda s: s.opens is not None)  # as `nth` counts them
             count, seen = (Counter[str]() for _ in range(2))
             count.update(one for s in statements for one in s.names(verb))
             for statement in statements:

@@ -62,7 +62,8 @@ def _of_values(
 
 def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
     """Assignments, augmented ones and calls that stand alone on their lines, each left out."""
-    statements = [one for f in file.functions.get(function, ()) for one in f.statements if not one.reason]
+    every = (one for f in file.functions.get(function, ()) for one in f.statements)
+    statements = [one for one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()
     for statement in statements:
         anchored = None
@@ -94,7 +95,7 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: str) -> bool:
     """Not the statement that binds a local name first: without it every later use of the name fails."""
-    if not statement.alone or statement.opens is not None or statement.is_return:
+    if not statement.alone or statement.is_return:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]
     return all(facts.bound.get((function, name), 0) < statement.first + 1 for name in names)

@@ -104,6 +104,19 @@ def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]
         assert [name for one in function.statements for name in one.assigns] == named
 
 
+def test_heads_of_blocks_count_last() -> None:
+    """A `nth` that chose a statement, or none where there was one, still means the statement."""
+    source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
+    source += "    with xs as y:\n        y = 2\n        y = 3\n"
+
+    def line(name: str, nth: int | None = None) -> int:
+        anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name=name, nth=nth)
+        return parsed(source).resolve(FaultLocation(path="m.py", function="f", anchor=anchor)).last
+
+    assert (line("x"), line("x", 1), line("x", 2)) == (4, 4, 2)
+    assert (line("y", 1), line("y", 2), line("y", 3)) == (6, 7, 5)
+
+
 def test_functions_are_found_by_qualified_name() -> None:
     """Nested functions have their own statements, with `<locals>` or without."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
