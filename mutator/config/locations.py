@@ -3,6 +3,7 @@
 import ast
 import keyword
 import re
+from typing import Any
 
 from pydantic import Field
 
@@ -135,6 +136,17 @@ class AtModel(StrictModel, title="A place"):
                 (*keys, "function"), f"'{name}'", expected="a qualified name such as Sensor.measure"
             )
         return name
+
+
+def as_written_at(location: FaultLocation) -> dict[str, Any]:
+    """The location as a spec writes it at `at`."""
+    anchor = location.anchor
+    found: dict[str, Any] = {"file": location.path}
+    found |= {"function": location.function} if location.function else {}
+    found[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
+    if anchor.which is not None:
+        found["which"] = int(anchor.which) if anchor.which.isdecimal() else anchor.which
+    return found | ({"nth": anchor.nth} if anchor.nth is not None else {})
 
 
 def _fits(kind: AnchorKind, name: str) -> bool:

@@ -63,14 +63,14 @@ class ParsedFile:
 
     def resolve_value(self, location: FaultLocation) -> Expression:
         """The expression that `location` names; MutatorError with candidates unless there is exactly one."""
-        functions = _functions(self, location)
-        name = as_compiled(location.function.replace(".<locals>", ""))
-        return choose_expression(self.expressions.get(name, ()), location, self.where, functions[0].line)
+        functions = functions_named(self, location.function)
+        known = self.expressions.get(plain_name(location.function), ())
+        return choose_expression(known, location, self.where, functions[0].line)
 
     def resolve_fixed(self, location: FaultLocation) -> FixedValue:
         """The constant or default that `location` names; MutatorError with candidates if there is none."""
         if location.function:
-            _functions(self, location)
+            functions_named(self, location.function)
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
@@ -90,7 +90,7 @@ class ParsedFile:
 
     def names(self, location: FaultLocation) -> frozenset[str]:
         """The names that the functions of the location's name use."""
-        return frozenset().union(*(function.names for function in _functions(self, location)))
+        return frozenset().union(*(function.names for function in functions_named(self, location.function)))
 
     def resolve(self, location: FaultLocation) -> Site:
         """The statement that `location` names; MutatorError with candidates unless there is exactly one."""
@@ -130,13 +130,19 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
         )
 
 
-def _functions(file: ParsedFile, location: FaultLocation) -> tuple[Function, ...]:
-    name = as_compiled(location.function.replace(".<locals>", ""))
+def plain_name(function: str) -> str:
+    """The qualified name of a function as files have it: without `<locals>`."""
+    return as_compiled(function.replace(".<locals>", ""))
+
+
+def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
+    """The functions of that qualified name; MutatorError with those that there are, if there is none."""
+    name = plain_name(function)
     functions = file.functions.get(name)
     if not functions:
         known = list(file.functions)
         raise MutatorError(
-            f"no function '{location.function}'",
+            f"no function '{function}'",
             where=file.where,
             expected=f"one of {', '.join(known) or 'none: the file has no function'}",
             remedy="correct the qualified name" + suggestion(name, known),
@@ -145,7 +151,7 @@ def _functions(file: ParsedFile, location: FaultLocation) -> tuple[Function, ...
 
 
 def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
-    functions = _functions(file, location)
+    functions = functions_named(file, location.function)
     if location.anchor.kind is AnchorKind.ENTRY:
         return _entry(file, location, functions)
     function, statement = _choose(file, location, functions)

@@ -15,7 +15,7 @@ from pathlib import Path
 from mutator._common.text import suggestion
 from mutator.errors import MutatorError
 from mutator.model import AnchorKind, FaultLocation
-from mutator.mutants.expressions import blocks
+from mutator.mutants.expression_roles import blocks
 from mutator.mutants.scopes import as_compiled, set_by_functions
 
 _MADE_OTHERWISE = ("Enum", "Flag", "NamedTuple", "TypedDict")  # ends of the names of bases

@@ -8,7 +8,7 @@ from pathlib import Path
 from symtable import symtable
 
 from mutator.errors import MutatorError
-from mutator.mutants.expressions import blocks
+from mutator.mutants.expression_roles import blocks
 from mutator.mutants.scopes import set_by_functions
 from mutator.targets.source_tree import SourceTree
 

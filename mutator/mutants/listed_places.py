@@ -5,14 +5,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from mutator._common.text import suggestion
-from mutator.config.locations import assignable, dotted_name
+from mutator.config.locations import as_written_at, assignable, dotted_name
 from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel, FaultModels, Needs, SnippetKind
 from mutator.model import Anchor, AnchorKind, FaultLocation
-from mutator.mutants.anchors import ParsedFile, Site
+from mutator.mutants.anchors import ParsedFile, Site, functions_named, plain_name
 from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
-from mutator.mutants.scopes import as_compiled
 from mutator.mutants.statement_texts import written_out
 
 _OF_OPERATORS = "operator_"  # models that mutation operators use, which find their own places
@@ -34,13 +32,7 @@ class ListedPlace:
     @property
     def at(self) -> dict[str, Any]:
         """What a spec writes at `at`."""
-        location, anchor = self.location, self.location.anchor
-        found: dict[str, Any] = {"file": location.path}
-        found |= {"function": location.function} if location.function else {}
-        found[anchor.kind.value] = anchor.name if anchor.kind is not AnchorKind.ENTRY else True
-        if anchor.which is not None:
-            found["which"] = int(anchor.which) if anchor.which.isdecimal() else anchor.which
-        return found | ({"nth": anchor.nth} if anchor.nth is not None else {})
+        return as_written_at(self.location)
 
 
 def places_of(file: ParsedFile, models: FaultModels, function: str | None = None) -> list[ListedPlace]:
@@ -50,23 +42,13 @@ def places_of(file: ParsedFile, models: FaultModels, function: str | None = None
     MutatorError with the file's functions if it has none of that name.
     """
     lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
-    names = tuple(file.functions) if function is None else (_known(file, function),)
+    names = tuple(file.functions)
+    if function is not None:
+        functions_named(file, function)  # or it says which there are
+        names = (plain_name(function),)
     found = [place for name in names for place in lister.of_function(name)]
     found += lister.fixed(None if function is None else names[0])
     return sorted(found, key=lambda place: place.line)
-
-
-def _known(file: ParsedFile, function: str) -> str:
-    name = as_compiled(function.replace(".<locals>", ""))
-    if name not in file.functions:
-        known = list(file.functions)
-        raise MutatorError(
-            f"no function '{function}'",
-            where=file.where,
-            expected=f"one of {', '.join(known) or 'none: the file has no function'}",
-            remedy="correct the qualified name" + suggestion(name, known),
-        )
-    return name
 
 
 class _Lister:

@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from mutator.mutants.expression_roles import blocks
 from mutator.targets.source_tree import SourceTree
 
 Extent = tuple[int, int, int | None, int | None]
@@ -59,7 +60,7 @@ def _scope(body: list[ast.stmt], scope: tuple[str, ...], facts: Facts, *, inside
         elif isinstance(statement, ast.ClassDef):
             _scope(statement.body, (*scope, statement.name), facts, inside=False)
         else:
-            for block in _blocks(statement):
+            for block in blocks(statement):
                 _scope(block, scope, facts, inside=inside)
 
 
@@ -68,15 +69,8 @@ def _arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
     yield from (one for one in (arguments.vararg, arguments.kwarg) if one)
 
 
-def _blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
-    for name in ("body", "orelse", "finalbody"):
-        yield getattr(statement, name, [])
-    for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
-        yield part.body
-
-
 def _statement(statement: ast.stmt, function: str, facts: Facts) -> None:
-    inner = [block[0].lineno for block in _blocks(statement) if block]
+    inner = [block[0].lineno for block in blocks(statement) if block]
     last = statement.end_lineno or statement.lineno
     facts.own.append(range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1))
     if not inner:

@@ -17,8 +17,9 @@ import yaml
 from markupsafe import Markup
 
 from mutator._common.hashing import plain
+from mutator.config.locations import as_written_at
 from mutator.errors import MutatorError
-from mutator.model import Anchor, Experiment, Fault
+from mutator.model import Experiment, Fault
 from mutator.mutants.readable_diffs import readable
 from mutator.outcomes.columns import is_text
 from mutator.outcomes.ranking import worst
@@ -246,7 +247,7 @@ def _spec(fault: Fault) -> str:
     told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
     told["injections"] = [
         {
-            "at": {"file": i.location.path, "function": i.location.function, **_anchor(i.location.anchor)},
+            "at": as_written_at(i.location),
             "model": i.model,
             "params": dict(i.params),
             **{name: getattr(i, name) for name in ("where", "call", "every") if getattr(i, name) is not None},
@@ -254,11 +255,6 @@ def _spec(fault: Fault) -> str:
         for i in fault.injections
     ]
     return yaml.safe_dump(told, sort_keys=False, allow_unicode=True, width=100)
-
-
-def _anchor(anchor: Anchor) -> dict[str, Any]:
-    chosen = {"which": anchor.which, "nth": anchor.nth}
-    return {anchor.kind.value: anchor.name} | {key: value for key, value in chosen.items() if value}
 
 
 def _setting(experiment: Experiment) -> str:

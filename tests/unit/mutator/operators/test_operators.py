@@ -115,8 +115,8 @@ def test_yield_is_not_calculated_again(make: Make) -> None:
 
 
 def test_equal_code_is_dropped(make: Make) -> None:
-    """A change that compiles to the code of the original is no mutant, and of two with one code the first
-    alone is one."""
+    """A mutant that compiles to the same code as the original is dropped, and so is one that compiles to the
+    same code as an earlier mutant."""
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
     assert [(one.operator.value, one.now) for one in denied] == [
