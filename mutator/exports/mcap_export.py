@@ -30,7 +30,7 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.trace_files import own_times
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
-from mutator.store.series import SeriesFolder
+from mutator.store.series import SeriesFolder, making_again
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
@@ -119,14 +119,22 @@ class Content:
         return written.finish()
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
-        """The kept traces, where both runs have one; never driven again."""
+        """The kept traces, where both runs have one; never driven again. MutatorError for one that is not the
+        campaign's: the series would be coarser, and nobody would know."""
         kept = self._folder.path / "traces" / experiment_id
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
-        experiment = self._experiments[experiment_id]
-        golden = self._folder.golden_folder(experiment)
-        if not (golden.is_dir() or (kept / "golden").is_dir()) or not self._traces.is_kept(experiment_id):
+        golden = self._folder.golden_folder(self._experiments[experiment_id])
+        faulty = kept / "faulty" / self._traces.manifest.trace_file
+        if not (golden.is_dir() or (kept / "golden").is_dir()) or not faulty.is_file():
             return None
+        if not self._traces.is_kept(experiment_id):
+            raise MutatorError(
+                f"the kept trace of {experiment_id} is not the one of its record",
+                where=faulty,
+                expected="the trace of the campaign's run, whole",
+                remedy=f"drive it again: {making_again(self._folder.path, experiment_id)}, or delete {kept}",
+            )
         return self._traces.of(experiment_id)
 
     def _of_series(self, experiment_id: str) -> tuple[list[Topic], list[Topic]]:

@@ -150,6 +150,25 @@ def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -
     assert facts["times"] == {"first_s": "-0.5"}
 
 
+def test_a_kept_trace_of_another_run_is_refused(
+    run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
+) -> None:
+    """A kept trace that is damaged, or not the campaign's, is an error with its file: the series in its place
+    would be another result."""
+    copy, name = tmp_path / "run", hazardous(run)[0]
+    shutil.copytree(run, copy)
+    faulty = copy / "traces" / name / "faulty"
+    for folder in (faulty, copy / "traces" / name / "golden"):
+        folder.mkdir(parents=True)
+    (faulty / "log.npz").write_bytes(b"rubbish")
+    parts = Parts(only=f'experiment_id == "{name}"')
+    with pytest.raises(
+        MutatorError, match=rf"log.npz: the kept trace of {name}.*mutator rerun {name} --trace"
+    ):
+        export(copy, Format.MCAP, tmp_path / "out", workspace=copy_toycar(tmp_path), parts=parts)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
     """An export is the same each time."""
     parts = Parts(only=f'experiment_id == "{hazardous(run)[0]}"')
