@@ -89,8 +89,12 @@ class ParsedFile:
         return next((lines for lines in self.outer if line in lines), None)
 
     def names(self, location: FaultLocation) -> frozenset[str]:
-        """The names that the functions of the location's name use."""
-        return frozenset().union(*(function.names for function in functions_named(self, location.function)))
+        """The names that the function uses in which the location's statement or value is."""
+        if location.anchor.kind not in VALUE_ANCHORS:
+            return self.resolve(location).names
+        line = self.resolve_value(location).start[0]
+        above = [one for one in functions_named(self, location.function) if one.line <= line]
+        return max(above, key=lambda one: one.line).names
 
     def resolve(self, location: FaultLocation) -> Site:
         """The statement that `location` names; MutatorError with candidates unless there is exactly one."""

@@ -194,6 +194,14 @@ def test_one_value_in_another_is_refused() -> None:
         changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
 
 
+def test_names_are_those_of_its_own_function() -> None:
+    """Of several functions of one name, such as a property's, each knows its own names."""
+    source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
+    file = parse_file("m.py", source.encode(), Path())
+    first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
+    assert (file.names(first), file.names(second)) == ({"self"}, {"self", "value"})
+
+
 def test_a_file_in_another_encoding() -> None:
     """Columns are bytes of the file's encoding, whatever Python counts."""
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
