@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from mutator._common.files import is_no_file, raising_disk_full
+from mutator._common.files import is_no_file, no_pipe, raising_disk_full
 from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
@@ -99,9 +99,9 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
 
 
 def _opened(path: Path, more: int = 0) -> int:
-    """The file there, open; MutatorError for a folder, and for a link: nothing is written to its end."""
+    """The file there, open; MutatorError for a folder, a pipe, and a link: nothing is written to its end."""
     try:
-        return os.open(path, os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
+        return os.open(no_pipe(path), os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:
         if isinstance(err, FileNotFoundError) or not is_no_file(err):
             raise

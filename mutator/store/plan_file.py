@@ -12,7 +12,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, overload
 
-from mutator._common.files import raising_disk_full, writing_atomic
+from mutator._common.files import no_pipe, raising_disk_full, writing_atomic
 from mutator._common.hashing import added_values, canonical, content_id, plain
 from mutator.errors import MutatorError
 from mutator.model import (
@@ -190,7 +190,7 @@ def iterate(run: Path) -> Iterator[Experiment]:
 def lines_of(path: Path) -> Iterator[bytes]:
     """The lines of a plan file, one at a time, with their ends."""
     try:
-        with path.open("rb") as file:
+        with no_pipe(path).open("rb") as file:
             yield from file
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path, remedy=_REMEDY) from None

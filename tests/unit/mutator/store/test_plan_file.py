@@ -1,6 +1,7 @@
 """The frozen plan on disk, and plans that other versions wrote."""
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -63,6 +64,14 @@ def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
     del line["trigger"]["armed_after_s"], line["trigger"]["hold_s"]
     read = plan_file.experiment_from(line, {planned.fault.id: planned.fault})
     assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
+
+
+def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
+    """Who opened the pipe would wait for a writer for ever."""
+    (tmp_path / "plan").mkdir()
+    os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
+    with pytest.raises(MutatorError, match="experiments.jsonl: cannot be read"):
+        list(plan_file.ids(tmp_path))
 
 
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])

@@ -1,6 +1,7 @@
 """The run folder: opened, owned by one."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -103,9 +104,14 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
 
 @pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
 def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
-    """A folder in the place of a lock is named, and so is a link, whose end is not written to."""
+    """A folder or a pipe in the place of a lock is named, and so is a link, whose end is not written to."""
     place = folder.path / name
     place.unlink(missing_ok=True)
+    place.parent.mkdir(exist_ok=True)
+    os.mkfifo(place)
+    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+        locks.owned(folder.path).__enter__()
+    place.unlink()
     place.mkdir(parents=True)
     with pytest.raises(MutatorError, match=rf"{name}: no file"):
         locks.owned(folder.path).__enter__()
