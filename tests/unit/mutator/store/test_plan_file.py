@@ -70,7 +70,7 @@ def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
     """Who opened the pipe would wait for a writer for ever."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
-    with pytest.raises(MutatorError, match="experiments.jsonl: cannot be read"):
+    with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
         list(plan_file.ids(tmp_path))
 
 
