@@ -1,7 +1,7 @@
 """The review page: every group with its state, diff and values, in one self-contained file."""
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -22,18 +22,30 @@ SCRIPTS = ("dom.js", "packed.js", "diff.js", "review.js")
 
 def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
     """Write the page of `groups`; the commands on it have these `options`, which select the groups."""
+    try:
+        write_atomic(out, page_html(review, groups, options).encode())
+    except OSError as err:
+        raise MutatorError(
+            f"cannot be written ({err.strerror})", where=out, remedy="name another file"
+        ) from None
+
+
+def page_html(
+    review: Review,
+    groups: Sequence[Group],
+    options: Sequence[str],
+    served: Mapping[str, Any] | None = None,
+) -> str:
+    """The page of `groups`. `served` is what a page needs that a server shows (target, reviewer, where to
+    send decisions, runs); None for a file."""
     data = {
         "target": review.target,
         "states": [state.value for state in State],
         "options": shlex.join(options),
         "groups": [_group(review, group) for group in groups],
+        "served": served,
     }
-    try:
-        write_atomic(out, render_page(data).encode())
-    except OSError as err:
-        raise MutatorError(
-            f"cannot be written ({err.strerror})", where=out, remedy="name another file"
-        ) from None
+    return render_page(data)
 
 
 def render_page(data: dict[str, Any]) -> str:
