@@ -1,7 +1,11 @@
-"""The review page: every group with its state, diff and values, in one self-contained file."""
+"""The review page: every group with its state, diff and values, in one self-contained file.
+
+A server shows the same page; there, what a reviewer says is kept as it is said (`served`).
+"""
 
 import shlex
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +13,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from mutator._common.files import write_atomic
+from mutator._common.hashing import content_id
 from mutator.errors import MutatorError
 from mutator.mutants.probe import tag_words
 from mutator.review.catalogue import Group
@@ -17,7 +22,18 @@ from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset, embedded, plainly_embedded
 
 STYLES = ("base.css", "review.css")
-SCRIPTS = ("dom.js", "packed.js", "diff.js", "review.js")
+SCRIPTS = (  # each uses those before it
+    "dom.js",
+    "packed.js",
+    "diff.js",
+    "review_changes.js",
+    "review_beside.js",
+    "review_card.js",
+    "review_stacks.js",
+    "review_commands.js",
+    "review_outbox.js",
+    "review.js",
+)
 
 
 def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
@@ -42,7 +58,7 @@ def page_html(
         "target": review.target,
         "states": [state.value for state in State],
         "options": shlex.join(options),
-        "groups": [_group(review, group) for group in groups],
+        "groups": [_group(review, group, like) for group, like in _in_stacks(review, groups)],
         "served": served,
     }
     return render_page(data)
@@ -56,6 +72,7 @@ def render_page(data: dict[str, Any]) -> str:
     return environment.from_string(asset("review.html")).render(
         target=data["target"],
         count=len(data["groups"]),
+        served=data.get("served") is not None,
         styles=[Markup(asset(name)) for name in STYLES],
         tags=Markup(plainly_embedded(tag_words(), "tags")),
         data=Markup(embedded(data, "review")),
@@ -63,12 +80,50 @@ def render_page(data: dict[str, Any]) -> str:
     )
 
 
-def _group(review: Review, group: Group) -> dict[str, Any]:
-    heads, rows = value_table(group)
+def state_of(review: Review, group: Group) -> dict[str, Any]:
+    """What reviewers have said of a group, as the page shows it and a server sends it.
+
+    `digest` says which mutants that is: a page made of others must not decide about these.
+    """
+    decision = review.decisions.get(group.id)
     return {
-        "id": group.id,
         "state": review.state(group).value,
-        "decision": review.describe(group),
+        "decision": decision
+        and {
+            "verdict": decision.verdict.value,
+            "by": decision.by,
+            "at": "",
+            "commit": "",
+            "tool": "",
+            "text": decision.remark,
+            "changed": decision.changed(group),
+        },
+        "remarks": [],
+        "flag": None,
+        "revision": "",
+        "digest": content_id(asdict(group.bound))[:12],
+    }
+
+
+def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
+    """The groups, those of a state with one template in one function next to each other, each with the number
+    of its kind."""
+    kinds: dict[tuple[object, ...], int] = {}
+    numbered = [
+        (
+            group,
+            kinds.setdefault((review.state(group), group.files, group.functions, group.models), len(kinds)),
+        )
+        for group in groups
+    ]
+    return sorted(numbered, key=lambda pair: pair[1])
+
+
+def _group(review: Review, group: Group, like: int) -> dict[str, Any]:
+    heads, rows = value_table(group)
+    return state_of(review, group) | {
+        "id": group.id,
+        "like": like,
         "injections": group.injections,
         "specs": group.specs,
         "trigger": group.trigger,
@@ -77,6 +132,8 @@ def _group(review: Review, group: Group) -> dict[str, Any]:
         "faults": len(group.faults),
         "runs": group.runs,
         "diff": group.diff,
+        "changes": "",
+        "pictures": "image_effect" in group.models,
         "heads": heads,
         "rows": rows,
     }

@@ -10,6 +10,7 @@ const Dom = (() => {
     for (const [name, value] of Object.entries(attributes)) {
       if (value === null || value === undefined || value === false) continue;
       if (name.startsWith("on")) made.addEventListener(name.slice(2), value);
+      else if (name === "style") made.style.cssText = value; // a content security policy forbids the attribute
       else made.setAttribute(name, value === true ? "" : value);
     }
     made.append(...children.flat(Infinity).filter((c) => c !== null && c !== undefined && c !== false));

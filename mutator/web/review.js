@@ -1,22 +1,30 @@
 "use strict";
-// The review page: groups found and shown, marks collected into the commands that make them decisions.
-// What is shown is kept in the address behind #, so that it can be shared: #g=GROUP&q=words&state=new,changed&diff=split
+// The review page: groups found, shown and decided about. What is shown is kept in the address behind #, so that it can be
+// shared: #g=GROUP&q=words&state=new,changed&flag=1&diff=split
 
 const Review = (() => {
-  const { el, copyButton } = Dom;
+  const { el } = Dom;
   const find = (id) => document.getElementById(id);
-  const MARKS = { approve: "a", reject: "r" };
-  const plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
+  const plural = Card.plural;
+  const DECISIONS = ["approve", "reject"];
 
   class Page {
     constructor(data) {
       this.data = data;
-      this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking
-      this.cards = new Map();
-      this.texts = new Map(data.groups.map((g) => [g.id, words(g)]));
+      this.groups = new Map(data.groups.map((g) => [g.id, g]));
+      this.said = new Map(); // group id -> the timer of what its card says
+      const actions = {
+        mark: (ids, kind, text) => this.mark(ids, kind, text), show: (id) => this.#show(id), unfold: (id) => this.#unfold(id),
+        resolve: (id, isMine) => this.#resolve(id, isMine),
+      };
+      this.cards = new Map(data.groups.map((g) => [g.id, new Card(g, data, actions)]));
+      this.stacks = new Stacks(this.cards, { ...actions, mark: (ids, kind) => this.#ask(ids, kind) });
+      this.conflicts = new Map(); // group id -> the mark that was not kept
       this.#read();
       this.#controls();
       this.#draw();
+      this.marks = data.served ? this.#outbox() : new Commands(data, (ids) => this.#changed(ids));
+      for (const [id, card] of this.cards) card.update(this.marks.pending(id));
       this.#apply();
       if (this.current) this.#show(this.current);
       addEventListener("popstate", () => {
@@ -27,11 +35,29 @@ const Review = (() => {
       addEventListener("keydown", (event) => this.#key(event));
     }
 
+    #outbox() {
+      return new Outbox(this.data.served, this.groups, {
+        changed: (ids) => this.#changed(ids),
+        kept: (ids) => ids.forEach((id) => this.#say(id, "saved")),
+        refused: (id, words) => {
+          this.#changed([id]);
+          this.#say(id, `not saved: ${words}`, true);
+        },
+        conflict: (id, words, item) => this.#conflict(id, words, item),
+        offline: (words) => {
+          if (find("banner").textContent === words) return;
+          find("banner").textContent = words;
+          find("banner").hidden = !words;
+        },
+      });
+    }
+
     #read() {
       const given = new URLSearchParams(location.hash.slice(1));
       this.query = given.get("q") || "";
       this.states = new Set((given.get("state") || "").split(",").filter((s) => this.data.states.includes(s)));
-      this.current = this.texts.has(given.get("g")) ? given.get("g") : "";
+      this.isFlagged = given.get("flag") === "1";
+      this.current = this.groups.has(given.get("g")) ? given.get("g") : "";
       this.mode = given.get("diff") === "split" ? "split" : "unified";
     }
 
@@ -40,192 +66,238 @@ const Review = (() => {
       if (this.current) state.set("g", this.current);
       if (this.query) state.set("q", this.query);
       if (this.states.size) state.set("state", [...this.states].join(","));
+      if (this.isFlagged) state.set("flag", "1");
       if (this.mode === "split") state.set("diff", "split");
       history.replaceState(null, "", `#${state}`);
     }
 
     #controls() {
-      const counts = new Map();
-      for (const g of this.data.groups) counts.set(g.state, (counts.get(g.state) || 0) + 1);
-      find("states").append(...this.data.states.map((state) =>
-        el("button", { type: "button", "data-state": state, onclick: () => this.#toggle(state) },
-          `${state} ${counts.get(state) || 0}`)));
+      const button = (name, onclick) => el("button", { type: "button", "data-state": name, onclick });
+      find("states").append(...this.data.states.map((state) => button(state, () => {
+        if (!this.states.delete(state)) this.states.add(state);
+        this.#apply();
+      })));
+      if (this.data.served) find("states").append(button("flagged", () => {
+        this.isFlagged = !this.isFlagged;
+        this.#apply();
+      }));
       find("find").addEventListener("input", () => {
         this.query = find("find").value.trim();
         this.#apply();
       });
       find("bar").addEventListener("submit", (event) => event.preventDefault());
       for (const mode of ["unified", "split"]) find(mode).addEventListener("click", () => this.#layout(mode));
+      for (const kind of DECISIONS) find(`${kind}-shown`).addEventListener("click", () => this.#ask(this.shown, kind));
       find("keys").addEventListener("click", () => find("help").showModal());
-      for (const id of ["by", "remark"]) find(id).addEventListener("input", () => this.#commands());
+      if (this.data.served) this.#servedControls(this.data.served);
     }
 
-    #toggle(state) {
-      if (!this.states.delete(state)) this.states.add(state);
-      this.#apply();
+    #servedControls({ by, runs }) {
+      const name = find("by"), run = find("run"), key = "mutator-review by";
+      name.value = localStorage.getItem(key) || by;
+      name.addEventListener("input", () => localStorage.setItem(key, name.value.trim()));
+      find("run-label").hidden = runs.length === 0;
+      run.append(...runs.map(({ key: value, name: text }) => el("option", { value }, text)), el("option", { value: "" }, "none"));
+      const observer = Beside.nearby((card) => {
+        const id = card.id.slice("group-".length);
+        Beside.typical(card.querySelector(":scope > .typical"), id, this.data.served, run.value);
+      });
+      const watch = () => {
+        observer.disconnect();
+        for (const { element } of this.cards.values()) observer.observe(element);
+      };
+      run.addEventListener("change", watch);
+      if (runs.length) watch();
+    }
+
+    #draw() {
+      for (const card of this.cards.values()) card.diff(this.mode);
+      find("groups").append(...[...this.cards.values()].map((card) => card.element),
+        el("p.nothing.quiet", { id: "nothing", hidden: true }, "No group is like that."));
     }
 
     #layout(mode) {
       this.mode = mode;
-      for (const g of this.data.groups) this.#diff(g);
+      for (const card of this.cards.values()) card.diff(mode);
       this.#apply();
     }
 
-    #draw() {
-      for (const g of this.data.groups) {
-        const card = this.#card(g);
-        this.cards.set(g.id, card);
-        this.#diff(g);
+    /** Show what is known now of groups; one that no longer fits the filter stays until the filter is changed. */
+    #changed(ids) {
+      for (const id of ids) this.cards.get(id).update(this.marks.pending(id));
+      this.#apply({ isKept: true });
+    }
+
+    /** Do something about groups; false: it needs a name first. A single group's decision is taken back by the same again. */
+    mark(all, kind, text = "") {
+      const outbox = this.data.served && this.marks;
+      if (!outbox) return this.marks.mark(all, kind);
+      const ids = all.filter((id) => !this.groups.get(id).isOther);
+      for (const id of all) if (!ids.includes(id)) this.#say(id, "made anew since: reload this page", true);
+      if (!ids.length) return false;
+      const by = find("by").value.trim();
+      if (!by) {
+        find("by").focus();
+        find("by").reportValidity();
+        return false;
       }
-      find("groups").append(...this.cards.values(), el("p.nothing.quiet", { id: "nothing", hidden: true }, "No group is like that."));
+      const [id] = ids, isDown = ids.length === 1 && this.cards.get(id).isMarked(kind, outbox.pending(id));
+      const done = isDown ? (kind === "flag" ? "unflag" : "clear") : kind;
+      for (const one of ids) {
+        this.#settle(one);
+        this.#say(one, "saving");
+      }
+      outbox.add(ids.map((group) => ({ group, kind: done, text })), by);
+      return true;
     }
 
-    #diff(g) {
-      renderDiff(this.cards.get(g.id).querySelector(".diffs"), g.diff, { mode: this.mode });
+    #say(id, text, isBad = false) {
+      clearTimeout(this.said.get(id));
+      this.cards.get(id).say(text, isBad);
+      if (text === "saved") this.said.set(id, setTimeout(() => this.cards.get(id).say(""), 4000));
     }
 
-    #card(g) {
-      const when = g.trigger ? `${g.trigger}, ${g.hold}` : "in every mutant";
-      const runs = g.runs === null ? "" : `, ${plural(g.runs, "experiment")}`;
-      const mark = (verb) =>
-        el("button", { type: "button", "data-mark": verb, "aria-pressed": "false", title: `Key ${MARKS[verb]}`,
-          onclick: () => this.#mark(g.id, verb) }, verb === "approve" ? "Approve" : "Reject");
-      return el("article.group", { id: `group-${g.id}`, tabindex: -1, "aria-labelledby": `id-${g.id}` },
-        el("header", {},
-          el("h2", { id: `id-${g.id}` }, el("a", { href: `#g=${g.id}`, onclick: (event) => this.#linked(event, g.id) }, g.id)),
-          el(`span.state.${g.state}`, {}, g.state),
-          el("span.quiet", {}, g.decision),
-          el("span.marks", {}, mark("approve"), mark("reject"))),
-        el("ul", {}, g.injections.map((text) => el("li", {}, injection(text)))),
-        el("p.facts.quiet", {}, `${when}${g.faults ? `; ${plural(g.faults, "fault")}` : ""}${runs}`),
-        el("div.diffs"),
-        g.conditions.length ? disclosure(`Triggers (${g.conditions.length})`, el("ul", {}, g.conditions.map((c) => el("li", {}, c)))) : null,
-        g.rows.length ? disclosure(`Values (${g.rows.length})${spans(g)}`, table(g), ".values") : null);
+    #conflict(id, words, item) {
+      this.conflicts.set(id, item);
+      const { decision, flag } = this.groups.get(id);
+      const other = decision ? `Meanwhile: ${Card.told(decision)}.` : flag ? `Meanwhile flagged by ${flag.by}.` : "Meanwhile the decision was taken back.";
+      this.cards.get(id).conflict(`${other} Your mark was not kept: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
+      this.#say(id, "not saved", true);
+      find("said").textContent = `${id}: ${words || other}`;
     }
 
-    #linked(event, id) {
-      event.preventDefault();
-      this.#show(id);
+    #settle(id) {
+      this.conflicts.delete(id);
+      this.cards.get(id).conflict("");
     }
 
-    #mark(id, verb) {
-      if (this.marks.get(id) === verb) this.marks.delete(id);
-      else this.marks.set(id, verb);
-      for (const button of this.cards.get(id).querySelectorAll("[data-mark]"))
-        button.setAttribute("aria-pressed", String(this.marks.get(id) === button.dataset.mark));
-      this.#commands();
+    #resolve(id, isMine) {
+      const { kind, text, by } = this.conflicts.get(id);
+      this.#settle(id);
+      this.#say(id, isMine ? "saving" : "");
+      if (isMine) this.marks.add([{ group: id, kind, text }], by);
+      this.cards.get(id).element.focus({ preventScroll: true });
     }
 
-    /** The commands that make the marks decisions. */
-    #commands() {
-      find("decide").hidden = this.marks.size === 0;
-      const by = quoted(find("by").value.trim() || "NAME");
-      const remark = find("remark").value.trim();
-      find("commands").replaceChildren(...Object.keys(MARKS).flatMap((verb) => {
-        const ids = [...this.marks].filter(([, v]) => v === verb).map(([id]) => id);
-        if (!ids.length) return [];
-        const parts = ["mutator review", verb, ...ids, this.data.options, `--by ${by}`, remark && `--remark ${quoted(remark)}`];
-        const text = parts.filter(Boolean).join(" ");
-        return [el("div.command", {}, el("code", {}, text), copyButton(() => text))];
-      }));
+    /** Approve or reject several groups after a question that says how many and in which states they are. */
+    #ask(ids, kind) {
+      if (!ids.length) return;
+      const verb = Card.VERBS[kind][0], folded = ids.filter((id) => this.cards.get(id).element.hidden).length;
+      const states = this.data.states.map((state) => [state, ids.filter((id) => this.groups.get(id).state === state).length]).filter(([, n]) => n);
+      find("ask-title").textContent = `${verb} ${plural(ids.length, "group")}?`;
+      find("ask-about").textContent = `Their states now: ${states.map(([state, n]) => `${n} ${state}`).join(", ")}.`
+        + (folded ? ` ${folded} of them ${folded === 1 ? "is" : "are"} folded under others like them.` : "");
+      find("ask-yes").textContent = `${verb} ${ids.length}`;
+      find("ask").returnValue = "";
+      find("ask").showModal();
+      find("ask-yes").focus();
+      find("ask").addEventListener("close", () => find("ask").returnValue === "yes" && this.mark(ids, kind), { once: true });
     }
 
-    /** Hide what is not asked for. */
-    #apply() {
+    /** Hide what is not asked for; `isKept`: what is shown stays, although it may fit no more. */
+    #apply({ isKept = false } = {}) {
       const wanted = this.query.toLowerCase().split(/\s+/).filter(Boolean);
-      let shown = 0;
-      for (const g of this.data.groups) {
-        const fits = (!this.states.size || this.states.has(g.state)) && wanted.every((w) => this.texts.get(g.id).includes(w));
-        this.cards.get(g.id).hidden = !fits;
-        shown += fits;
-      }
-      find("nothing").hidden = shown > 0;
-      find("found").textContent = shown === this.data.groups.length ? plural(shown, "group") : `${shown} of ${plural(this.data.groups.length, "group")}`;
+      const fits = (g) => (!this.states.size || this.states.has(g.state)) && (!this.isFlagged || g.flag)
+        && wanted.every((w) => this.cards.get(g.id).words.includes(w));
+      const before = new Set(isKept ? this.shown : []);
+      this.shown = this.data.groups.filter((g) => fits(g) || before.has(g.id)).map((g) => g.id);
+      const seen = this.stacks.fold(this.shown);
+      for (const [id, { element }] of this.cards) element.hidden = !seen.has(id);
+      find("nothing").hidden = this.shown.length > 0;
+      this.#counts();
       if (find("find").value.trim() !== this.query) find("find").value = this.query;
-      for (const button of find("states").children) button.setAttribute("aria-pressed", String(this.states.has(button.dataset.state)));
       for (const mode of ["unified", "split"]) find(mode).setAttribute("aria-pressed", String(mode === this.mode));
       this.#write();
     }
 
-    /** Make a group the current one and bring it into view. */
+    #counts() {
+      const { groups, states } = this.data, all = plural(groups.length, "group");
+      find("found").textContent = this.shown.length === groups.length ? all : `${this.shown.length} of ${all}`;
+      for (const button of find("states").children) {
+        const name = button.dataset.state, isFlag = name === "flagged";
+        const count = groups.filter((g) => (isFlag ? g.flag : g.state === name)).length;
+        button.textContent = `${name} ${count}`;
+        button.setAttribute("aria-pressed", String(isFlag ? this.isFlagged : this.states.has(name)));
+      }
+      const isFiltered = this.shown.length < groups.length, none = this.shown.length === 0;
+      for (const kind of DECISIONS) {
+        find(`${kind}-shown`).textContent = `${Card.VERBS[kind][0]} ${isFiltered ? `these ${this.shown.length}` : `all ${groups.length}`}`;
+        find(`${kind}-shown`).disabled = none || !states.length;
+      }
+    }
+
+    #unfold(id) {
+      const [first] = this.stacks.of(id);
+      this.stacks.toggle(first);
+      this.#apply({ isKept: true });
+      if (this.cards.get(this.current)?.element.hidden) this.#show(first);
+    }
+
+    /** Make a group the current one and bring it into view; one that is folded away is opened. */
     #show(id) {
       this.current = id;
-      for (const [name, card] of this.cards) {
-        if (name === id) card.setAttribute("aria-current", "true");
-        else card.removeAttribute("aria-current");
-      }
-      const card = this.cards.get(id);
-      card.focus({ preventScroll: true });
-      card.scrollIntoView({ block: "start" });
+      const { element } = this.cards.get(id);
+      if (element.hidden && this.shown.includes(id)) this.#unfold(id);
+      for (const card of this.cards.values()) card.element.removeAttribute("aria-current");
+      element.setAttribute("aria-current", "true");
+      element.focus({ preventScroll: true });
+      element.scrollIntoView({ block: "start" });
       this.#write();
     }
 
     #move(by) {
-      const shown = this.data.groups.map((g) => g.id).filter((id) => !this.cards.get(id).hidden);
-      if (!shown.length) return;
-      const at = shown.indexOf(this.current);
-      this.#show(shown[at < 0 ? 0 : Math.min(Math.max(at + by, 0), shown.length - 1)]);
+      const seen = this.shown.filter((id) => !this.cards.get(id).element.hidden);
+      if (!seen.length) return;
+      const at = seen.indexOf(this.current);
+      this.#show(seen[at < 0 ? 0 : Math.min(Math.max(at + by, 0), seen.length - 1)]);
     }
 
     #key(event) {
-      if (event.ctrlKey || event.metaKey || event.altKey || find("help").open) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || find("help").open || find("ask").open) return;
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) {
-        if (event.key === "Escape") event.target.blur();
+        if (event.key === "Escape") this.#leave(event.target);
         return;
       }
-      const values = this.current && this.cards.get(this.current).querySelector("details.values");
-      const done = {
-        j: () => this.#move(1),
-        k: () => this.#move(-1),
-        a: () => this.current && this.#mark(this.current, "approve"),
-        r: () => this.current && this.#mark(this.current, "reject"),
-        v: () => values && (values.open = !values.open),
-        m: () => this.#layout(this.mode === "split" ? "unified" : "split"),
-        "/": () => find("find").focus(),
-        "?": () => find("help").showModal(),
-      }[event.key];
+      const done = this.#keys()[event.key];
       if (!done) return;
       event.preventDefault();
       done();
     }
+
+    /** Out of a field, back to the current group. */
+    #leave(field) {
+      field.blur();
+      this.cards.get(this.current)?.element.focus({ preventScroll: true });
+    }
+
+    #keys() {
+      const id = this.current, card = id ? this.cards.get(id).element : null;
+      const on = (todo) => () => card && !card.hidden && todo();
+      const open = (name) => on(() => {
+        const details = card.querySelector(`:scope > details.${name}`);
+        if (details && !details.hidden) details.open = !details.open;
+      });
+      const served = {
+        u: on(() => this.groups.get(id).decision && this.mark([id], "clear")),
+        f: on(() => this.mark([id], "flag")),
+        c: on(() => card.querySelector(":scope > form.remark input").focus()),
+        n: () => find("by").focus(),
+      };
+      return {
+        j: () => this.#move(1), k: () => this.#move(-1),
+        a: on(() => this.mark([id], "approve")), r: on(() => this.mark([id], "reject")),
+        o: on(() => this.stacks.of(id).length > 1 && this.#unfold(id)), s: on(() => this.#ask(this.stacks.of(id), "approve")),
+        A: () => this.#ask(this.shown, "approve"), R: () => this.#ask(this.shown, "reject"),
+        v: open("values"), t: open("triggers"), d: open("since"),
+        m: () => this.#layout(this.mode === "split" ? "unified" : "split"),
+        "/": () => find("find").focus(), "?": () => find("help").showModal(),
+        ...(this.data.served ? served : {}),
+      };
+    }
   }
-
-  /** All that a group can be found by. */
-  const words = (g) => [g.id, g.state, g.decision, ...g.injections, ...g.specs, g.trigger, g.hold].join(" ").toLowerCase();
-
-  /** `place: model(parameters)` with the model standing out. */
-  function injection(text) {
-    const [, place, model, rest] = /^(.*): (\w+)(\(.*\))$/.exec(text) || [null, text, "", ""];
-    return model ? [`${place}: `, el("span.model", {}, model), rest] : [place];
-  }
-
-  const disclosure = (title, content, name = "") => el(`details${name}`, {}, el("summary", {}, title), content);
-
-  /** The span of each hole that holds numbers: `: by - 245.0 to - 12.0`; a seed's says nothing. */
-  function spans(g) {
-    const told = g.heads.slice(2).flatMap((head, i) => {
-      const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);
-      if (head.endsWith("seed") || cells.some(([n]) => Number.isNaN(n))) return [];
-      cells.sort(([a], [b]) => a - b);
-      return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}`];
-    });
-    return told.length ? `: ${told.join(", ")}` : "";
-  }
-
-  function table(g) {
-    return el("div.scroll", { tabindex: 0, role: "region", "aria-label": `Values of ${g.id}` },
-      el("table", {},
-        el("thead", {}, el("tr", {}, g.heads.map((head) => el("th", { scope: "col" }, head)))),
-        el("tbody", {}, g.rows.map((row) => el("tr", {}, row.map((cell, i) => el(i < 2 ? "td" : "td.value", {}, cell)))))));
-  }
-
-  /** A word of a shell's command line. */
-  const quoted = (text) => (/^[\w.@/-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
 
   Packed.read("review").then((data) => {
     new Page(data);
     document.documentElement.dataset.ready = "";
   });
-
-  return { quoted };
 })();

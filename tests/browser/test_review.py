@@ -48,9 +48,17 @@ def shown(page: Any) -> int:
     return int(page.locator(".group:visible").count())
 
 
+def unfold(page: Any) -> None:
+    """Open every stack of groups that are like each other."""
+    closed = page.locator("[data-do=unfold][aria-expanded=false]:visible")
+    while closed.count():
+        closed.first.click()
+
+
 def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[..., Any]) -> None:
     """Words and states narrow the list; the address of what is seen shows the same again."""
     page = open_page()
+    unfold(page)
     assert (shown(page), page.inner_text("#found")) == (9, "9 groups")
     page.fill("#find", "omission time")
     assert (shown(page), page.inner_text("#found")) == (1, "1 of 9 groups")
@@ -66,6 +74,7 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
     """Keys go from group to group and mark them; the commands name them as a shell needs it."""
     page = open_page("q=longer")
+    unfold(page)
     for key in "jajr":
         page.keyboard.press(key)
     page.fill("#by", "Jane O'Neil")
@@ -79,6 +88,34 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
     page.keyboard.press("Escape")
     page.keyboard.press("r")
     assert page.locator("#commands code").count() == 1
+
+
+def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None:
+    """The first of them stands for all: a key opens the others, another marks them after a question."""
+    page = open_page("q=longer")
+    assert shown(page) == 1
+    assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
+    page.keyboard.press("j")
+    page.keyboard.press("s")
+    assert page.inner_text("#ask-title") == "Approve 2 groups?"
+    assert "1 of them is folded" in page.inner_text("#ask-about")
+    page.keyboard.press("Enter")
+    assert page.inner_text("#commands code").count(" ") == 2 + 2 + 2 + 2  # verb, ids, --spec, --by
+    page.keyboard.press("o")
+    assert shown(page) == 2
+    assert page.locator("[data-mark=approve][aria-pressed=true]:visible").count() == 2
+
+
+def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
+    """The question says how many there are and in which states; without a yes nothing is done."""
+    page = open_page("q=longer")
+    page.keyboard.press("Shift+R")
+    assert page.inner_text("#ask-title") == "Reject 2 groups?"
+    page.keyboard.press("Escape")
+    assert not page.is_visible("#commands")
+    page.click("#reject-shown")
+    page.click("#ask-yes")
+    assert page.inner_text("#commands code").startswith("mutator review reject ")
 
 
 def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:

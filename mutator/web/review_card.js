@@ -1,0 +1,205 @@
+"use strict";
+// A group as a card: what it is, what was decided, its diff and values, the remarks about it.
+
+class Card {
+  static VERBS = { approve: ["Approve", "a"], reject: ["Reject", "r"] };
+  static plural = (n, word) => `${n.toLocaleString("en")} ${word}${n === 1 ? "" : "s"}`;
+
+  /** `actions`: mark(ids, kind, text), show(id), unfold(id), resolve(id, isMine). */
+  constructor(group, data, actions) {
+    Object.assign(this, { group, data, actions });
+    this.element = this.#made();
+  }
+
+  #part(name) {
+    return this.element.querySelector(`:scope > .${name}`);
+  }
+
+  get isServed() {
+    return Boolean(this.data.served);
+  }
+
+  #made() {
+    const { el } = Dom;
+    const { group } = this, { id } = group;
+    const linked = (event) => {
+      event.preventDefault();
+      this.actions.show(id);
+    };
+    return el("article.group", { id: `group-${id}`, tabindex: -1, "aria-labelledby": `id-${id}` },
+      el("header.head", {},
+        el("h2", { id: `id-${id}` }, el("a", { href: `#g=${id}`, onclick: linked }, id)),
+        el("span.state"), el("span.flagged", { hidden: true }, "flagged"), el("span.kept.quiet", { role: "status" }), this.#buttons()),
+      el("p.decision.quiet", { hidden: true }),
+      el("div.conflict", { role: "alert", hidden: true }),
+      el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
+      el("p.facts.quiet", {}, this.#facts()),
+      this.isServed && group.pictures ? Beside.pictures(group, this.data.served) : null,
+      el("div.typical", { hidden: true }),
+      el("details.since", { hidden: true }, el("summary", {}, "Changed since the decision"), el("div.content")),
+      el("div.diffs"),
+      group.conditions.length ? Card.#disclosure(`Triggers (${group.conditions.length})`, el("ul", {}, group.conditions.map((c) => el("li", {}, c))), ".triggers") : null,
+      group.rows.length ? Card.#disclosure(`Values (${group.rows.length})${Card.#spans(group)}`, this.#values(), ".values") : null,
+      el("ul.remarks", { "aria-label": "Remarks", hidden: true }),
+      this.isServed ? this.#remarkForm() : null,
+      el("div.alike", { hidden: true }));
+  }
+
+  #buttons() {
+    const { el } = Dom;
+    const { id } = this.group;
+    const button = (kind, text, key) =>
+      el("button", { type: "button", "data-mark": kind, "aria-pressed": "false", title: `Key ${key}`, "aria-label": `${text} ${id}`,
+        onclick: () => this.actions.mark([id], kind) }, text);
+    const decide = Object.entries(Card.VERBS).map(([kind, [text, key]]) => button(kind, text, key));
+    return el("span.marks", {}, decide, this.isServed ? button("flag", "Flag", "f") : null);
+  }
+
+  #facts() {
+    const { trigger, hold, faults, runs } = this.group;
+    const when = trigger ? `${trigger}, ${hold}` : "in every mutant";
+    return `${when}${faults ? `; ${Card.plural(faults, "fault")}` : ""}${runs === null ? "" : `, ${Card.plural(runs, "experiment")}`}`;
+  }
+
+  #remarkForm() {
+    const { el } = Dom;
+    const { id } = this.group;
+    const field = el("input", { "aria-label": `Remark about ${id}`, placeholder: "Remark", maxlength: 2000, autocomplete: "off" });
+    const kept = (event) => {
+      event.preventDefault();
+      const text = field.value.trim();
+      if (text && this.actions.mark([id], "remark", text)) {
+        field.value = "";
+        this.element.focus({ preventScroll: true });
+      }
+    };
+    return el("form.remark", { onsubmit: kept }, field, el("button", {}, "Keep remark"));
+  }
+
+  /** Show what is known of the group now; `pending`: the kinds of its marks that are on their way. */
+  update(pending = new Set()) {
+    const { group } = this, header = this.#part("head");
+    const state = header.querySelector(".state");
+    state.className = `state ${group.state}`;
+    state.textContent = group.state;
+    header.querySelector(".flagged").hidden = !group.flag;
+    if (group.flag) header.querySelector(".flagged").title = `by ${group.flag.by}, ${Card.moment(group.flag.at)}`;
+    for (const button of header.querySelectorAll("[data-mark]")) button.setAttribute("aria-pressed", String(this.isMarked(button.dataset.mark, pending)));
+    const decision = this.#part("decision");
+    decision.textContent = Card.told(group.decision);
+    decision.hidden = !group.decision;
+    this.#since();
+    this.#remarks();
+  }
+
+  /** Whether a button is down: by a mark on its way, else by what is decided and holds. */
+  isMarked(kind, pending) {
+    const { state, flag } = this.group;
+    if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
+    if (["approve", "reject", "clear"].some((other) => pending.has(other))) return pending.has(kind);
+    return this.isServed && state === { approve: "approved", reject: "rejected" }[kind];
+  }
+
+  /** What became of the last mark: `saving`, `saved 15:20`. */
+  say(text, isBad = false) {
+    const kept = this.#part("head").querySelector(".kept");
+    kept.textContent = text;
+    kept.classList.toggle("bad", isBad);
+  }
+
+  /** What another reviewer did meanwhile; null: nothing. `mine`: the kind of my mark that was not kept. */
+  conflict(words, mine) {
+    const { el } = Dom;
+    const place = this.#part("conflict");
+    place.hidden = !words;
+    if (!words) {
+      place.replaceChildren();
+      return;
+    }
+    const answer = (text, isMine) => el("button", { type: "button", onclick: () => this.actions.resolve(this.group.id, isMine) }, text);
+    place.replaceChildren(el("p", {}, words), el("p", {}, answer(`${Card.name(mine)} all the same`, true), " ", answer("Leave it as it is", false)));
+  }
+
+  static name(kind) {
+    return { approve: "Approve", reject: "Reject", clear: "Take back", flag: "Flag", unflag: "Remove the flag", remark: "Remark" }[kind];
+  }
+
+  /** A decision in a line: who, when, about which commit, what has changed since. */
+  static told(decision) {
+    if (!decision) return "";
+    const { verdict, by, at, text, commit, tool, changed } = decision;
+    const source = [commit && `commit ${commit.slice(0, 10)}`, tool && `mutator ${tool}`].filter(Boolean).join(", ");
+    return [`${verdict} by ${by}${at ? `, ${Card.moment(at)}` : ""}${source ? ` (${source})` : ""}${text ? `: ${text}` : ""}`,
+      changed.length ? `changed since: ${changed.join(", ")}` : ""].filter(Boolean).join("; ");
+  }
+
+  /** A time as people write it, in their zone. */
+  static moment(text) {
+    const at = new Date(text);
+    if (!text || Number.isNaN(at.getTime())) return text || "";
+    return at.toLocaleString("en-GB", { day: "numeric", month: "short", year: "numeric", hour: "2-digit", minute: "2-digit" });
+  }
+
+  #remarks() {
+    const { el } = Dom;
+    const list = this.#part("remarks"), { remarks } = this.group;
+    list.hidden = remarks.length === 0;
+    list.replaceChildren(...remarks.map(({ by, at, text }) => el("li", {}, el("span.quiet", {}, `${by}${at ? `, ${Card.moment(at)}` : ""}: `), text)));
+  }
+
+  /** The changes are fetched when they are opened, and again after each decision. */
+  #since() {
+    const since = this.#part("since"), isChanged = this.group.state === "changed";
+    since.hidden = !isChanged;
+    if (!isChanged) since.open = false;
+    if (since.dataset.tied) return;
+    since.dataset.tied = "yes";
+    since.addEventListener("toggle", async () => {
+      if (!since.open) return;
+      const place = since.querySelector(".content");
+      if (!this.isServed) Changes.render(place, this.group.changes);
+      else await Beside.changes(place, this.group.id, this.data.served);
+    });
+  }
+
+  diff(mode) {
+    renderDiff(this.#part("diffs"), this.group.diff, { mode });
+  }
+
+  /** All that a group can be found by. */
+  get words() {
+    const g = this.group;
+    return [g.id, g.state, Card.told(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
+      .join(" ").toLowerCase();
+  }
+
+  /** `place: model(parameters)` with the model standing out. */
+  static #injection(text) {
+    const [, place, model, rest] = /^(.*): (\w+)(\(.*\).*)$/.exec(text) || [null, text, "", ""];
+    return model ? [`${place}: `, Dom.el("span.model", {}, model), rest] : [place];
+  }
+
+  static #disclosure(title, content, name = "") {
+    return Dom.el(`details${name}`, {}, Dom.el("summary", {}, title), content);
+  }
+
+  /** The span of each hole that holds numbers: `: by - 245.0 to - 12.0`; a seed's says nothing. */
+  static #spans(g) {
+    const told = g.heads.slice(2).flatMap((head, i) => {
+      const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);
+      if (head.endsWith("seed") || cells.some(([n]) => Number.isNaN(n))) return [];
+      cells.sort(([a], [b]) => a - b);
+      return [`${head} ${cells[0][1]} to ${cells.at(-1)[1]}`];
+    });
+    return told.length ? `: ${told.join(", ")}` : "";
+  }
+
+  #values() {
+    const { el } = Dom;
+    const g = this.group;
+    return el("div.scroll", { tabindex: 0, role: "region", "aria-label": `Values of ${g.id}` },
+      el("table", {},
+        el("thead", {}, el("tr", {}, g.heads.map((head) => el("th", { scope: "col" }, head)))),
+        el("tbody", {}, g.rows.map((row) => el("tr", {}, row.map((cell, i) => el(i < 2 ? "td" : "td.value", {}, cell)))))));
+  }
+}

@@ -1,0 +1,35 @@
+"use strict";
+// A diff of diffs: what a reviewer saw against what is there now, each line with a sign of its own and, in the part that
+// is a diff itself, the one it had there.
+
+const Changes = (() => {
+  const { el } = Dom;
+  const KINDS = { "+": "added", "-": "removed", " ": "same" };
+
+  /** The rows of a unified diff without its two heads. */
+  function rows(text) {
+    const lines = text.split("\n");
+    const first = lines.findIndex((line) => line.startsWith("@@"));
+    return lines.slice(Math.max(first, 0)).filter((line) => line && !line.startsWith("\\")).map((line) => {
+      if (line.startsWith("@@")) return el("tr.hunk", {}, el("td", {}, line));
+      const kind = KINDS[line[0]] || "same";
+      return el(`tr.${kind}`, {}, el(`td.code.${kind}`, { "data-sign": line[0] }, el("code", {}, inner(line.slice(1)))));
+    });
+  }
+
+  /** A line in colours; a sign that it begins with is that of the diff inside. */
+  function inner(text) {
+    const sign = /^[-+](?![-+]{2} )/.exec(text);
+    return sign ? [el(`span.inner.${KINDS[sign[0]]}`, {}, sign[0]), ...Diff.coloured(text.slice(1))] : Diff.coloured(text);
+  }
+
+  /** Show the changes in `place`. */
+  function render(place, text) {
+    place.replaceChildren(text
+      ? el("div.file", {}, el("div.scroll", { tabindex: 0, role: "region", "aria-label": "Changed since the decision" },
+        el("table.diff.changes", {}, el("tbody", {}, rows(text)))))
+      : el("p.quiet", {}, "What the reviewer saw was not kept, so there is nothing to compare with."));
+  }
+
+  return { render };
+})();

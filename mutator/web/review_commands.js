@@ -1,0 +1,47 @@
+"use strict";
+// Marks on a page without a server: they become the commands that make them decisions.
+
+class Commands {
+  /** `changed(ids)` is called for groups whose marks have changed. */
+  constructor(data, changed) {
+    Object.assign(this, { data, changed });
+    this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking
+    for (const id of ["by", "remark"]) document.getElementById(id).addEventListener("input", () => this.#show());
+  }
+
+  pending(id) {
+    return new Set(this.marks.has(id) ? [this.marks.get(id)] : []);
+  }
+
+  /** Mark groups; the mark that a single one has already is taken off. */
+  mark(ids, kind) {
+    if (!["approve", "reject"].includes(kind)) return false;
+    const isOff = ids.length === 1 && this.marks.get(ids[0]) === kind;
+    for (const id of ids) {
+      this.marks.delete(id);
+      if (!isOff) this.marks.set(id, kind);
+    }
+    this.changed(ids);
+    this.#show();
+    return true;
+  }
+
+  #show() {
+    const { el, copyButton } = Dom;
+    document.getElementById("decide").hidden = this.marks.size === 0;
+    const by = Commands.quoted(document.getElementById("by").value.trim() || "NAME");
+    const remark = document.getElementById("remark").value.trim();
+    document.getElementById("commands").replaceChildren(...["approve", "reject"].flatMap((kind) => {
+      const ids = [...this.marks].filter(([, k]) => k === kind).map(([id]) => id);
+      if (!ids.length) return [];
+      const parts = ["mutator review", kind, ...ids, this.data.options, `--by ${by}`, remark && `--remark ${Commands.quoted(remark)}`];
+      const text = parts.filter(Boolean).join(" ");
+      return [el("div.command", {}, el("code", {}, text), copyButton(() => text))];
+    }));
+  }
+
+  /** A word of a shell's command line. */
+  static quoted(text) {
+    return /^[\w.@/-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
+  }
+}
