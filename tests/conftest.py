@@ -41,6 +41,35 @@ from mutator.triggers.kinds import always
 from mutator.workspace import Workspace
 
 _TESTS = Path(__file__).parent
+_LENS = """\
+import numpy as np
+
+
+class Light:
+    def __init__(self, amount, seed, camera):
+        self.amount = amount
+
+    def apply(self, picture, scene):
+        return np.clip(picture + self.amount, 0, 255).astype(np.uint8)
+"""
+_LIGHT = """\
+schema: fault_spec/1
+module: sensor
+fault_type: light
+about: The picture is too light.
+variants:
+  level:
+    aim: H3
+    about: By so many grey levels.
+    draw:
+      level: {{values: {values}}}
+    as_described:
+      injections:
+        - at: {{file: toycar/sensing.py, function: Sensor.sense, after_assign: {place}}}
+          model: image_effect
+          unit: '1'
+          params: {{effect: toycar.lens.Light, target: {target}, amount: level, camera: self, scene: world}}
+"""
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # a shell starts what it puts into the background deaf to Ctrl-C, and so would be the commands under test
@@ -119,6 +148,30 @@ def copy_toycar() -> Callable[[Path], Workspace]:
         return Workspace(library=root / "fault_library", templates=root / "templates")
 
     return copy
+
+
+@pytest.fixture(scope="session")
+def give_eyes() -> Callable[..., None]:
+    """Lets the car of a copied toy see a picture, and gives its library an image effect, `sensor/light`."""
+
+    def give(
+        toycar: Workspace,
+        values: str = "[10, 20, 40, 80, 160]",
+        picture: str = "np.full((12, 16), 90, np.uint8)",
+        target: str = "picture",
+        place: str = "picture",
+    ) -> None:
+        tree = toycar.library.parent / "tree/toycar"
+        text = (tree / "sensing.py").read_text()
+        offset = "        offset = world.offset\n"
+        seen = f"        picture = {picture}\n        self.picture = picture\n{offset}"
+        text = text.replace("class Sensor", "import numpy as np\n\n\nclass Sensor").replace(offset, seen)
+        (tree / "sensing.py").write_text(text)
+        (tree / "lens.py").write_text(_LENS)
+        spec = _LIGHT.format(values=values, target=target, place=place)
+        (toycar.library / "faults/sensor/light.yaml").write_text(spec)
+
+    return give
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@
       checks/<digest>/     passed checks of campaigns, with their golden runs
       runs/<digest>.json   finished runs that were verified: what was found
       lines/<digest>.json  the lines that a golden run executes
+      pictures/<digest>.json  what image effects do to a picture, for their review
       targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
 
 Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
@@ -17,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, RUNS, LINES, TARGETS = "checks", "runs", "lines", "targets"
+CHECKS, RUNS, LINES, PICTURES, TARGETS = "checks", "runs", "lines", "pictures", "targets"
 TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with many seeds
 
 
@@ -25,8 +26,8 @@ TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with m
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `runs`, `lines`, `target openpilot`. `size` is what it takes on the
-    disk, in bytes, and `used` when it was last read or written, in seconds since the epoch.
+    `what` says whose it is: `checks`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is what it
+    takes on the disk, in bytes, and `used` when it was last read or written, in seconds since the epoch.
     """
 
     what: str
@@ -68,6 +69,11 @@ def of_lines() -> Path:
     return folder() / LINES
 
 
+def of_pictures() -> Path:
+    """Where it is kept what image effects do to a picture."""
+    return folder() / PICTURES
+
+
 def of_target(name: str) -> Path:
     """Where the target of that name keeps what its runs share; any name is one folder there."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
@@ -78,6 +84,7 @@ def entries() -> list[Entry]:
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
     found += [_entry(LINES, path) for path in _children(of_lines())]
+    found += [_entry(PICTURES, path) for path in _children(of_pictures())]
     for target in _children(folder() / TARGETS):
         found += [_entry(f"target {target.name}", path) for path in _files(target)]
     return sorted(found, key=lambda entry: (entry.what, entry.path))

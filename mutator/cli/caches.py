@@ -46,8 +46,9 @@ def cache(
     """List what is cached on this machine, and delete what is too much.
 
     Passed checks of campaigns are kept for other run folders, pictures and detections of a target for its
-    other runs, which lines golden runs execute, and which finished runs were verified. It lies below
-    XDG_CACHE_HOME, or in ~/.cache. Results never depend on it; without it runs take longer.
+    other runs, which lines golden runs execute, what image effects look like, and which finished runs were
+    verified. It lies below XDG_CACHE_HOME, or in ~/.cache. Results never depend on it; without it runs take
+    longer.
     """
     if path + clear + (most is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")

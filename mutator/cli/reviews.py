@@ -45,6 +45,7 @@ Examples:
   mutator review --campaign quickstart             what one campaign runs
   mutator review --only 'state == "new" and match(file, "*radar*")'
   mutator review show 3f9a                         one group: diff with holes, values
+  mutator review show 3f9a --pictures DIR          what an image effect does to a picture, too
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
   mutator review walk --by "A. Reviewer"           one after the other
   mutator review page --out review.html
@@ -109,6 +110,10 @@ def list_groups(
 @with_place
 def show(
     groups: Groups,
+    pictures: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Write pictures before and after an image effect there, too."),
+    ] = None,
     campaign: Campaign = None,
     specs: Specs = None,
     reading: Reading = None,
@@ -122,11 +127,30 @@ def show(
     terminal = Terminal(as_json)
     found = _load(terminal, place, campaign, specs, reading, seed, manifest)
     shown = found.find(groups)
-    if as_json:
-        terminal.emit([review_view.data(found.review, group, whole=True) for group in shown])
-        return
-    for group in shown:
+    for group in () if as_json else shown:
         review_view.print_group(terminal, found.review, group)
+    written: dict[str, dict[str, str]] = {}
+    if pictures:
+        written = _write_pictures(terminal, place, found.review.target, shown, pictures)
+    if as_json:
+        facts = [review_view.data(found.review, group, whole=True) for group in shown]
+        terminal.emit([{**one, "pictures": written.get(str(one["group"]), {})} for one in facts])
+
+
+def _write_pictures(
+    terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
+) -> dict[str, dict[str, str]]:
+    """Write them, and say which value each shows; the files by group."""
+    from mutator.api.review_pictures import write_pictures
+
+    with terminal.wait("drawing"):
+        written, values = write_pictures(groups, target, folder, workspace=place.workspace())
+    for path, value in values.items():
+        terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
+    for group in groups:
+        if group.id not in written:
+            terminal.note(f"{group.id} has no pictures: it is no image effect in one place")
+    return written
 
 
 @with_place

@@ -41,7 +41,7 @@ def test_every_cache_has_a_line() -> None:
     """The table names the folders that `mutator cache` lists, and no others."""
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
-    assert folders == {caches.CHECKS, caches.LINES, caches.RUNS, caches.TARGETS}
+    assert folders == {caches.CHECKS, caches.LINES, caches.PICTURES, caches.RUNS, caches.TARGETS}
 
 
 def test_every_file_of_a_library_has_a_line() -> None:

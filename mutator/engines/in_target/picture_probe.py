@@ -1,0 +1,100 @@
+"""Stands in for the probe in a tree that is run for its pictures. Standard library and numpy only.
+
+When the run comes to the place of an image effect, the lines of every effect in ASKED are executed on the
+variables of that place, one effect after the other, each on the same picture. The pictures before and after
+are written to the run's folder, and the run ends.
+"""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FrameType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects: what `review.pictures` fills in
+FILE = "pictures.npz"
+
+_folder = Path.cwd()
+_left = 0  # observations that the run may still make
+_drawn = False
+
+
+def limit(max_steps: int) -> None:
+    """Let `observe` end the run after so many steps."""
+    global _left
+    _left = max_steps
+
+
+def observe(**values: float) -> None:
+    """Count a step; the run is over when the pictures are drawn, or when it takes too long."""
+    global _left
+    _left -= 1
+    if _drawn or _left < 0:
+        raise SystemExit
+
+
+def on() -> bool:
+    """Whether the fault is active: it always is."""
+    return True
+
+
+def call(fi: str, number: int) -> bool:
+    """Whether this execution counts: each does."""
+    return True
+
+
+def every(fi: str, number: int) -> bool:
+    """Whether this execution counts: each does."""
+    return True
+
+
+def active(fi: str) -> bool:
+    """Draw the pictures where it is first asked, and end the run."""
+    global _drawn
+    if not _drawn:
+        frame: FrameType | None = sys._getframe()
+        while frame is not None and not frame.f_code.co_filename.endswith(ASKED["file"]):
+            frame = frame.f_back
+        if frame is not None:
+            _draw({**frame.f_globals, **frame.f_locals})
+            _drawn = True
+            raise SystemExit
+    return False
+
+
+def _draw(names: dict[str, Any]) -> None:
+    """Write the pictures; `names` are the variables of the place."""
+    before = _picture(names)
+    after = []
+    for lines in ASKED["effects"]:
+        own = {**names, "_fi": SimpleNamespace(on=on, call=call, every=every, active=_yes, kept=_made)}
+        exec("\n".join(lines), own)
+        after.append(_picture(own))
+        exec(f"{ASKED['picture']} = _before", {**own, "_before": before.copy()})  # it may be an attribute
+    np.savez(_folder / FILE, before=before, **{f"after_{i}": one for i, one in enumerate(after)})
+
+
+def _picture(names: dict[str, Any]) -> Any:
+    picture = eval(ASKED["picture"], names)
+    shape = tuple(getattr(picture, "shape", ()))
+    kind = str(getattr(picture, "dtype", type(picture).__name__))
+    if kind != "uint8" or len(shape) not in (2, 3) or shape[2:] not in ((), (3,)):
+        raise TypeError(f"{ASKED['picture']} is {kind} of shape {shape}, and no grey or RGB picture of bytes")
+    return np.array(picture)
+
+
+def _yes(fi: str) -> bool:
+    return True
+
+
+def _made(fi: str, make: Callable[[], Any]) -> Any:
+    """What the effect keeps for a run: it is made for this picture alone."""
+    return make()
+
+
+def report() -> dict[str, Any]:
+    """What a probe tells of its run, as far as it is read."""
+    return {"mutant": ASKED["mutant"], "triggered": None, "injections": {}}

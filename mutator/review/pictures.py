@@ -1,0 +1,295 @@
+"""What an image effect does to a picture: before it, and after it at up to three levels.
+
+The target is run until it comes to the place of the injected lines. There these very lines are executed,
+with the values of several mutants, on the picture that the target has at that moment. So pictures show what a
+run would see, and need no word in the manifest. What was drawn is cached by all that it follows from.
+"""
+
+import base64
+import io
+import json
+import os
+import platform
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import correlation
+from threading import Lock
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from mutator._common import caches
+from mutator._common.files import ScratchFolder, json_bytes, no_pipe, write_atomic
+from mutator._common.hashing import content_id, digest
+from mutator.engines.in_target import picture_probe
+from mutator.engines.jobs import Job
+from mutator.engines.reference import ReferenceEngine, prepare_base
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.model import Fault, FaultLocation, Injection, Limits, Status
+from mutator.mutants.building import build
+from mutator.mutants.probe import probe_path
+from mutator.mutants.rendering import snippet
+from mutator.review.catalogue import Group
+from mutator.review.groups import parameter_values
+from mutator.targets.manifest import TargetManifest
+from mutator.targets.requirements import check_requirements
+from mutator.triggers.kinds import always
+from mutator.workspace import Workspace
+
+MODEL = "image_effect"
+LEVELS = ("least", "middle", "most")
+MOST = 9  # values of a group that are drawn, of which three are shown
+CLEAR = 0.5  # correlation of amount and change from which on the amount decides what is more severe
+QUALITY = 85  # of the JPEG files
+LIMITS = Limits(cpu_s=60, wall_s=120)
+_SCHEMA = "pictures/1"
+_drawing = Lock()  # a page asks for all the pictures of a group at once: the first request draws them
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Level:
+    """A picture after the effect: which of LEVELS, the fault's value in words, the JPEG file."""
+
+    name: str
+    label: str
+    after: bytes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Pictures:
+    """A group's pictures as JPEG files. Of a group with fewer than three different values there are fewer
+    levels: with one it is `most`, with two `least` and `most`."""
+
+    before: bytes
+    levels: tuple[Level, ...]
+
+    def level(self, name: str) -> Level | None:
+        """The level of that name; None if there is none."""
+        return next((level for level in self.levels if level.name == name), None)
+
+
+def has_pictures(group: Group) -> bool:
+    """Whether there are pictures of a group: all its image effects change the same variable in one place."""
+    return MODEL in group.models and all(_place(fault) for fault in group.faults)
+
+
+def of_group(
+    workspace: Workspace, manifest: TargetManifest, group: Group, level: str
+) -> tuple[bytes, bytes] | None:
+    """The picture before and after the effect at one of LEVELS, as JPEG files; None where there are none."""
+    found = of_groups(workspace, manifest, [group]).get(group.id)
+    wanted = found.level(level) if found else None
+    return (found.before, wanted.after) if found and wanted else None
+
+
+def of_groups(workspace: Workspace, manifest: TargetManifest, groups: Iterable[Group]) -> dict[str, Pictures]:
+    """The pictures of all groups that have any, by group, drawn unless they are cached.
+
+    Groups of one place are drawn in one process. MutatorError for a target that does not come to the place,
+    and for an effect that fails there.
+    """
+    models, scenario = workspace.fault_models(), _scenario(workspace)
+    wanted = {
+        group.id: _Wanted.of(manifest, models, scenario, group) for group in groups if has_pictures(group)
+    }
+    with _drawing:
+        found = {name: _recalled(one.key) for name, one in wanted.items()}
+        missing = {name: one for name, one in wanted.items() if found[name] is None}
+        if missing:
+            found |= _drawn_anew(manifest, models, scenario, missing)
+    return {name: pictures for name, pictures in found.items() if pictures}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Wanted:
+    """The faults of a group of which pictures are drawn, each with its injected lines."""
+
+    key: str
+    place: tuple[FaultLocation, str]
+    faults: tuple[Fault, ...]
+    lines: tuple[tuple[str, ...], ...]
+
+    @classmethod
+    def of(cls, manifest: TargetManifest, models: FaultModels, scenario: Path, group: Group) -> "_Wanted":
+        faults = _chosen(group.faults)
+        lines = tuple(_lines(models, fault) for fault in faults)
+        place = _place(faults[0])
+        assert place is not None  # of a group that has pictures
+        entry = manifest.arguments(
+            scenario=Path("scenario"), seed=0, out=Path("out"), changes=faults[0].changes
+        )
+        probe = digest(Path(picture_probe.__file__).read_bytes())
+        run = [manifest.entry_module, entry, sorted(manifest.env.items()), digest(scenario.read_bytes())]
+        labels = list(map(_label, faults))
+        versions = [_SCHEMA, platform.python_version(), probe, manifest.tree.digest]
+        key = content_id([*versions, run, content_id(place[0]), place[1], lines, labels])
+        return cls(key=key, place=place, faults=faults, lines=lines)
+
+
+def _scenario(workspace: Workspace) -> Path:
+    """The library's first scenario: which road is seen does not matter."""
+    found = next(iter(workspace.scenarios.values()), None)
+    if found is None:
+        raise MutatorError(
+            "no scenario to draw pictures in",
+            where=workspace.library / "scenarios",
+            remedy="write one, as docs/how-to/add-a-scenario.md says",
+        )
+    return found
+
+
+def _effects(fault: Fault) -> tuple[Injection, ...]:
+    return tuple(injection for injection in fault.injections if injection.model == MODEL)
+
+
+def _place(fault: Fault) -> tuple[FaultLocation, str] | None:
+    """Where its image effects are, and the variable with the picture; None if that is not one place."""
+    places = {(one.location, str(dict(one.params)["target"])) for one in _effects(fault)}
+    return places.pop() if len(places) == 1 else None
+
+
+def _lines(models: FaultModels, fault: Fault) -> tuple[str, ...]:
+    return tuple(
+        line for one in _effects(fault) for line in snippet(models.get(MODEL), dict(one.params), "picture")
+    )
+
+
+def _label(fault: Fault) -> str:
+    """Its value in words: as the spec states it, else the amounts."""
+    if fault.value is not None:
+        return f"{fault.value}" + (f" {fault.unit}" if fault.unit not in ("", "-", "1") else "")
+    return ", ".join(
+        f"{name} {value}" for name, value in parameter_values(fault).items() if name.endswith("amount")
+    )
+
+
+def _amounts(fault: Fault) -> tuple[float, ...]:
+    return tuple(float(str(dict(one.params)["amount"])) for one in _effects(fault))
+
+
+def _chosen(faults: Sequence[Fault]) -> tuple[Fault, ...]:
+    """At most MOST faults, a different amount each, evenly from the least to the largest."""
+    by_amount: dict[tuple[float, ...], Fault] = {}
+    for fault in faults:
+        by_amount.setdefault(_amounts(fault), fault)
+    sorted_faults = [by_amount[amounts] for amounts in sorted(by_amount)]
+    last, count = len(sorted_faults) - 1, min(len(sorted_faults), MOST)
+    places = {round(i * last / max(1, count - 1)) for i in range(count)}
+    return tuple(sorted_faults[place] for place in sorted(places))
+
+
+def _drawn_anew(
+    manifest: TargetManifest, models: FaultModels, scenario: Path, wanted: Mapping[str, _Wanted]
+) -> dict[str, Pictures]:
+    """The pictures of groups, which are cached: one run of the target for all groups of a place."""
+    check_requirements(manifest)
+    places: dict[tuple[object, ...], list[str]] = {}
+    for name, one in wanted.items():
+        places.setdefault((one.place, one.faults[0].changes), []).append(name)
+    found = {}
+    with ScratchFolder("mutator-pictures-") as scratch:
+        (scratch / "work").mkdir()
+        base = prepare_base(manifest, scratch / "base")
+        engine = ReferenceEngine(manifest, base, scratch / "work", LIMITS)
+        for i, names in enumerate(places.values()):
+            groups = [wanted[name] for name in names]
+            before, *rest = _run(engine, models, scenario, groups, scratch / "work" / f"pictures-{i}")
+            after = iter(rest)
+            for name, one in zip(names, groups, strict=True):
+                found[name] = _shown(before, one.faults, [next(after) for _ in one.faults])
+                _remember(one.key, found[name])
+    return found
+
+
+def _run(
+    engine: ReferenceEngine, models: FaultModels, scenario: Path, groups: Sequence[_Wanted], folder: Path
+) -> list[np.ndarray]:
+    """The picture before, then those after each fault of each group."""
+    manifest, (location, picture) = engine.manifest, groups[0].place
+    first = groups[0].faults[0]
+    mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always())
+    lines = [one for group in groups for one in group.lines]
+    asked = {"file": location.path, "picture": picture, "effects": lines, "mutant": mutant.id}
+    stub = Path(picture_probe.__file__).read_text(encoding="utf-8")
+    probe = stub.replace('json.loads("{}")', f"json.loads({json.dumps(asked)!r})")
+    files = {**mutant.files, probe_path(manifest.package): probe.encode()}
+    job = Job(
+        name=folder.name, scenario=scenario, seed=0, changes=first.changes, files=files, mutant=mutant.id
+    )
+    execution = engine.execute(job, folder)
+    file = execution.out / picture_probe.FILE
+    if not file.is_file():
+        ended = execution.status is Status.OK
+        raise MutatorError(
+            f"no picture of {location.path} {location.function}: "
+            + ("the run never came there" if ended else execution.detail),
+            where=scenario,
+            expected="a run that comes to the image effect",
+            remedy="see `mutator check --drive`",
+        )
+    with np.load(no_pipe(file), allow_pickle=False) as found:
+        return [found["before"], *(found[f"after_{i}"] for i in range(len(lines)))]
+
+
+def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarray]) -> Pictures:
+    """The least, a middle and the most severe of faults that are sorted by amount."""
+    changes = [float(np.sqrt(np.mean(np.square(one.astype(float) - before)))) for one in after]
+    order = _by_severity(changes)
+    names = {1: LEVELS[2:], 2: LEVELS[::2]}.get(len(order), LEVELS)
+    places = {"least": order[0], "middle": order[(len(order) - 1) // 2], "most": order[-1]}
+    levels = [
+        Level(name=name, label=_label(faults[places[name]]), after=_jpeg(after[places[name]]))
+        for name in names
+    ]
+    return Pictures(before=_jpeg(before), levels=tuple(levels))
+
+
+def _by_severity(changes: Sequence[float]) -> list[int]:
+    """Places in `changes`, the least severe first. A larger amount counts as more severe, or as less, where
+    the picture changes more with it, or less: chance may turn two neighbours round. Amounts to both sides of
+    no effect are in the order of their changes."""
+    order = list(range(len(changes)))
+    trend = correlation(order, changes) if len(set(changes)) > 1 else 1.0
+    if abs(trend) < CLEAR:
+        return sorted(order, key=changes.__getitem__)
+    return order if trend > 0.0 else order[::-1]
+
+
+def _jpeg(picture: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    Image.fromarray(picture).save(buffer, "JPEG", quality=QUALITY)
+    return buffer.getvalue()
+
+
+def _recalled(key: str) -> Pictures | None:
+    path = caches.of_pictures() / f"{key}.json"
+    try:
+        data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
+        before, levels = data["before"], data["levels"]
+        if data["sum"] == digest([key, before, levels]):
+            os.utime(path)  # used now
+            return Pictures(
+                before=base64.b64decode(before),
+                levels=tuple(
+                    Level(name=name, label=label, after=base64.b64decode(after))
+                    for name, label, after in levels
+                ),
+            )
+    except (OSError, MutatorError, ValueError, KeyError, TypeError, AttributeError):
+        pass
+    return None
+
+
+def _remember(key: str, pictures: Pictures) -> None:
+    path = caches.of_pictures() / f"{key}.json"
+    before = base64.b64encode(pictures.before).decode()
+    levels = [[one.name, one.label, base64.b64encode(one.after).decode()] for one in pictures.levels]
+    data = {"sum": digest([key, before, levels]), "before": before, "levels": levels}
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(path, json_bytes(data))
+    except (OSError, MutatorError):
+        return  # an unwritable cache is ignored

@@ -1,0 +1,118 @@
+"""What became of a group's mutants in a run: how many ended how, a typical experiment and the worst one."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from mutator.model import Fault, Outcome, Status
+from mutator.operators.names import operator_of
+from mutator.outcomes.counting import endings
+from mutator.outcomes.ranking import places
+from mutator.outcomes.reader import Results
+from mutator.outcomes.rows import UNUSABLE, Row, lines_of, row_from
+from mutator.review.catalogue import Group
+from mutator.review.groups import injection_label
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_PLAIN = {
+    Outcome.NOT_ACTIVATED.value: "not activated: the injected lines never ran while the trigger held",
+    Outcome.MASKED.value: "masked: no actuator differed from the golden run",
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Case:
+    """An experiment: its id, what it was (fault, drive), how it ended, and its verdict in words."""
+
+    id: str
+    label: str
+    ending: str
+    verdict: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Typical:
+    """What became of a group in a run: how many experiments it has, and how many ended how. The typical one
+    is the median, by rank, of those with the most frequent ending; the worst has the first rank of all."""
+
+    experiments: int
+    outcomes: Mapping[str, int]
+    typical: Case
+    worst: Case
+
+
+def of_group(run: RunFolder, group: Group) -> Typical | None:
+    """What became of the group in a run; None if that has no experiment of it. MutatorError for a run without
+    results."""
+    results = Results.up_to_date(run.path)
+    return _of_run(run.path, results.path.stat().st_mtime_ns).get("; ".join(group.injections))
+
+
+@lru_cache(maxsize=8)
+def _of_run(path: Path, written: int) -> dict[str, Typical]:
+    """That of each group, by what it injects; `written` is when the results were."""
+    import numpy as np
+
+    texts = Results.of_run(path).texts()
+    about = {one["name"]: one["about"] for one in RunFolder.open(path).head.get("about_hazards") or ()}
+    labels = {name: _what(fault) for name, fault in plan_file.read_faults(path).items()}
+    known = [labels.get(name, "") for name in texts["fault_id"]]
+    rows: dict[str, list[int]] = {}
+    for row in np.argsort(places(texts)).tolist():  # the worst first
+        rows.setdefault(known[row], []).append(row)
+    ended = endings(texts).tolist()
+    return {label: _typical(texts, ended, own, about) for label, own in rows.items() if label}
+
+
+def _what(fault: Fault) -> str:
+    """What its group has in common."""
+    location = fault.injections[0].location
+    if operator := operator_of(fault):
+        return f"{location.path} {location.function}: operator {operator}"
+    return "; ".join(map(injection_label, fault.injections))
+
+
+def _typical(
+    texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
+) -> Typical:
+    """Of `rows`, the worst first; a tie of two endings is for the worse one."""
+    by_ending: dict[str, list[int]] = {}
+    for row in rows:
+        by_ending.setdefault(ended[row], []).append(row)
+    usable = {name: own for name, own in by_ending.items() if name not in UNUSABLE} or by_ending
+    most = max(usable.values(), key=len)
+    order = [*Outcome, *Status]
+    counts = {name.value: len(by_ending[name.value]) for name in order if name.value in by_ending}
+    typical, worst = (_case(texts, row, about) for row in (most[len(most) // 2], rows[0]))
+    return Typical(experiments=len(rows), outcomes=counts, typical=typical, worst=worst)
+
+
+def _case(texts: "pd.DataFrame", number: int, about: Mapping[str, str]) -> Case:
+    row = row_from(lines_of(texts.iloc[[number]])[0])
+    return Case(
+        id=row.experiment_id,
+        label=f"{row.fault}, {row.scenario}, {row.trigger}",
+        ending=row.ending,
+        verdict=verdict_of(row, about),
+    )
+
+
+def verdict_of(row: Row, about: Mapping[str, str]) -> str:
+    """How an experiment ended, in words; `about` says what the hazards are."""
+    if row.ending in _PLAIN:
+        return _PLAIN[row.ending]
+    if row.ending == Outcome.SDC.value:
+        return f"sdc: an actuator differed from the golden run from {row.t_manifest:.2f} s on; no hazard came"
+    if row.ending != Outcome.HAZARD.value:
+        return f"{row.ending.replace('_', ' ')}: {row.detail}"
+    name, time = row.hazards[0]
+    meaning = f" ({about[name]})" if about.get(name) else ""
+    after = f", {time - row.t_activation:.2f} s after the activation" if row.t_activation is not None else ""
+    said = f"alert {row.alerts[0]} at {row.t_alert:.2f} s" if row.alerts else "no alert"
+    return f"hazard {name}{meaning} at {time:.2f} s{after}; {said}"

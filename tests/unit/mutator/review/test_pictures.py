@@ -1,0 +1,168 @@
+"""Pictures before and after image effects, of any target: the injected lines themselves are executed."""
+
+import io
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mutator._common import caches
+from mutator.engines.jobs import Execution, Job
+from mutator.engines.reference import ReferenceEngine
+from mutator.errors import MutatorError
+from mutator.review import pictures
+from mutator.review.catalogue import Group, of_library
+from mutator.review.pictures import LEVELS, Pictures
+from mutator.workspace import Workspace
+
+Lit = Callable[..., tuple[Workspace, Group]]
+
+
+@pytest.fixture
+def lit(toycar: Workspace, give_eyes: Callable[..., None]) -> Lit:
+    """Gives the toy eyes, and a fault for what they see: the workspace and its group."""
+
+    def make(**given: str) -> tuple[Workspace, Group]:
+        give_eyes(toycar, **given)
+        return toycar, next(g for g in groups_of(toycar) if g.faults)
+
+    return make
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The names of the runs that are made."""
+    made: list[str] = []
+    execute = ReferenceEngine.execute
+
+    def noted(engine: ReferenceEngine, job: Job, folder: Path) -> Execution:
+        made.append(job.name)
+        return execute(engine, job, folder)
+
+    monkeypatch.setattr(ReferenceEngine, "execute", noted)
+    return made
+
+
+def groups_of(workspace: Workspace) -> tuple[Group, ...]:
+    return of_library(workspace, workspace.manifest("toycar"), specs=["sensor/light"])
+
+
+def drawn(workspace: Workspace, group: Group) -> Pictures:
+    return pictures.of_groups(workspace, workspace.manifest("toycar"), [group])[group.id]
+
+
+def grey(jpeg: bytes) -> float:
+    return float(np.asarray(Image.open(io.BytesIO(jpeg))).mean())
+
+
+def test_three_levels_of_an_effect(lit: Lit) -> None:
+    """The target's own picture, and what the least, a middle and the largest value make of it."""
+    workspace, group = lit()
+    found = drawn(workspace, group)
+    assert grey(found.before) == pytest.approx(90, abs=1)
+    assert [(one.name, one.label) for one in found.levels] == [
+        ("least", "10"),
+        ("middle", "40"),
+        ("most", "160"),
+    ]
+    assert [grey(one.after) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
+
+
+def test_one_level_is_asked_for(lit: Lit) -> None:
+    """A pair of files; None for a level that a group with fewer values lacks, and for any other group."""
+    workspace, group = lit(values="[10, 50]")
+    manifest = workspace.manifest("toycar")
+    pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
+    assert [pair and round(grey(pair[1])) for pair in pairs] == [100, None, 140, None]
+    probe = groups_of(workspace)[-1]
+    assert not pictures.has_pictures(probe)
+    assert pictures.of_group(workspace, manifest, probe, "most") is None
+
+
+def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
+    """Nothing is run twice; another line of the effect, or a damaged entry, is drawn anew."""
+    workspace, group = lit()
+    first = drawn(workspace, group)
+    runs.clear()
+    assert drawn(workspace, group) == first
+    assert not runs
+    [entry] = caches.of_pictures().iterdir()
+    entry.write_bytes(entry.read_bytes().replace(b"least", b"lost!"))
+    assert drawn(workspace, group) == first
+    lens = workspace.library.parent / "tree/toycar/lens.py"
+    lens.write_text(lens.read_text().replace("picture + ", "picture - "))
+    assert grey(drawn(workspace, group).levels[-1].after) == pytest.approx(0, abs=1)
+    assert runs == ["pictures-0"] * 2
+
+
+def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -> None:
+    """As many pictures as wanted from one run of the target."""
+    workspace, group = lit()
+    halves = [
+        replace(group, id=name, faults=faults)
+        for name, faults in (("a", group.faults[:2]), ("b", group.faults[2:5]))
+    ]
+    found = pictures.of_groups(workspace, workspace.manifest("toycar"), halves)
+    assert {name: [one.label for one in made.levels] for name, made in found.items()} == {
+        "a": ["10", "20"],
+        "b": ["40", "80", "160"],
+    }
+    assert len(runs) == 1
+
+
+def test_a_picture_in_an_attribute(lit: Lit) -> None:
+    """Each value is applied to the target's picture, not to the one that the value before has left."""
+    workspace, group = lit(values="[10, 20, 30]", target="self.picture", place="self.picture")
+    assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
+
+
+def test_what_is_more_severe() -> None:
+    """A larger amount, or a smaller one, whichever changes the picture more; with amounts to both sides of
+    none, what changes it more."""
+    assert pictures._by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
+    assert pictures._by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
+    assert pictures._by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
+    assert pictures._by_severity([7.0]) == [0]
+
+
+def test_chance_does_not_turn_neighbours_round() -> None:
+    """Nine blobs that cover more than ten do are still less severe."""
+    assert pictures._by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
+    assert pictures._by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
+    assert pictures._by_severity([2.0, 2.0]) == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("picture", "said"),
+    [
+        ("7.0", r"picture is float of shape \(\), and no grey or RGB picture of bytes"),
+        ("1 / 0", "no picture of toycar/sensing.py Sensor.sense: ZeroDivisionError"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None:
+    """An array of bytes is a picture; what fails in the target is told in its words."""
+    with pytest.raises(MutatorError, match=said):
+        drawn(*lit(picture=picture))
+
+
+def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
+    """A run that ends without it is told, not waited for."""
+    workspace, _ = lit()
+    sensing = workspace.library.parent / "tree/toycar/sensing.py"
+    text = sensing.read_text()
+    sensing.write_text(text.replace("def sense(self, world):\n", "def sense(self, world):\n        return\n"))
+    with pytest.raises(MutatorError, match="the run never came there"):
+        drawn(workspace, next(g for g in groups_of(workspace) if g.faults))
+
+
+@pytest.mark.slow
+def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_path: Path) -> None:
+    """Each has a picture that it changes, at every level."""
+    manifest = clone.manifest("openpilot")
+    wanted = [g for g in of_library(clone, manifest, specs=["vision_*/*"]) if pictures.has_pictures(g)]
+    found = pictures.of_groups(clone, manifest, wanted)
+    assert len(found) == len(wanted) >= 20
+    assert all(level.after != made.before for made in found.values() for level in made.levels)

@@ -1,0 +1,91 @@
+"""What became of a group's mutants in a run."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.model import Outcome, Status
+from mutator.outcomes.rows import Row
+from mutator.review.catalogue import of_plan
+from mutator.review.typical import of_group, verdict_of
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+WriteRun = Callable[..., Path]
+HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
+
+
+def test_counts_a_typical_and_the_worst_experiment(
+    toycar: Workspace, tmp_path: Path, write_run: WriteRun
+) -> None:
+    """Of the group alone: the median of the most frequent ending, and the worst of all."""
+    plan = make_plan(toycar, "toy", Choices())
+    lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
+    bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
+    run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
+    group = next(g for g in of_plan(toycar, plan) if "offset: offset" in g.what)
+    found = of_group(RunFolder.open(run), group)
+    assert found is not None
+    assert found.experiments == len(lane) > 4
+    assert found.outcomes == {"masked": len(lane) - 2, "hazard": 2}
+    assert found.typical.ending == "masked"
+    assert found.typical.id in set(lane) - bad.keys()
+    assert found.worst.id in bad
+    assert found.worst.label.startswith("sensor/lane/shifted ")
+    assert found.worst.verdict.endswith("after the activation; no alert")
+
+
+def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
+    """There is nothing to tell of a group that a campaign left out, nor of the probe, which all have."""
+    run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
+    groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
+    told = {group.models for group in groups if of_group(run, group)}
+    assert told == {("omission",)}
+
+
+def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
+    """A run that went on is read anew."""
+    group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
+    write_run(toycar, tmp_path / "run", lambda e: None)
+    assert of_group(RunFolder.open(tmp_path / "run"), group) is None
+    shutil.rmtree(tmp_path / "run")
+    write_run(toycar, tmp_path / "run")
+    assert of_group(RunFolder.open(tmp_path / "run"), group)
+
+
+def row(**given: Any) -> Row:
+    fields: dict[str, Any] = {
+        "experiment_id": "e", "module": "m", "fault_type": "f", "variant": "v", "value": "", "unit": "",
+        "scenario": "A", "method": "guided", "trigger": "C1", "status": Status.OK, "outcome": None,
+        "t_activation": 2.0, "t_manifest": 2.5, "checked": (), "hazards": (), "alerts": (), "t_alert": None,
+        "reaction_time": None, "detail": "",
+    }  # fmt: skip
+    return Row(**fields | given)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            {"outcome": Outcome.SDC},
+            "sdc: an actuator differed from the golden run from 2.50 s on; no hazard came",
+        ),
+        (
+            {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.25),), "alerts": ("fcw",), "t_alert": 3.0},
+            "hazard H1 (a crash) at 4.25 s, 2.25 s after the activation; alert fcw at 3.00 s",
+        ),
+        (
+            {"outcome": Outcome.HAZARD, "hazards": (("H9", 4.0),), "t_activation": None},
+            "hazard H9 at 4.00 s; no alert",
+        ),
+        ({"status": Status.CRASHED, "detail": "ValueError: no"}, "crashed: ValueError: no"),
+        ({"outcome": Outcome.MASKED}, "masked: no actuator differed from the golden run"),
+    ],
+)
+def test_a_verdict_in_words(given: dict[str, Any], words: str) -> None:
+    """What came, when, and whether anybody was warned."""
+    assert verdict_of(row(**given), {"H1": "a crash"}) == words
