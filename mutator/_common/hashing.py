@@ -11,6 +11,8 @@ from enum import Enum
 from functools import lru_cache
 from typing import Any
 
+import orjson
+
 _ADDED = "added"  # key in a field's metadata
 _SCALARS = frozenset((str, int, float, bool, type(None)))
 
@@ -39,6 +41,15 @@ def _fields(kind: type) -> tuple[tuple[str, ...], tuple[tuple[str, Any], ...]]:
     every = dataclasses.fields(kind)
     first = tuple(f.name for f in every if _ADDED not in f.metadata)
     return first, tuple((f.name, f.default) for f in every if _ADDED in f.metadata)
+
+
+def from_json(data: bytes) -> Any:
+    """What `json.loads` makes of `data`, or raises, in a quarter of its time; but integers of more than 64
+    bits become floats."""
+    try:
+        return orjson.loads(data)
+    except ValueError:  # also of what it is too strict for, like nan
+        return json.loads(data)
 
 
 def plain(value: Any) -> Any:

@@ -5,6 +5,7 @@ import os
 import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
@@ -33,6 +34,29 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
     if processes < 2:
         yield from map(made, items)
         return
+    with _workers(made, items, processes) as receivers:
+        for number in range(len(items)):
+            yield _received(receivers[number % processes])
+
+
+@contextmanager
+def beside(work: Callable[[], None], processes: int) -> Iterator[None]:
+    """Do `work` in another process while the block runs; for fewer than two processes in this one, after it.
+
+    The block's end waits for it, and raises what it raised.
+    """
+    if processes < 2:
+        yield
+        work()
+        return
+    with _workers(lambda _: work(), [None], 1) as [receiver]:
+        yield
+        _received(receiver)
+
+
+@contextmanager
+def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
+    """Processes at work, each with the connection by which its results come; they end with the block."""
     context = get_context("fork")
     pipes = [context.Pipe(duplex=False) for _ in range(processes)]
     workers = [
@@ -44,8 +68,7 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
             worker.start()
         for _, sender in pipes:
             sender.close()
-        for number in range(len(items)):
-            yield _received(pipes[number % processes][0])
+        yield [receiver for receiver, _ in pipes]
     finally:
         for receiver, _ in pipes:
             receiver.close()

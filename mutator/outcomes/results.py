@@ -9,7 +9,7 @@ from typing import Any
 
 from mutator._common.files import half_written, read_json, write_json
 from mutator._common.hashing import digest
-from mutator._common.processes import processes_for, shared
+from mutator._common.processes import beside, processes_for, shared
 from mutator._common.version import VERSION
 from mutator.errors import MutatorError, MutatorWarning
 from mutator.outcomes import propagation
@@ -68,6 +68,12 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     Experiments are read by their ids, a batch at a time: a million takes some hundred MB. Two processes make
     the batches of a large run.
     """
+    with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)):
+        _write_results(folder, paths)
+
+
+def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
+    """As `write`, without the timings."""
     records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
     tells_propagation = PROPAGATION in paths
 
@@ -93,7 +99,6 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
             parquet.append(table)
             if propagated:
                 propagated.append(departures)
-    _write_timings(folder, paths[TIMINGS_PARQUET])
 
 
 @contextmanager
@@ -166,7 +171,6 @@ def _write_timings(folder: RunFolder, path: Path) -> None:
         lines = [newest[name] for name in batch]
         return record_batch(TIMINGS, [[line.get(column.name) for line in lines] for column in TIMINGS])
 
-    batches = _batches(sorted(newest))
     with ParquetTable(path, TIMINGS) as file:
-        for table in shared(made, batches, processes_for(len(newest))):
-            file.append(table)
+        for batch in _batches(sorted(newest)):
+            file.append(made(batch))

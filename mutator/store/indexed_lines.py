@@ -12,6 +12,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, Generic, TypeVar
 
+from mutator._common.hashing import from_json
 from mutator.errors import MutatorError
 from mutator.store.lines import bare_segment, verified_lines
 
@@ -104,7 +105,7 @@ class Line:
 
     def content(self) -> dict[str, Any]:
         """The object on it; ValueError when it is none."""
-        value = json.loads(self.data)
+        value = from_json(self.data)
         if not isinstance(value, dict):
             raise ValueError("no object")
         value.pop("sum", None)

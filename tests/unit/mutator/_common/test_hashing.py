@@ -1,9 +1,12 @@
 """Ids that outlive new fields."""
 
+import json
 from dataclasses import dataclass, replace
 
+import pytest
+
 from mutator import model
-from mutator._common.hashing import added, added_values, content_id, digest, plain
+from mutator._common.hashing import added, added_values, content_id, digest, from_json, plain
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Method
 
 LOCATION = FaultLocation(
@@ -96,3 +99,19 @@ def test_digests_tell_kinds_of_values_apart() -> None:
     """A number, its text, its truth value, and lists of these have digests of their own."""
     values = [1.0, 1, True, "1", None, [1], [[1]], {"a": 1}, b"1 "]
     assert len({digest(value) for value in values}) == len(values)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
+)
+def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
+    """Also what the faster reader refuses: numbers that are none, half a pair."""
+    assert repr(from_json(text.encode())) == repr(json.loads(text))
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"\xff", b"[1,]"])
+def test_what_is_no_json_is_a_value_error(data: bytes) -> None:
+    """As of `json.loads`."""
+    with pytest.raises(ValueError):
+        from_json(data)

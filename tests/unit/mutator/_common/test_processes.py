@@ -3,10 +3,11 @@
 import os
 import signal
 from itertools import islice
+from pathlib import Path
 
 import pytest
 
-from mutator._common.processes import shared
+from mutator._common.processes import beside, shared
 from mutator.errors import MutatorError
 
 
@@ -47,3 +48,25 @@ def test_no_process_is_left_behind() -> None:
     for pid in pids:
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_work_is_done_beside(processes: int, tmp_path: Path) -> None:
+    """It is done when the block has ended; another process does it, if there may be one."""
+    place = tmp_path / "pid"
+    with beside(lambda: print(os.getpid(), file=place.open("w")), processes):
+        pass
+    assert (place.read_text() == f"{os.getpid()}\n") is (processes == 1)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_what_goes_wrong_beside_is_raised(processes: int) -> None:
+    """As the block ends; what the block itself raises comes first."""
+
+    def fails() -> None:
+        raise MutatorError("there")
+
+    with pytest.raises(MutatorError, match="there"), beside(fails, processes):
+        pass
+    with pytest.raises(ValueError, match="here"), beside(fails, processes):
+        raise ValueError("here")
