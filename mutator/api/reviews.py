@@ -11,9 +11,10 @@ from mutator.errors import MutatorError
 from mutator.review import catalogue
 from mutator.review.catalogue import Group
 from mutator.review.columns import COLUMNS
-from mutator.review.decisions import Review, State, Verdict
+from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.page import write_page
+from mutator.workspace import Workspace
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +24,7 @@ class ReviewedGroups:
     `options` of `mutator review` mean the same groups; the commands on a written page have them.
     """
 
+    workspace: Workspace
     review: Review
     groups: tuple[Group, ...]
     options: tuple[str, ...] = ()
@@ -57,21 +59,38 @@ class ReviewedGroups:
 
     def approve(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Approve groups as they are now; the decision is written into the library."""
-        return self._decide(groups, Verdict.APPROVED, by, remark)
+        return self._changed(groups, Kind.APPROVE, by, remark)
 
     def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
         """Reject groups as they are now; the decision is written into the library."""
-        return self._decide(groups, Verdict.REJECTED, by, remark)
+        return self._changed(groups, Kind.REJECT, by, remark)
+
+    def clear(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
+        """Take the decisions about groups back; remarks and flags stay."""
+        return self._changed(groups, Kind.CLEAR, by, remark)
+
+    def remark(self, groups: Sequence[Group], by: str, text: str) -> "ReviewedGroups":
+        """Leave a remark on groups."""
+        return self._changed(groups, Kind.REMARK, by, text)
+
+    def flag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
+        """Mark groups to be looked at again."""
+        return self._changed(groups, Kind.FLAG, by)
+
+    def unflag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
+        """Take such marks off."""
+        return self._changed(groups, Kind.UNFLAG, by)
 
     def write_page(self, out: str | Path) -> Path:
         """Write a page of all groups, complete in itself."""
         write_page(Path(out), self.review, self.groups, self.options)
         return Path(out)
 
-    def _decide(self, groups: Sequence[Group], verdict: Verdict, by: str, remark: str) -> "ReviewedGroups":
-        decided = self.review.decided(groups, verdict, by, remark)
-        decided.write()
-        return replace(self, review=decided)
+    def _changed(self, groups: Sequence[Group], kind: Kind, by: str, text: str = "") -> "ReviewedGroups":
+        """Conflict, and nothing written, where somebody else has said something since these were loaded."""
+        changes = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
+        seen = {group.id: self.review.revision(group.id) for group in groups}
+        return replace(self, review=record(self.workspace, self.review.target, changes, seen))
 
 
 def load_review(
@@ -103,16 +122,19 @@ def load_review(
     words = [word for name, value in given.items() if value for word in (name, value)]
     words += ["--seed", str(seed)] if seed is not None else []
     words += [word for spec in specs for word in ("--spec", spec)]
-    return ReviewedGroups(review=review, groups=tuple(review.in_turn(groups)), options=tuple(words))
+    return ReviewedGroups(
+        workspace=found, review=review, groups=tuple(review.in_turn(groups)), options=tuple(words)
+    )
 
 
 def facts(review: Review, group: Group) -> dict[str, object]:
     """What the filters know of a group; several of one kind stand with commas between them."""
-    decision = review.decisions.get(group.id)
+    decision = review.decision(group.id)
     return {
         "group": group.id,
         "state": review.state(group).value,
         "by": decision.by if decision else None,
+        "flagged": review.flag(group.id) is not None,
         "file": ", ".join(group.files),
         "function": ", ".join(group.functions),
         "model": ", ".join(group.models),

@@ -112,14 +112,14 @@ def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
 def clone_state(folder: Path) -> dict[str, Any] | None:
     """`commit` of the git clone that has this folder, and whether anything in the folder was `changed` since;
     None without git, and for a folder that no commit has."""
-    head = _git(folder, "rev-parse", "HEAD", "HEAD:./")
-    changes = _git(folder, "status", "--porcelain", "--", ".")
+    head = git(folder, "rev-parse", "HEAD", "HEAD:./")
+    changes = git(folder, "status", "--porcelain", "--", ".")
     if head is None or changes is None:
         return None
     return {"commit": head.split()[0], "changed": bool(changes.strip())}
 
 
-def _git(folder: Path, *words: str) -> str | None:
+def git(folder: Path, *words: str) -> str | None:
     """What git says in a folder; None when it cannot."""
     outside = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "--no-optional-locks", "-C", str(folder), *words]

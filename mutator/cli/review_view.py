@@ -22,10 +22,11 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
     from mutator.api.reviews import facts as known
     from mutator.review.readable_groups import value_table
 
-    decision = review.decisions.get(group.id)
+    decision, flag = review.decision(group.id), review.flag(group.id)
     facts = {**known(review, group), "what": group.what, "injections": group.injections}
-    facts |= {"remark": decision.remark if decision else None}
-    facts |= {"changed": decision.changed(group) if decision else [], "bound": asdict(group.bound)}
+    facts |= {"at": decision.at if decision else None, "changed": review.changed(group)}
+    facts |= {"remarks": [asdict(remark) for remark in review.remarks(group.id)]}
+    facts |= {"flag": asdict(flag) if flag else None, "bound": asdict(group.bound), "ranges": group.values}
     if not whole:
         return facts
     heads, rows = value_table(group)
@@ -57,9 +58,9 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
         flat = [(*row[:2], row[2].replace("\n", "; "), *row[3:]) for row in rows]
         terminal.table(["group", "state", "what", "when", "faults", "runs"], flat, right=(4, 5))
     terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
-    gone = review.decisions.keys() - {group.id for group in groups}
+    gone = review.entries.keys() - {group.id for group in groups}
     if gone:
-        terminal.note(f"{len(gone)} decisions are about groups that are not listed")
+        terminal.note(f"{len(gone)} blocks are about groups that are not listed")
 
 
 def _short(injection: str) -> str:

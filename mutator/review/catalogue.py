@@ -1,61 +1,50 @@
-"""What there is to review: the mutants of a library or campaign, grouped by location, template and trigger.
+"""What there is to review: the mutants of a library or campaign, grouped by location and template.
 
-A group is the same whichever of its mutants are selected: its id follows from what it is about, and what a
-decision is bound to (`Bound`) from its diff with holes, the target's functions and the templates.
+A group is the same whichever of its mutants are selected, and whatever triggers them: its id follows from
+what it is about, and what a decision is bound to (`Material`) from its diff with holes, the target's code and
+the templates.
 """
 
-import ast
-import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
-from functools import lru_cache
+from pathlib import Path
 
 from mutator._common.hashing import content_id
 from mutator.campaigns.plans import Plan
 from mutator.faults.expansion import expand
 from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.faults.specs import FaultSpec
-from mutator.model import Fault, FaultLocation, Injection, Trigger
+from mutator.model import Fault, Injection, Trigger
 from mutator.mutants.anchors import parsed
 from mutator.mutants.building import build
-from mutator.mutants.probe import adds_fault
-from mutator.mutants.readable_diffs import adds_file, file_patches
 from mutator.operators.enumeration import mutations_of
 from mutator.operators.facts import facts_of
 from mutator.operators.names import MODELS, Operator, operator_of
 from mutator.review import groups
+from mutator.review.called_code import CalledCode
+from mutator.review.entries import Bound, Values
 from mutator.review.groups import Shape
+from mutator.review.material import Material, diffs_of, fault_hunks, functions_of
+from mutator.review.seen_texts import text_of
+from mutator.review.value_ranges import ranges_of
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time
 from mutator.workspace import Workspace
 
-_HUNK_HEAD = re.compile(r"^@@ .*$", re.MULTILINE)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Bound:
-    """Digests of what a decision is about; when one of them changes, the decision no longer holds."""
-
-    diff: str  # of the hunks with injected lines, without their values and line numbers
-    function: str  # of the target's functions that are changed, without injected lines
-    template: str  # of the templates that the injected lines were made from
-
-    def changed(self, now: "Bound") -> list[str]:
-        """What has changed, in words."""
-        words = {"template": "template", "function": "target function", "diff": "diff"}
-        return [word for name, word in words.items() if getattr(self, name) != getattr(now, name)]
-
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ only in values, or those that an operator makes of a function. `what` is one line:
-    the location, the template and the trigger.
+    """Mutants that differ only in values and triggers, or those that an operator makes of a function. `what`
+    is one line: the location and the template.
 
     `shapes` are its diffs with holes: more than one if a template writes different lines for different
     numbers. Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None
-    without a campaign.
+    without a campaign. `trigger` and `hold` name the kinds there are, with `or` between.
+
+    `values` is what each parameter may be by the specs; `seen` is all that a decision is bound to, as text;
+    `made_from` are the spec files and the templates, with their YAML.
     """
 
     id: str
@@ -71,6 +60,9 @@ class Group:
     triggers: tuple[Trigger, ...]
     runs: int | None
     bound: Bound
+    values: Values = field(default_factory=dict)
+    seen: str = ""
+    made_from: tuple[Path, ...] = ()
 
     @property
     def diff(self) -> str:
@@ -90,8 +82,9 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     """The groups of every mutant that the plan runs, its canary included; the probe's comes last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
-    runs = Counter(groups.group_label(e.fault, e.trigger) for e in plan.experiments)
-    return _Catalogue(workspace.fault_models(), manifest).groups(members, runs)
+    runs = Counter(groups.group_label(e.fault) for e in plan.experiments)
+    specs = (*workspace.specs(), *(workspace.spec(one.file) for one in plan.campaign.faults if one.file))
+    return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 
 
 def of_library(
@@ -112,14 +105,15 @@ def of_library(
     tables = map(workspace.context_table, workspace.context_tables)
     contexts = [t for table in tables for t in table.triggers(armed_after_s=manifest.armed_after_s)]
     triggers = (*contexts, at_time(manifest.armed_after_s))
+    chosen = tuple(_specs(workspace, specs))
     faults = [
         fault
-        for spec in _specs(workspace, specs)
+        for spec in chosen
         for name in ((reading,) if reading else spec.readings.names)
         for fault in expand(spec, seed, name, models=models, manifest=manifest)
     ]
     members = [(fault, trigger) for fault in faults for trigger in triggers]
-    return _Catalogue(models, manifest).groups(members, None)
+    return _Catalogue(models, manifest, chosen).groups(members, None)
 
 
 def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
@@ -133,17 +127,19 @@ def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
 
 
 class _Catalogue:
-    """Makes the groups of one target and its templates."""
+    """Makes the groups of one target and its templates; `specs` say what may be drawn."""
 
-    def __init__(self, models: FaultModels, manifest: TargetManifest) -> None:
+    def __init__(self, models: FaultModels, manifest: TargetManifest, specs: Sequence[FaultSpec]) -> None:
         self.models = models
         self.manifest = manifest
+        self.specs = {spec.name: spec for spec in specs}
+        self._called = CalledCode(manifest.tree)
 
     def groups(self, members: Sequence[_Member], runs: Mapping[str, int] | None) -> tuple[Group, ...]:
         """The groups of `members`, sorted by label; `runs` counts experiments by label."""
         found: dict[str, list[_Member]] = {}
         for fault, trigger in members:
-            found.setdefault(groups.group_label(fault, trigger), []).append((fault, trigger))
+            found.setdefault(groups.group_label(fault), []).append((fault, trigger))
         patches: dict[tuple[Injection, ...], str] = {}
         for fault, trigger in members:
             if fault.injections not in patches:
@@ -163,48 +159,80 @@ class _Catalogue:
         shapes = groups.shapes((fault.id, what, patches[fault.injections]) for fault in faults.values())
         fault, _ = members[0]
         injections = tuple(dict.fromkeys(i for one in faults.values() for i in one.injections))
-        kinds = dict.fromkeys(groups.trigger_kind(trigger) for _, trigger in members)
-        holds = dict.fromkeys(groups.hold_of(*member).value for member in members)
+        models = tuple(dict.fromkeys(injection.model for injection in injections))
         operator = operator_of(fault)
+        values: Values = {}
+        if operator:
+            material = self._material_of_operator(fault, operator)
+        else:
+            several = [faults[shape.members[0]] for shape in shapes]
+            material = self._material(several, [patches[one.injections] for one in several])
+            values = ranges_of(faults.values(), self.specs, self.models)
         return Group(
             id=self._id(what),
             what=what,
             injections=(what,) if operator else tuple(map(groups.injection_label, fault.injections)),
             files=tuple(dict.fromkeys(i.location.path for i in injections)),
             functions=tuple(dict.fromkeys(i.location.function for i in injections)),
-            models=tuple(dict.fromkeys(injection.model for injection in injections)),
-            trigger=" or ".join(kinds),
-            hold=" or ".join(holds),
+            models=models,
+            trigger=" or ".join(sorted({groups.trigger_kind(trigger) for _, trigger in members})),
+            hold=" or ".join(sorted({groups.hold_of(*member).value for member in members})),
             shapes=tuple(
                 s.with_named_holes(groups.parameter_values(faults[m]) for m in s.members) for s in shapes
             ),
             faults=tuple(faults.values()),
             triggers=tuple(dict.fromkeys(trigger for _, trigger in members)),
             runs=None if runs is None else runs.get(what, 0),
-            bound=self._bound_of_operator(fault, operator)
-            if operator
-            else self._bound(
-                sorted({patches[fault.injections] for fault in faults.values()}, key=groups.without_values),
-                [injection.location for injection in fault.injections],
-                {i.model: self.models.get(i.model).template for i in fault.injections},
-            ),
+            bound=material.bound,
+            values=values,
+            seen=text_of(material.bound, values, material.sections),
+            made_from=self._made_from(faults.values(), models),
         )
 
-    def _bound_of_operator(self, fault: Fault, operator: Operator) -> Bound:
+    def _made_from(self, faults: Iterable[Fault], models: Iterable[str]) -> tuple[Path, ...]:
+        names = dict.fromkeys(fault.spec.rpartition("/")[0] for fault in faults)
+        specs = [self.specs[name].path for name in names if name in self.specs]
+        found = map(self.models.get, models)
+        return (*specs, *(path for one in found for path in (one.template_path, one.source.path)))
+
+    def _material(self, faults: Sequence[Fault], patches: Sequence[str]) -> Material:
+        """What a decision about mutants is bound to: a fault and its patch of each shape."""
+        calls: dict[str, str] = {}
+        for fault in faults:
+            mutant = build(self.manifest, self.models, fault, always())
+            for path in dict.fromkeys(i.location.path for i in fault.injections):
+                calls |= self._called.of_lines(path, mutant.files[path])
+        injections = faults[0].injections
+        return Material(
+            diff=diffs_of(patches),
+            functions=functions_of(self.manifest.tree, [i.location for i in injections]),
+            templates={i.model: self.models.get(i.model).template for i in injections},
+            calls=calls,
+        )
+
+    def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
         """What all the mutants of an operator in a function follow from, whichever were drawn."""
-        at = fault.injections[0].location
-        file, facts = parsed(self.manifest.tree, at.path), facts_of(self.manifest.tree, at.path)
-        changes = [
-            [one.was, one.now] for one in mutations_of(file, facts, at.function, self.models, [operator])
-        ]
-        templates = {one.name: one.template for one in self.models if one.name in MODELS}
-        return replace(self._bound([], [at], templates), diff=content_id(changes))
+        at, tree = fault.injections[0].location, self.manifest.tree
+        file, facts = parsed(tree, at.path), facts_of(tree, at.path)
+        found = list(mutations_of(file, facts, at.function, self.models, [operator]))
+        return Material(
+            diff=[[one.was, one.now] for one in found],
+            functions=functions_of(tree, [at]),
+            templates={one.name: one.template for one in self.models if one.name in MODELS},
+            calls=self._called.of_expressions(at.path, at.function, [one.now for one in found]),
+        )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
         """What every mutant has: the probe, its import, and the statement that observes."""
         location = self.manifest.observation.location
         what = f"the probe, observing at {groups.location_label(location)}"
         patch = build(self.manifest, self.models, None, always()).patch
+        material = Material(
+            diff=diffs_of([patch]),
+            functions=functions_of(self.manifest.tree, [location]),
+            templates={PROBE_TEMPLATE: self.models.probe},
+            calls={},
+        )
         return Group(
             id=self._id(what),
             what=what,
@@ -218,57 +246,10 @@ class _Catalogue:
             faults=(),
             triggers=(),
             runs=None if runs is None else sum(runs.values()),
-            bound=self._bound([patch], [location], {PROBE_TEMPLATE: self.models.probe}),
+            bound=material.bound,
+            seen=text_of(material.bound, {}, material.sections),
+            made_from=(self.models.folder / PROBE_TEMPLATE, self.manifest.path),
         )
 
     def _id(self, what: str) -> str:
         return content_id([self.manifest.name, what])[:12]
-
-    def _bound(
-        self, patches: Sequence[str], locations: Sequence[FaultLocation], templates: dict[str, str]
-    ) -> Bound:
-        diffs = dict.fromkeys(_HUNK_HEAD.sub("@@", groups.without_values(patch)) for patch in patches)
-        sources = {
-            f"{place.path} {place.function}": _function(
-                self.manifest.tree.files[place.path], place.function
-            ).decode("utf-8", "surrogateescape")
-            for place in locations
-        }
-        return Bound(
-            diff=content_id(list(diffs)), function=content_id(sources), template=content_id(templates)
-        )
-
-
-def fault_hunks(patch: str) -> str:
-    """The hunks that hold lines of a fault, without those that every mutant has."""
-    kept = []
-    for section in file_patches(patch):
-        if not adds_file(section):
-            head, *hunks = re.split(r"^(?=@@ )", section, flags=re.MULTILINE)
-            own = [hunk for hunk in hunks if adds_fault(hunk)]
-            kept += [head, *own] if own else []
-    return "".join(kept)
-
-
-@lru_cache(maxsize=256)
-def _function(data: bytes, name: str) -> bytes:
-    """The source of the functions with this qualified name, decorators included."""
-    lines = data.splitlines(keepends=True)
-    spans = [
-        (min(n.lineno for n in (node, *node.decorator_list)), node.end_lineno)
-        for path, node in _functions(ast.parse(data), ())
-        if path == name
-    ]
-    return b"".join(b"".join(lines[first - 1 : last]) for first, last in spans)
-
-
-def _functions(
-    tree: ast.AST, path: tuple[str, ...]
-) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
-    for node in ast.iter_child_nodes(tree):
-        inside = path
-        if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            inside = (*path, node.name)
-            if not isinstance(node, ast.ClassDef):
-                yield ".".join(inside), node
-        yield from _functions(node, inside)

@@ -1,37 +1,26 @@
-"""Decisions about groups of mutants: a YAML file for version control, one block for each group, sorted.
+"""Decisions, remarks and flags about groups of mutants: who said what, whether it holds, and how it is kept.
 
-A decision holds for what the reviewer saw: the group's diff, the target's functions, the templates. Their
-digests are in the block; when one of them differs now, the group is `changed` and needs a new decision.
+A decision holds for what the reviewer saw: the group's diff, the target's functions, the templates, the code
+that the injected lines call, the range of each value. When one of these is another now, the group is
+`changed` and needs a new decision.
 """
 
-import json
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
-from typing import Literal
 
-from pydantic import Field
-
-from mutator._common.files import make_folder, write_atomic
+from mutator._common.files import make_folder
+from mutator._common.locks import alone_in
 from mutator._common.shipped import refuse_shipped
-from mutator.config.yaml_files import StrictModel, read
-from mutator.errors import MutatorError
-from mutator.review.catalogue import Bound, Group
+from mutator._common.version import VERSION
+from mutator.errors import CheckFailed, MutatorError
+from mutator.review import review_file, seen_texts
+from mutator.review.catalogue import Group
+from mutator.review.commits import check_four_eyes, library_commit
+from mutator.review.entries import Decision, Entry, Flag, Remark, Verdict
 from mutator.workspace import Workspace
-
-SCHEMA = "review/1"
-_HEAD = """\
-# What reviewers said of the groups of mutants of this target: `mutator review` reads and writes this file.
-# A decision holds while diff, function and template are those it was made about.
-"""
-
-
-class Verdict(StrEnum):
-    """What a reviewer decided."""
-
-    APPROVED = "approved"
-    REJECTED = "rejected"
 
 
 class State(StrEnum):
@@ -43,57 +32,97 @@ class State(StrEnum):
     APPROVED = "approved"
 
 
+class Kind(StrEnum):
+    """What a reviewer does about a group."""
+
+    APPROVE = "approve"
+    REJECT = "reject"
+    CLEAR = "clear"  # take the decision back
+    REMARK = "remark"
+    FLAG = "flag"
+    UNFLAG = "unflag"
+
+
+_VERDICTS = {Kind.APPROVE: Verdict.APPROVED, Kind.REJECT: Verdict.REJECTED}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Decision:
-    """What `by` decided about a group, and digests of what it was then."""
+class Change:
+    """What `by` does about a group as it is now. A text given with it is left as a remark."""
 
-    group: str
-    what: str
-    verdict: Verdict
+    group: Group
+    kind: Kind
     by: str
-    remark: str
-    bound: Bound
-
-    def changed(self, group: Group) -> list[str]:
-        """What of the group has changed since; empty: the decision holds."""
-        return self.bound.changed(group.bound)
-
-    @property
-    def words(self) -> str:
-        """Who decided what: `approved by Jane Doe: a remark`."""
-        return f"{self.verdict} by {self.by}" + (f": {self.remark}" if self.remark else "")
+    text: str = ""
 
 
-class _DecisionModel(StrictModel):
-    group: str = Field(pattern=r"^[0-9a-f]{12}$")
-    what: str
-    decision: Literal["approved", "rejected"]
-    by: str = Field(pattern=r"\S")  # somebody must have looked
-    remark: str
-    diff: str = Field(pattern=r"^[0-9a-f]{16}$")
-    function: str = Field(pattern=r"^[0-9a-f]{16}$")
-    template: str = Field(pattern=r"^[0-9a-f]{16}$")
+class Conflict(CheckFailed):
+    """Somebody else has said something about these groups since the caller looked. Nothing was written.
 
+    `groups` are their ids, `review` is what is kept now.
+    """
 
-class _ReviewModel(StrictModel):
-    target: str
-    decisions: list[_DecisionModel]
+    groups: tuple[str, ...] = ()
+    review: "Review"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Review:
-    """The decisions about one target's groups, by group; `path` is their file, which need not exist."""
+    """What was said of one target's groups, by group; `path` is the file, which need not exist.
+
+    With `four_eyes` a group is not approved by the author of its last change.
+    """
 
     path: Path
     target: str
-    decisions: Mapping[str, Decision]
+    entries: Mapping[str, Entry]
+    four_eyes: bool = False
+
+    def decision(self, group: str) -> Decision | None:
+        """The decision about a group, by id; None for a new one."""
+        entry = self.entries.get(group)
+        return entry.decision if entry else None
+
+    def remarks(self, group: str) -> tuple[Remark, ...]:
+        """What was remarked on it, the oldest first."""
+        entry = self.entries.get(group)
+        return entry.remarks if entry else ()
+
+    def flag(self, group: str) -> Flag | None:
+        """Who wants it to be looked at again, if anybody does."""
+        entry = self.entries.get(group)
+        return entry.flag if entry else None
+
+    def revision(self, group: str) -> str:
+        """Digest of all that was said of it; empty while nothing was."""
+        entry = self.entries.get(group)
+        return entry.revision if entry else ""
+
+    def changed(self, group: Group) -> list[str]:
+        """What of a group has changed since the decision, in words; empty: it holds, or there is none."""
+        decision = self.decision(group.id)
+        return decision.changed(group.bound, group.values) if decision else []
 
     def state(self, group: Group) -> State:
         """The state of the group's review."""
-        decision = self.decisions.get(group.id)
+        decision = self.decision(group.id)
         if decision is None:
             return State.NEW
-        return State.CHANGED if decision.changed(group) else State(decision.verdict.value)
+        return State.CHANGED if self.changed(group) else State(decision.verdict.value)
+
+    def changes(self, group: Group) -> str:
+        """What was seen when a group was decided against what it is now, as a unified diff.
+
+        Empty while the decision holds, and where what was seen was not kept.
+        """
+        decision = self.decision(group.id)
+        if decision is None or not self.changed(group):
+            return ""
+        return seen_texts.changes(self.seen_path(group.id), decision.bound, group.seen)
+
+    def seen_path(self, group: str) -> Path:
+        """Where what was seen of a group is kept."""
+        return self.path.parent / "seen" / self.target / f"{group}.txt"
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
         """The groups in the order of the list: new and changed ones first."""
@@ -102,79 +131,127 @@ class Review:
 
     def describe(self, group: Group) -> str:
         """Who decided about the group, and what has changed since; empty for a new one."""
-        decision = self.decisions.get(group.id)
+        decision = self.decision(group.id)
         if decision is None:
             return ""
-        changed = decision.changed(group)
-        return decision.words + (f" (changed since: {', '.join(changed)})" if changed else "")
-
-    def decided(self, groups: Iterable[Group], verdict: Verdict, by: str, remark: str) -> "Review":
-        """The review with this decision about `groups`; MutatorError for an unusable name or remark."""
-        by, remark = _line(by, "by"), _line(remark, "remark")
-        if not by:
-            raise MutatorError("no name", argument="by", expected="who has reviewed", remedy="give a name")
-        made = {
-            group.id: Decision(
-                group=group.id, what=group.what, verdict=verdict, by=by, remark=remark, bound=group.bound
-            )
-            for group in groups
-        }
-        return Review(path=self.path, target=self.target, decisions={**self.decisions, **made})
-
-    def write(self) -> None:
-        """Write the file, whole or not at all; sorted, so that the work of two people can be merged.
-
-        MutatorError in the library that ships with mutator, which stays as it is.
-        """
-        refuse_shipped(self.path)
-        make_folder(self.path.parent)
-        blocks = [_block(self.decisions[name]) for name in sorted(self.decisions)]
-        entries = "\n" + "".join(blocks) if blocks else " []\n"
-        text = f"{_HEAD}schema: {SCHEMA}\ntarget: {json.dumps(self.target)}\ndecisions:{entries}"
-        write_atomic(self.path, text.encode())
+        changed = self.changed(group)
+        since = f" (changed since: {', '.join(changed)})" if changed else ""
+        older = "" if decision.bound.calls else " (before called code and values were kept)"
+        return decision.words + since + older
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
-    """The decisions about a target; none without a file. MutatorError at the line of a mistake."""
+    """What was said of a target's groups; nothing without a file. MutatorError at the line of a mistake."""
     path = workspace.library / "reviews" / f"{target}.yaml"
     if not path.exists():
-        return Review(path=path, target=target, decisions={})
-    model, source = read(path, _ReviewModel, SCHEMA)
-    if model.target != target:
-        raise source.error(
-            ("target",), f"target '{model.target}'", expected=f"'{target}', as the file is named"
-        )
-    decisions: dict[str, Decision] = {}
-    for i, entry in enumerate(model.decisions):
-        if entry.group in decisions:
-            raise source.error(
-                ("decisions", i, "group"),
-                f"group '{entry.group}' stands here a second time",
-                expected="one decision about a group",
-                remedy="keep the one that holds",
-            )
-        decisions[entry.group] = Decision(
-            group=entry.group,
-            what=entry.what,
-            verdict=Verdict(entry.decision),
-            by=entry.by,
-            remark=entry.remark,
-            bound=Bound(diff=entry.diff, function=entry.function, template=entry.template),
-        )
-    return Review(path=path, target=target, decisions=decisions)
+        return Review(path=path, target=target, entries={})
+    content = review_file.load(path, target)
+    return Review(path=path, target=target, entries=content.entries, four_eyes=content.four_eyes)
 
 
-def _block(decision: Decision) -> str:
-    facts = {
-        "group": decision.group,
-        "what": decision.what,
-        "decision": decision.verdict.value,
-        "by": decision.by,
-        "remark": decision.remark,
-        **asdict(decision.bound),
-    }
-    lines = [f"{name}: {json.dumps(text, ensure_ascii=False)}\n" for name, text in facts.items()]
-    return "  - " + "    ".join(lines)
+def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: Mapping[str, str]) -> Review:
+    """Make all of the changes, or none; what is kept then.
+
+    `seen` are the revisions of the groups that the caller has looked at (`Review.revision`; a group that is
+    missing there had nothing said of it). Only one caller at a time gets in here, whichever process it is in.
+    Conflict when somebody else has said something about one of the groups since; MutatorError for an
+    unusable name or text, for an approval that `four_eyes` forbids, and in the library that ships with
+    mutator, which stays as it is.
+    """
+    made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
+    for change in made:
+        _check(change)
+    path = workspace.library / "reviews" / f"{target}.yaml"
+    refuse_shipped(path)
+    make_folder(path.parent)
+    with alone_in(path.parent):
+        review = load_review(workspace, target)
+        _refuse_unseen(review, made, seen)
+        if review.four_eyes:
+            check_four_eyes([(c.group, c.by) for c in made if c.kind is Kind.APPROVE])
+        return _written(workspace, review, made)
+
+
+def _check(change: Change) -> None:
+    """MutatorError for a change by nobody, and for a remark that says nothing."""
+    if not change.by:
+        raise MutatorError("no name", argument="by", expected="who has reviewed", remedy="give a name")
+    if change.kind is Kind.REMARK and not change.text:
+        raise MutatorError("no text", argument="text", expected="what is remarked", remedy="write something")
+
+
+def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping[str, str]) -> None:
+    groups = {change.group.id: change.group for change in changes}
+    unseen = [one for one in groups.values() if review.revision(one.id) != looked_at.get(one.id, "")]
+    if not unseen:
+        return
+    told = [f"  {one.id}  {_last_word(review, one)}" for one in unseen]
+    conflict = Conflict(
+        "\n".join(["somebody else has said something meanwhile:", *told]),
+        where=review.path,
+        expected="groups that are as you saw them",
+        remedy="look at them again, then decide; nothing was written",
+    )
+    conflict.groups, conflict.review = tuple(one.id for one in unseen), review
+    raise conflict
+
+
+def _last_word(review: Review, group: Group) -> str:
+    remarks = review.remarks(group.id)
+    flag = review.flag(group.id)
+    return "; ".join(
+        filter(
+            None,
+            (
+                review.describe(group) or "no decision",
+                f"flagged by {flag.by}" if flag else "",
+                f"{remarks[-1].by}: {remarks[-1].text}" if remarks else "",
+            ),
+        )
+    )
+
+
+def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) -> Review:
+    """The review with the changes, once it is on the disk; texts of what was seen go first."""
+    at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
+    entries = dict(review.entries)
+    for change in changes:
+        group = change.group
+        before = entries.get(group.id, Entry(group=group.id, what=group.what))
+        entries[group.id] = _applied(before, change, at, commit)
+    kept = {name: entry for name, entry in entries.items() if not entry.says_nothing}
+    made = replace(review, entries=kept)
+    for change in changes:
+        if change.kind in _VERDICTS:
+            seen_texts.keep(made.seen_path(change.group.id), change.group.seen)
+    content = review_file.Content(entries=made.entries, four_eyes=made.four_eyes)
+    review_file.write(made.path, made.target, content)
+    return made
+
+
+def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry:
+    """What is said of a group once a change is made."""
+    group, kind = change.group, change.kind
+    if change.text:
+        entry = replace(entry, remarks=(*entry.remarks, Remark(by=change.by, at=at, text=change.text)))
+    if kind in _VERDICTS:
+        decision = Decision(
+            group=group.id,
+            what=group.what,
+            verdict=_VERDICTS[kind],
+            by=change.by,
+            at=at,
+            commit=commit,
+            tool=VERSION,
+            bound=group.bound,
+            values=group.values,
+        )
+        return replace(entry, what=group.what, decision=decision)
+    if kind is Kind.CLEAR:
+        return replace(entry, decision=None)
+    if kind in (Kind.FLAG, Kind.UNFLAG):
+        return replace(entry, flag=Flag(by=change.by, at=at) if kind is Kind.FLAG else None)
+    return entry
 
 
 def _line(text: str, argument: str) -> str:

@@ -31,7 +31,7 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     refused = [group for group in groups if review.state(group) is not State.APPROVED]
     if refused:
         raise _refusal(workspace, plan, review, refused)
-    decisions = [plain(review.decisions[group.id]) for group in groups]
+    decisions = [_kept(review, group) for group in groups]
     return {"schema": SCHEMA, "target": manifest.name, "groups": decisions}
 
 
@@ -51,9 +51,14 @@ def approval_summary(run: Path) -> str:
     )
 
 
+def _kept(review: Review, group: Group) -> dict[str, Any]:
+    remarks = [plain(remark) for remark in review.remarks(group.id)]
+    return {**plain(review.decision(group.id)), "remarks": remarks}
+
+
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {review.state(group)}, {_share(group)}: {group.what}"
+        f"  {group.id}  {_reason(review, group)}, {_share(group)}: {group.what}"
         for group in review.in_turn(refused)
     ]
     many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
@@ -69,6 +74,16 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
         expected="an approval of each, as it is now",
         remedy=f"review what is missing: `mutator review walk {wanted} --by NAME`{at_once}",
     )
+
+
+def _reason(review: Review, group: Group) -> str:
+    """Why a group may not run: `missing`, what has `changed`, or by whom it was `rejected`."""
+    state, decision = review.state(group), review.decision(group.id)
+    if decision is None:
+        return "missing"
+    if state is State.CHANGED:
+        return f"changed ({', '.join(review.changed(group))})"
+    return decision.words
 
 
 def _share(group: Group) -> str:

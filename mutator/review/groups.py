@@ -100,17 +100,16 @@ def without_values(patch: str) -> str:
     return _rest(patch, list(_spans(patch)))
 
 
-def group_label(fault: Fault, trigger: Trigger) -> str:
-    """Where, what and when, in words without values; only mutants with one label can share a shape.
+def group_label(fault: Fault) -> str:
+    """Where and what, in words without values; only mutants with one label can share a shape.
 
-    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap); state, while`. The mutants of an
-    operator share one in each function: `pkg/sensor.py Sensor.measure: operator constant`.
+    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap)`. The mutants of an operator share
+    one in each function: `pkg/sensor.py Sensor.measure: operator constant`.
     """
     if operator := operator_of(fault):
         location = fault.injections[0].location
         return f"{location.path} {location.function}: operator {operator}"
-    when = f"{trigger_kind(trigger)}, {hold_of(fault, trigger).value}"
-    return "; ".join((*map(injection_label, fault.injections), when))
+    return "; ".join(map(injection_label, fault.injections))
 
 
 def location_label(location: FaultLocation) -> str:

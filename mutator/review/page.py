@@ -5,7 +5,6 @@ A server shows the same page; there, what a reviewer says is kept as it is said 
 
 import shlex
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from mutator._common.files import write_atomic
-from mutator._common.hashing import content_id
+from mutator._common.hashing import content_id, plain
 from mutator.errors import MutatorError
 from mutator.mutants.probe import tag_words
 from mutator.review.catalogue import Group
@@ -85,23 +84,23 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
 
     `digest` says which mutants that is: a page made of others must not decide about these.
     """
-    decision = review.decisions.get(group.id)
+    decision, flag = review.decision(group.id), review.flag(group.id)
     return {
         "state": review.state(group).value,
         "decision": decision
         and {
             "verdict": decision.verdict.value,
             "by": decision.by,
-            "at": "",
-            "commit": "",
-            "tool": "",
-            "text": decision.remark,
-            "changed": decision.changed(group),
+            "at": decision.at or "",
+            "commit": decision.commit or "",
+            "tool": decision.tool or "",
+            "text": "",
+            "changed": review.changed(group),
         },
-        "remarks": [],
-        "flag": None,
-        "revision": "",
-        "digest": content_id(asdict(group.bound))[:12],
+        "remarks": [{"by": one.by, "at": one.at or "", "text": one.text} for one in review.remarks(group.id)],
+        "flag": flag and plain(flag),
+        "revision": review.revision(group.id),
+        "digest": content_id([group.bound, group.values])[:12],
     }
 
 
@@ -132,7 +131,7 @@ def _group(review: Review, group: Group, like: int) -> dict[str, Any]:
         "faults": len(group.faults),
         "runs": group.runs,
         "diff": group.diff,
-        "changes": "",
+        "changes": review.changes(group),
         "pictures": "image_effect" in group.models,
         "heads": heads,
         "rows": rows,

@@ -7,18 +7,19 @@ from typing import Any
 import pytest
 
 from mutator.review.catalogue import of_library
-from mutator.review.decisions import Verdict, load_review
+from mutator.review.decisions import Change, Kind, record
 from mutator.review.page import write_page
 from mutator.workspace import Workspace
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """The toy's nine groups; one of them is approved."""
+    """The toy's five groups; one of them is approved."""
     folder = tmp_path_factory.mktemp("review")
     toy = copy_toycar(folder)
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
-    review = load_review(toy, "toycar").decided(groups[:1], Verdict.APPROVED, "Jane <b>Doe</b>", "")
+    approval = Change(group=groups[-1], kind=Kind.APPROVE, by="Jane <b>Doe</b>")
+    review = record(toy, "toycar", [approval], {})
     write_page(folder / "review.html", review, review.in_turn(groups), ["--spec", "sensor/*"])
     return folder / "review.html"
 
@@ -59,9 +60,9 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
     """Words and states narrow the list; the address of what is seen shows the same again."""
     page = open_page()
     unfold(page)
-    assert (shown(page), page.inner_text("#found")) == (9, "9 groups")
-    page.fill("#find", "omission time")
-    assert (shown(page), page.inner_text("#found")) == (1, "1 of 9 groups")
+    assert (shown(page), page.inner_text("#found")) == (5, "5 groups")
+    page.fill("#find", "omission")
+    assert (shown(page), page.inner_text("#found")) == (1, "1 of 5 groups")
     page.fill("#find", "")
     page.click("[data-state=approved]")
     assert "approved by Jane <b>Doe</b>" in page.inner_text(".group:visible")
@@ -73,7 +74,7 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
 
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
     """Keys go from group to group and mark them; the commands name them as a shell needs it."""
-    page = open_page("q=longer")
+    page = open_page("q=gap")
     unfold(page)
     for key in "jajr":
         page.keyboard.press(key)
@@ -92,7 +93,7 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None:
     """The first of them stands for all: a key opens the others, another marks them after a question."""
-    page = open_page("q=longer")
+    page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
     page.keyboard.press("j")
@@ -108,7 +109,7 @@ def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None
 
 def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
     """The question says how many there are and in which states; without a yes nothing is done."""
-    page = open_page("q=longer")
+    page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"
     page.keyboard.press("Escape")
@@ -120,7 +121,7 @@ def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable
 
 def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
     """The diff has its holes; the table of values opens by key, with the span above it."""
-    page = open_page("q=longer+time")
+    page = open_page("q=longer")
     page.keyboard.press("j")
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]
     page.keyboard.press("v")

@@ -58,7 +58,7 @@ def test_every_patch_is_given_back(families: list[list[tuple[Fault, Trigger]]]) 
     for family in families:
         for fault, trigger in family:
             patch = build(manifest, models, fault, trigger).patch  # type: ignore[arg-type]
-            made[str(len(made))] = (fault, group_label(fault, trigger), patch)
+            made[str(len(made))] = (fault, group_label(fault), patch)
     found = shapes((key, name, patch) for key, (_, name, patch) in made.items())
     assert len(found) == len({name for _, name, _ in made.values()})
     for shape in found:

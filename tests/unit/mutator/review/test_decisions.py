@@ -1,21 +1,27 @@
-"""The file of decisions: it holds what was decided; a mistake is reported at its line."""
+"""What reviewers say is kept as it is said, under one lock; who has not seen the latest is told of it."""
 
-import dataclasses
+import os
 import subprocess
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mutator._common import shipped
+from mutator._common.version import VERSION
 from mutator.errors import MutatorError
-from mutator.review.catalogue import Bound, Group
-from mutator.review.decisions import Review, State, Verdict, load_review
+from mutator.review.catalogue import Group
+from mutator.review.decisions import Change, Conflict, Kind, Review, State, load_review, record
+from mutator.review.entries import Bound
+from mutator.review.seen_texts import text_of
 from mutator.workspace import Workspace
 
-BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16)
+BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
+VALUES = {"by": (-40.0, 40.0)}
 
 
-def group(name: str, bound: Bound = BOUND) -> Group:
+def group(name: str, bound: Bound = BOUND, diff: str = "+x = 1\n") -> Group:
     return Group(
         id=name * 12,
         what=f"group {name}: \"quoted\" 'and' ünï # no comment",
@@ -30,120 +36,201 @@ def group(name: str, bound: Bound = BOUND) -> Group:
         triggers=(),
         runs=None,
         bound=bound,
+        values=VALUES,
+        seen=text_of(bound, VALUES, {"diff": diff}),
     )
 
 
-def review(toy: Workspace, *names: str) -> Review:
-    return load_review(toy, "toycar").decided(map(group, names), Verdict.APPROVED, "Jane Doe", "fine")
+def say(toy: Workspace, kind: Kind, *names: str, by: str = "Jane Doe", text: str = "") -> Review:
+    """Do this about these groups, by somebody who knows all that was said."""
+    changes = [Change(group=group(name), kind=kind, by=by, text=text) for name in names]
+    review = load_review(toy, "toycar")
+    return record(toy, "toycar", changes, {one.group.id: review.revision(one.group.id) for one in changes})
 
 
-def test_what_is_written_is_read(toycar: Workspace) -> None:
-    """Names and remarks of any letters come back, and the file says the same each time."""
-    written = review(toycar, "b", "0", "1").decided(
-        [group("1")], Verdict.REJECTED, "Ünï 'x' # \"y\"", "a: b\\n"
-    )
-    written.write()
-    assert load_review(toycar, "toycar") == written
-    text = written.path.read_text()
-    load_review(toycar, "toycar").write()
-    assert written.path.read_text() == text
+def test_what_is_said_is_kept(toycar: Workspace) -> None:
+    """Decisions, remarks and flags of any letters are read as they were written, and revisions with them."""
+    say(toycar, Kind.APPROVE, "b", "0", text="fine")
+    say(toycar, Kind.REJECT, "1", by="Ünï 'x' # \"y\"", text="a: b\\n")
+    say(toycar, Kind.REMARK, "a", text="- [not yaml]")
+    written = say(toycar, Kind.FLAG, "0", by="Joe")
+    read = load_review(toycar, "toycar")
+    assert read == written
+    assert [read.revision(name) for name in read.entries] == [
+        written.revision(name) for name in written.entries
+    ]
+    decision = read.decision("b" * 12)
+    assert decision is not None
+    assert (decision.by, decision.tool, decision.commit, decision.bound) == ("Jane Doe", VERSION, None, BOUND)
+    assert [(one.by, one.text) for one in read.remarks("b" * 12)] == [("Jane Doe", "fine")]
+    flag = read.flag("0" * 12)
+    assert flag is not None and flag.by == "Joe" and flag.at == decision.at[:11] + flag.at[11:]  # type: ignore[index]
 
 
 def test_states(toycar: Workspace) -> None:
     """New until decided, then what was decided, changed once anything that it was bound to is another."""
-    found = review(toycar, "a").decided([group("b")], Verdict.REJECTED, "Jane", "")
-    other = Bound(diff=BOUND.diff, function="e" * 16, template="1" * 16)
+    say(toycar, Kind.APPROVE, "a")
+    found = say(toycar, Kind.REJECT, "b")
+    other = replace(BOUND, function="e" * 16, template="1" * 16, calls="2" * 16)
     states = [found.state(g) for g in (group("c"), group("a", other), group("b"), group("a"))]
     assert states == list(State)
     assert found.in_turn([group("a"), group("b"), group("c")]) == [group("c"), group("b"), group("a")]
-    assert (
-        found.describe(group("a", other))
-        == "approved by Jane Doe: fine (changed since: template, target function)"
+    assert found.changed(group("a", other)) == ["template", "target function", "code that it calls"]
+    assert found.describe(group("a", other)).endswith(
+        " (changed since: template, target function, code that it calls)"
     )
-    assert (found.describe(group("b")), found.describe(group("c"))) == ("rejected by Jane", "")
+    assert found.describe(group("b")).startswith("rejected by Jane Doe on 20")
+    assert found.describe(group("c")) == ""
+
+
+@pytest.mark.parametrize(
+    ("values", "changed"),
+    [
+        ({"by": (-40.0, 40.0)}, []),
+        ({"by": (3.0, 3.0)}, []),
+        ({}, []),
+        ({"by": (-100.0, 40.0)}, ["values (by: -100 to 40; approved -40 to 40)"]),
+        ({"by": (41.0, 41.0), "low": (0.0, 0.0)}, [
+            "values (by: 41; approved -40 to 40; low: 0; approved none)"
+        ]),
+        ({"by": (1.0, 2.0, "nan")}, ["values (by: 1 to 2, nan; approved -40 to 40)"]),
+    ],
+)  # fmt: skip
+def test_values_must_lie_within_the_approved_ones(
+    toycar: Workspace, values: dict[str, tuple[float | str, ...]], changed: list[str]
+) -> None:
+    """Fewer values than were approved are approved; one beyond them is told with both ranges."""
+    found = say(toycar, Kind.APPROVE, "a")
+    assert found.changed(replace(group("a"), values=values)) == changed
 
 
 def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
-    """A group has one block in the file."""
-    found = review(toycar, "a").decided([group("a")], Verdict.REJECTED, "Joe", "no")
-    assert found.describe(group("a")) == "rejected by Joe: no"
-    assert len(found.decisions) == 1
+    """A group has one block and one decision; what was remarked before stays."""
+    say(toycar, Kind.APPROVE, "a", text="fine")
+    found = say(toycar, Kind.REJECT, "a", by="Joe", text="no")
+    assert found.describe(group("a")).startswith("rejected by Joe")
+    assert [one.text for one in found.remarks("a" * 12)] == ["fine", "no"]
+    assert len(found.entries) == 1
 
 
-def test_blocks_are_sorted_one_fact_a_line(toycar: Workspace) -> None:
-    """Decisions of two people about different groups merge under version control."""
-    base, ours, theirs = (review(toycar, *names) for names in ("08f", "018f", "08ef"))
-    folder = base.path.parent
-    files = []
-    for i, one in enumerate((ours, base, theirs)):
-        one.write()
-        files.append(folder / f"{i}")
-        one.path.rename(files[-1])
-    merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
-    base.path.write_bytes(merged)
-    assert "".join(name[0] for name in load_review(toycar, "toycar").decisions) == "018ef"
+def test_what_is_taken_back_is_gone(toycar: Workspace) -> None:
+    """A decision that is cleared leaves the remarks; a block of which nothing is left goes, too."""
+    say(toycar, Kind.APPROVE, "a", "b", text="fine")
+    say(toycar, Kind.FLAG, "c")
+    found = say(toycar, Kind.CLEAR, "a")
+    assert found.state(group("a")) is State.NEW and found.remarks("a" * 12)
+    assert "c" * 12 not in say(toycar, Kind.UNFLAG, "c").entries
+    assert found.revision("c" * 12) and load_review(toycar, "toycar").revision("c" * 12) == ""
 
 
-def test_no_file_is_no_decision(toycar: Workspace) -> None:
-    """A library without reviews has none."""
-    assert not load_review(toycar, "toycar").decisions
+def test_who_has_not_seen_the_latest_writes_nothing(toycar: Workspace) -> None:
+    """A conflict names the groups and what the other said; the rest of the changes is not made either."""
+    before = load_review(toycar, "toycar")
+    say(toycar, Kind.REJECT, "a", by="Joe", text="too much")
+    changes = [Change(group=group(name), kind=Kind.APPROVE, by="Jane") for name in ("a", "b")]
+    with pytest.raises(Conflict, match=r"aaaaaaaaaaaa  rejected by Joe on .*Joe: too much") as caught:
+        record(toycar, "toycar", changes, {g: before.revision(g) for g in ("a" * 12, "b" * 12)})
+    assert caught.value.groups == ("a" * 12,)
+    assert caught.value.review == load_review(toycar, "toycar")
+    assert caught.value.review.state(group("b")) is State.NEW
+
+
+def test_different_groups_never_conflict(toycar: Workspace) -> None:
+    """Who decides about one group need not know of decisions about others."""
+    say(toycar, Kind.REJECT, "a", by="Joe")
+    found = record(toycar, "toycar", [Change(group=group("b"), kind=Kind.APPROVE, by="Jane")], {})
+    assert [found.state(group(name)) for name in "ab"] == [State.REJECTED, State.APPROVED]
+
+
+_WRITER = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+from test_decisions import Change, Kind, Workspace, group, record
+library, by = Path(sys.argv[2]), sys.argv[3]
+toy = Workspace(library=library, templates=library.parent / "templates")
+print("ready", flush=True)
+sys.stdin.readline()
+for name in sys.argv[4]:
+    record(toy, "toycar", [Change(group=group(name), kind=Kind.APPROVE, by=by)], {})
+"""
+
+
+def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
+    """Two processes that decide about different groups at the same time both find all their decisions."""
+    words = [sys.executable, "-c", _WRITER, str(Path(__file__).parent), str(toycar.library)]
+    shares = {"Jane": "02468ace", "Joe": "13579bdf"}
+    with_pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "env": dict(os.environ)}
+    writers = [
+        subprocess.Popen([*words, by, names], **with_pipes)  # type: ignore[call-overload]
+        for by, names in shares.items()
+    ]
+    for writer in writers:
+        assert writer.stdout.readline() == b"ready\n"
+    for writer in writers:
+        writer.stdin.write(b"\n")
+        writer.stdin.flush()
+    assert [writer.wait(60) for writer in writers] == [0, 0]
+    for writer in writers:
+        writer.stdin.close()
+        writer.stdout.close()
+    found = load_review(toycar, "toycar")
+    assert {name[0]: found.entries[name].decision.by for name in found.entries} == {  # type: ignore[union-attr]
+        name: by for by, names in shares.items() for name in names
+    }
+
+
+def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
+    """The diff of then against that of now, while the group is changed; without the text kept, nothing."""
+    found = say(toycar, Kind.APPROVE, "a")
+    now = group("a", replace(BOUND, diff="e" * 16), "+x = 2\n")
+    assert found.changes(group("a")) == ""
+    assert "-+x = 1\n++x = 2\n" in found.changes(now)
+    path = toycar.library / "reviews" / "seen" / "toycar" / f"{'a' * 12}.txt"
+    text = path.read_text()
+    path.write_text(text.replace("d" * 16, "9" * 16))
+    assert found.changes(now) == ""  # of another decision
+    path.unlink()
+    assert found.changes(now) == ""
+    assert found.state(now) is State.CHANGED
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "line", "words"),
+    ("kind", "by", "text", "argument"),
     [
-        ("approved", "aproved", 8, "aproved"),
-        ('"aaaaaaaaaaaa"', '"aaaa"', 6, "aaaa"),
-        ('ffff"', 'zzzz"', 12, "zzzz"),
-        ('"Jane Doe"', '""', 9, "by"),
-        ('"Jane Doe"', "3", 9, "3"),
-        ("remark:", "remarks:", 10, "remarks"),
-        ("toycar", "other", 4, "other"),
-        ("review/1", "review/2", 3, "newer version"),
-        ("decisions:", "decisions: [", 6, "YAML"),
-        ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 14, "second time"),
+        (Kind.APPROVE, "", "", "by"),
+        (Kind.FLAG, " \n", "", "by"),
+        (Kind.REJECT, "J", "a\0b", "text"),
+        (Kind.REMARK, "J", " ", "text"),
     ],
 )
-def test_hand_edits_are_checked(toycar: Workspace, old: str, new: str, line: int, words: str) -> None:
-    """A mistake is told with the file, its line and the offending value."""
-    found = review(toycar, "a", "b")
-    found.write()
-    found.path.write_text(found.path.read_text().replace(old, new, 1))
+def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, argument: str) -> None:
+    """A change has somebody's name, and what is kept of it is text."""
     with pytest.raises(MutatorError) as caught:
-        load_review(toycar, "toycar")
-    assert (caught.value.where, caught.value.line) == (str(found.path), line)
-    assert words in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("by", "remark", "argument"), [("", "", "by"), (" \n", "", "by"), ("J", "a\0b", "remark")]
-)
-def test_no_name_or_no_text(toycar: Workspace, by: str, remark: str, argument: str) -> None:
-    """A decision has somebody's name, and what is kept of it is text."""
-    with pytest.raises(MutatorError) as caught:
-        load_review(toycar, "toycar").decided([group("a")], Verdict.APPROVED, by, remark)
+        record(toycar, "toycar", [Change(group=group("a"), kind=kind, by=by, text=text)], {})
     assert caught.value.argument == argument
+    assert not (toycar.library / "reviews").exists()
 
 
 def test_a_remark_is_one_line(toycar: Workspace) -> None:
     """Line ends become spaces."""
-    found = load_review(toycar, "toycar").decided([group("a")], Verdict.APPROVED, "J", "one\n two\ttabs")
-    assert found.decisions["a" * 12].remark == "one two tabs"
+    found = say(toycar, Kind.REMARK, "a", text="one\n two\ttabs")
+    assert found.remarks("a" * 12)[0].text == "one two tabs"
 
 
 def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     """A write that fails leaves the old file, and nothing beside it."""
-    review(toycar, "a").write()
-    before = review(toycar).path.read_bytes()
+    path = say(toycar, Kind.APPROVE, "a").path
+    before = path.read_bytes()
 
     def full(self: Path, target: Path) -> None:
         raise OSError("no")
 
     monkeypatch.setattr(Path, "replace", full)
     with pytest.raises(OSError, match="no"):
-        review(toycar, "b").write()
-    assert review(toycar).path.read_bytes() == before
-    assert [path.name for path in review(toycar).path.parent.iterdir()] == ["toycar.yaml"]
+        say(toycar, Kind.FLAG, "b")
+    assert path.read_bytes() == before
+    assert sorted(one.name for one in path.parent.iterdir()) == ["seen", "toycar.yaml"]
 
 
 def test_the_shipped_library_takes_no_decisions(
@@ -152,7 +239,7 @@ def test_the_shipped_library_takes_no_decisions(
     """Decisions about the library that came with a wheel are refused before anything is written."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "cache"))
-    path = tmp_path / "cache" / "mutator" / "shipped" / "0" / "reviews" / "toycar.yaml"
+    library = tmp_path / "cache" / "mutator" / "shipped" / "0"
     with pytest.raises(MutatorError, match=r"reviews/toycar.yaml: .*ships with mutator.*mutator init DIR"):
-        dataclasses.replace(review(toycar, "a"), path=path).write()
+        say(replace(toycar, library=library), Kind.APPROVE, "a")
     assert not (tmp_path / "cache").exists()

@@ -4,13 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from mutator._common.version import VERSION
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import Choices, Plan, make_plan
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.review import gate
 from mutator.review.catalogue import of_plan
-from mutator.review.decisions import Verdict, load_review
+from mutator.review.decisions import Change, Kind, load_review, record
 from mutator.workspace import Workspace
 
 
@@ -19,10 +20,11 @@ def plan(toycar: Workspace) -> Plan:
     return make_plan(toycar, "small", Choices(limit=2))
 
 
-def decide(toy: Workspace, plan: Plan, verdict: Verdict = Verdict.APPROVED, count: int | None = None) -> None:
+def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
     """Approve or reject the groups of the plan, or the first `count` of them."""
-    groups = of_plan(toy, plan)[:count]
-    load_review(toy, "toycar").decided(groups, verdict, f"Reviewer {count}", "").write()
+    changes = [Change(group=one, kind=kind, by=f"Reviewer {count}") for one in of_plan(toy, plan)[:count]]
+    review = load_review(toy, "toycar")
+    record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
 
 
 def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
@@ -31,7 +33,10 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
     assert gate.approval_summary(run) == ""
     decide(toycar, plan)
     decide(toycar, plan, count=1)
-    gate.write_approvals(run, gate.approvals(toycar, plan))
+    gate.write_approvals(run, approvals := gate.approvals(toycar, plan))
+    for kept in approvals["groups"]:
+        assert (kept["verdict"], kept["tool"], kept["commit"]) == ("approved", VERSION, None)
+        assert kept["at"] and set(kept["bound"]) == {"diff", "function", "template", "calls"}
     total = len(of_plan(toycar, plan))
     assert gate.approval_summary(run) == (
         f"all of {total} groups approved, by Reviewer 1 (1), Reviewer None ({total - 1})"
@@ -39,18 +44,24 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
 
 
 def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
-    """New, rejected and changed groups, each with its number of experiments, and what to do."""
+    """Missing, changed and rejected groups in this order, with reasons, experiments, what to do."""
+    groups = of_plan(toycar, plan)
+    missing, changed, rejected = groups[0], groups[1], groups[-1]
     decide(toycar, plan)
-    decide(toycar, plan, Verdict.REJECTED, count=1)
-    template = toycar.templates / "omission.py.j2"
-    template.write_text(template.read_text().replace("not ", "not not not "))
+    decide(toycar, plan, Kind.CLEAR, count=1)
+    review = load_review(toycar, "toycar")
+    no = Change(group=rejected, kind=Kind.REJECT, by="Joe")
+    record(toycar, "toycar", [no], {rejected.id: review.revision(rejected.id)})
+    template = toycar.templates / f"{changed.models[0]}.py.j2"
+    template.write_text(template.read_text() + "{# another #}\n")
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, make_plan(toycar, "small", Choices(limit=2, reading="as_coded")))
-    review = load_review(toycar, "toycar")
-    refused = [group for group in of_plan(toycar, plan) if review.state(group) != "approved"]
-    for group in refused:
-        assert f"{group.id}  {review.state(group)}, {group.runs} experiment" in caught.value.got
-    assert caught.value.got.startswith(f"{len(refused)} groups" if len(refused) > 1 else "a group")
+    told = [line.split("  ")[2].partition(": ")[0] for line in caught.value.got.splitlines()[1:]]
+    assert told[0].startswith("missing, ")
+    assert all(line.startswith("changed (template), ") for line in told[1:-1]) and told[1:-1]
+    assert told[-1].startswith("rejected by Joe on ") and told[-1].endswith(", 2 experiments")
+    assert caught.value.got.startswith(f"{len(told)} groups")
+    assert f"  {missing.id}  missing" in caught.value.got
     assert "`mutator review walk --campaign small --reading as_coded --by NAME`" in str(caught.value.remedy)
     assert caught.value.exit_code == 1
 
@@ -61,7 +72,7 @@ def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Pl
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, plan)
     assert alone
-    assert all(f"{group.id}  new, the canary: " in caught.value.got for group in alone)
+    assert all(f"{group.id}  missing, the canary: " in caught.value.got for group in alone)
 
 
 def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ def faults(toy: Workspace, name: str, spec: str = "sensor/distance") -> list[Fau
 def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
     manifest, models = toy.manifest("toycar"), toy.fault_models()
     return shapes(
-        (f"{i}", group_label(fault, trigger), build(manifest, models, fault, trigger).patch)
+        (f"{i}", group_label(fault), build(manifest, models, fault, trigger).patch)
         for i, (fault, trigger) in enumerate(pairs)
     )
 
@@ -71,13 +71,19 @@ def test_not_a_number_is_a_value(toycar: Workspace) -> None:
 
 
 def test_what_must_be_in_common(toycar: Workspace) -> None:
-    """Another place, another model, bounds or none, another kind of trigger or hold: another shape."""
+    """Another place, another model, bounds or none: another shape."""
     longer, nearer = faults(toycar, "longer")[0], faults(toycar, "nearer")[0]
     shifted = faults(toycar, "shifted", "sensor/lane")[0]
     silent = faults(toycar, "no_data", "sensor/silence")[0]
-    triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
-    pairs = [(f, NEAR) for f in (longer, nearer, shifted, silent)] + [(longer, t) for t in triggers[1:]]
+    pairs = [(fault, NEAR) for fault in (longer, nearer, shifted, silent)]
     assert len(grouped(toycar, pairs)) == len(pairs)
+
+
+def test_what_triggers_a_change_makes_no_other_shape(toycar: Workspace) -> None:
+    """A context, a time or none, for as long as it holds or to the end: one diff."""
+    longer = faults(toycar, "longer")[0]
+    triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
+    assert len(grouped(toycar, [(longer, trigger) for trigger in triggers])) == 1
 
 
 def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:

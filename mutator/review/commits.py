@@ -1,0 +1,91 @@
+"""What git knows for a review: the library's commit, who is at work, and who changed a group last."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from mutator.campaigns.machine import git
+from mutator.errors import MutatorError
+from mutator.review.catalogue import Group
+from mutator.workspace import Workspace
+
+
+@dataclass(frozen=True, slots=True)
+class _Commit:
+    """A commit, and its author as a `.mailmap` has it."""
+
+    id: str
+    name: str
+    email: str
+
+    def is_by(self, reviewer: str) -> bool:
+        """Whether somebody who signs so is its author: `Jane Doe`, `jane@x.org`, `Jane Doe <jane@x.org>`."""
+        given, _, rest = reviewer.partition("<")
+        return bool(
+            {text.strip().casefold() for text in (reviewer, given, rest.rstrip("> "))}
+            & {self.name.casefold(), self.email.casefold()} - {""}
+        )
+
+
+def user_name(workspace: Workspace) -> str | None:
+    """git's `user.name` for the library; None without one, or without git."""
+    return (git(workspace.library, "config", "user.name") or "").strip() or None
+
+
+def library_commit(workspace: Workspace) -> str | None:
+    """The library's commit, with `-dirty` where more than its reviews was changed since; None outside git."""
+    head = git(workspace.library, "rev-parse", "HEAD")
+    changes = git(workspace.library, "status", "--porcelain", "--", ".", ":(exclude)reviews")
+    return None if head is None or changes is None else head.strip() + "-dirty" * bool(changes.strip())
+
+
+def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
+    """MutatorError where somebody approves a group whose last change is theirs, or cannot be told."""
+    known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
+    for group, by in approvals:
+        if group.made_from not in known:
+            known[group.made_from] = _last_changes(group)
+        for folder, commit in known[group.made_from].items():
+            if commit.is_by(by):
+                raise _refusal(
+                    f"{by} changed group {group.id} last (commit {commit.id[:12]} by {commit.name} "
+                    f"<{commit.email}>): {group.what}",
+                    folder,
+                    "have somebody else approve it",
+                )
+
+
+def _last_changes(group: Group) -> dict[Path, _Commit]:
+    """The last commit, in each clone, that changed what the group is made from."""
+    clones: dict[Path, list[Path]] = {}
+    for path in group.made_from:
+        top = git(path.parent, "rev-parse", "--show-toplevel")
+        if top is None:
+            raise _refusal(
+                f"nobody can tell who changed group {group.id} last: no git clone", path, "keep it in git"
+            )
+        clones.setdefault(Path(top.strip()), []).append(path)
+    return {top: _last_change(group, top, paths) for top, paths in clones.items()}
+
+
+def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
+    names = [str(path.resolve()) for path in paths]
+    changes = git(top, "status", "--porcelain", "--", *names)
+    told = git(top, "log", "-1", "--format=%H%x00%aN%x00%aE", "--", *names) or ""
+    if changes is None or changes.strip() or not told.strip():
+        first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
+        raise _refusal(
+            f"nobody can tell who changed group {group.id} last: not committed",
+            Path(top, *first),
+            "commit first",
+        )
+    return _Commit(*told.strip("\n").split("\0"))
+
+
+def _refusal(got: str, where: Path, remedy: str) -> MutatorError:
+    return MutatorError(
+        got,
+        where=where,
+        expected="another reviewer than the author of the last change (`four_eyes` of this library)",
+        remedy=remedy,
+    )

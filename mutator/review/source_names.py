@@ -1,0 +1,257 @@
+"""The names in a Python source: what a module defines and imports, and which names a piece of it uses."""
+
+import ast
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+_Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+_SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+_Wanted = Callable[[ast.expr | ast.stmt], bool]
+_COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+@dataclass(frozen=True, slots=True)
+class Import:
+    """`from module import name`, or, without a name, `import module`; `level`: dots before the module."""
+
+    module: str
+    name: str | None = None
+    level: int = 0
+
+    def absolute(self, path: str) -> str:
+        """The module's full name, for an import in the file at `path`."""
+        if not self.level:
+            return self.module
+        parts = path.split("/")[: -self.level]
+        return ".".join([*parts, *([self.module] if self.module else [])])
+
+
+@dataclass(frozen=True, slots=True)
+class Use:
+    """A name that is no local variable, with the attributes after it: `("effects", "Rain")`.
+
+    `imported` is what it stands for where the function imports it itself; `owner` is the class of a `self`.
+    """
+
+    words: tuple[str, ...]
+    imported: Import | None = None
+    owner: str = ""
+
+
+@dataclass(frozen=True)
+class Module:
+    """What a module defines, by qualified name (classes, functions, methods, constants), and imports."""
+
+    tree: ast.Module
+    defined: Mapping[str, Sequence[ast.stmt]]
+    imports: Mapping[str, Sequence[Import]]
+
+    def nodes_of(self, name: str) -> Sequence[ast.stmt]:
+        """The statements that define a name: several where it is set again."""
+        return self.defined.get(name, ())
+
+    def knows(self, name: str) -> bool:
+        """Whether a name is defined or imported here."""
+        return name in self.defined or name in self.imports
+
+    def function(self, name: str) -> ast.stmt | None:
+        """The function of that qualified name, the last one of several."""
+        found = self.nodes_of(name)
+        return found[-1] if found else None
+
+    def bases_of(self, name: str) -> list[tuple[str, ...]]:
+        """The base classes of a class, as names with attributes."""
+        classes = [node for node in self.nodes_of(name) if isinstance(node, ast.ClassDef)]
+        return [words for node in classes for base in node.bases if (words := _dotted(base))]
+
+    def source_of(self, name: str, data: bytes) -> bytes:
+        """The lines of all statements that define a name, decorators included."""
+        lines = data.splitlines(keepends=True)
+        parts = []
+        for node in self.nodes_of(name):
+            decorators = getattr(node, "decorator_list", [])
+            first = min(one.lineno for one in (node, *decorators))
+            parts += lines[first - 1 : node.end_lineno]
+        return b"".join(parts)
+
+
+def read_module(path: str, data: bytes, root: Path) -> Module:
+    """The names of a file of a tree; of one that is no Python, none."""
+    try:
+        tree = ast.parse(data)
+    except (SyntaxError, ValueError, RecursionError):
+        tree = ast.Module(body=[], type_ignores=[])
+    defined: dict[str, list[ast.stmt]] = {}
+    imports: dict[str, list[Import]] = {}
+    for name, node in _definitions(tree.body, ""):
+        defined.setdefault(name, []).append(node)
+    for name, one in _imports(tree.body):
+        imports.setdefault(name, []).append(one)
+    return Module(tree=tree, defined=defined, imports=imports)
+
+
+def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
+    """The names that `node` uses from outside of its functions, those that are `wanted`. `owner` is the class
+    that it is a method of."""
+    yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
+
+
+def uses_beside(function: ast.stmt | None, owner: str, node: ast.AST) -> Iterator[Use]:
+    """The names that `node` uses where it stands in a function (of the class `owner`, if of one)."""
+    scope = _Scope(owner=owner)
+    yield from _uses(node, scope.inside(function) if isinstance(function, _SCOPES) else scope, lambda _: True)
+
+
+@dataclass(frozen=True, slots=True)
+class _Scope:
+    """What names mean within a function: variables of its own, imports of its own, and `self`."""
+
+    local: frozenset[str] = frozenset()
+    imports: tuple[tuple[str, Import], ...] = ()
+    owner: str = ""  # the class that a method belongs to
+    me: str = ""  # what the method calls its object
+
+    def inside(self, node: _Function) -> "_Scope":
+        """The scope of a function that is defined in this one."""
+        names, imports = _bound(node)
+        method = bool(self.owner) and not self.local and not isinstance(node, ast.Lambda)
+        arguments = [*node.args.posonlyargs, *node.args.args]
+        return _Scope(
+            local=self.local | names,
+            imports=(*self.imports, *imports),
+            owner=self.owner,
+            me=arguments[0].arg if method and arguments else self.me,
+        )
+
+    def use(self, words: tuple[str, ...]) -> Use | None:
+        """What a name with attributes means here; None for a variable."""
+        for name, one in reversed(self.imports):
+            if name == words[0]:
+                return Use(words, imported=one)
+        if words[0] == self.me and self.owner:
+            return Use(words, owner=self.owner) if len(words) > 1 else None
+        return None if words[0] in self.local else Use(words)
+
+
+def _uses(node: ast.AST, scope: _Scope, wanted: _Wanted) -> Iterator[Use]:
+    if isinstance(node, ast.ClassDef):
+        inner = _Scope(scope.local, scope.imports, f"{scope.owner}.{node.name}".strip("."))
+        for one in (*node.bases, *node.keywords, *node.decorator_list):
+            yield from _uses(one, scope, wanted)
+        for one in node.body:
+            yield from _uses(one, inner, wanted)
+        return
+    words = _dotted(node) if isinstance(node, ast.Name | ast.Attribute) else ()
+    if words:
+        assert isinstance(node, ast.Name | ast.Attribute)
+        if wanted(node) and (use := scope.use(words)):
+            yield use
+        return
+    if isinstance(node, ast.Import | ast.ImportFrom):
+        if wanted(node):
+            yield from (Use(("import",), imported=one) for _, one in _imports([node]))
+        return
+    if isinstance(node, _SCOPES):
+        outer = [*node.args.defaults, *filter(None, node.args.kw_defaults)]
+        for one in (*outer, *getattr(node, "decorator_list", [])):
+            yield from _uses(one, scope, wanted)
+        body = node.body if isinstance(node.body, list) else [node.body]
+        inner = scope.inside(node)
+        for one in body:
+            yield from _uses(one, inner, wanted)
+        return
+    if isinstance(node, _COMPREHENSIONS):
+        names = frozenset(
+            n.id for g in node.generators for n in ast.walk(g.target) if isinstance(n, ast.Name)
+        )
+        scope = _Scope(scope.local | names, scope.imports, scope.owner, scope.me)
+    for one in _called_children(node):
+        yield from _uses(one, scope, wanted)
+
+
+def _called_children(node: ast.AST) -> Iterator[ast.AST]:
+    """All parts but annotations, which call nothing."""
+    for name, value in ast.iter_fields(node):
+        if name in ("annotation", "returns"):
+            continue
+        for one in value if isinstance(value, list) else [value]:
+            if isinstance(one, ast.AST):
+                yield one
+
+
+def _dotted(node: ast.AST) -> tuple[str, ...]:
+    """`a.b.c` as its words; nothing for an attribute of something else than a name."""
+    words: list[str] = []
+    while isinstance(node, ast.Attribute):
+        words.append(node.attr)
+        node = node.value
+    return (node.id, *reversed(words)) if isinstance(node, ast.Name) else ()
+
+
+def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
+    """The names that a function binds itself, and its imports."""
+    arguments = node.args
+    every = [
+        *arguments.posonlyargs,
+        *arguments.args,
+        *arguments.kwonlyargs,
+        arguments.vararg,
+        arguments.kwarg,
+    ]
+    names = {one.arg for one in every if one}
+    outside: set[str] = set()
+    imports: list[tuple[str, Import]] = []
+    waiting: list[ast.AST] = list(node.body) if isinstance(node.body, list) else []
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, ast.Import | ast.ImportFrom):
+            imports += _imports([one])
+        elif isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            names.add(one.name)
+        elif isinstance(one, ast.Global | ast.Nonlocal):
+            outside |= set(one.names)
+        elif isinstance(one, ast.Name) and isinstance(one.ctx, ast.Store | ast.Del):
+            names.add(one.id)
+        elif isinstance(one, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and one.name:
+            names.add(one.name)
+        if not isinstance(one, (*_SCOPES, ast.ClassDef)):
+            waiting += ast.iter_child_nodes(one)
+    return frozenset(names - outside - {name for name, _ in imports}), imports
+
+
+def _definitions(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, ast.stmt]]:
+    """Name and statement of all that a module, or a class of it, defines, in blocks like `if`, too."""
+    for node in body:
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield inside + node.name, node
+            if isinstance(node, ast.ClassDef):
+                yield from _definitions(node.body, f"{inside}{node.name}.")
+        elif isinstance(node, ast.Assign | ast.AnnAssign | ast.AugAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = (n.id for t in targets for n in ast.walk(t) if isinstance(n, ast.Name))
+            yield from ((inside + name, node) for name in names)
+        else:
+            yield from _definitions(_blocks(node), inside)
+
+
+def _imports(body: Sequence[ast.stmt]) -> Iterator[tuple[str, Import]]:
+    """Known name and import of each import statement outside of functions and classes."""
+    for node in body:
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                top = alias.name.partition(".")[0]
+                yield (alias.asname, Import(alias.name)) if alias.asname else (top, Import(top))
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                name = None if alias.name == "*" else alias.name
+                yield alias.asname or alias.name, Import(node.module or "", name, node.level)
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
+            yield from _imports(_blocks(node))
+
+
+def _blocks(node: ast.stmt) -> list[ast.stmt]:
+    """The statements in the blocks of a compound statement."""
+    found = [one for name in ("body", "orelse", "finalbody") for one in getattr(node, name, [])]
+    parts = [*getattr(node, "handlers", []), *getattr(node, "cases", [])]
+    return found + [one for part in parts for one in part.body]

@@ -1,0 +1,74 @@
+"""What the parameters of a group may be: by the draws of its specs, whichever values a seed gives."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from math import isfinite
+
+from mutator.errors import MutatorError
+from mutator.faults.fault_models import FaultModels
+from mutator.faults.parameters import resolve
+from mutator.faults.specs import FaultSpec, Variant
+from mutator.model import Fault, Injection
+from mutator.review.entries import Values
+
+_Value = float | str
+
+
+def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: FaultModels) -> Values:
+    """The range of each parameter of `faults`: all that was drawn, and all that their specs can draw.
+
+    `specs` are by name; of a fault whose spec is not there only its own values count. With several injections
+    a parameter is `1.by`, `2.by`. Texts and truth values are what a group is about, so they are no values.
+    """
+    found: dict[str, set[_Value]] = {}
+    known: set[tuple[str, str]] = set()
+    for fault in faults:
+        ends = [fault.injections]
+        if (fault.spec, fault.reading) not in known:
+            known.add((fault.spec, fault.reading))
+            ends += _ends(fault, specs.get(fault.spec.rpartition("/")[0]), models)
+        for injections in ends:
+            for name, value in _values(injections, models):
+                found.setdefault(name, set()).add(value)
+    return {name: _range(values) for name, values in sorted(found.items())}
+
+
+def _ends(fault: Fault, spec: FaultSpec | None, models: FaultModels) -> Iterator[tuple[Injection, ...]]:
+    """The injections with the least and with the greatest value that the fault's spec can draw."""
+    name = fault.spec.rpartition("/")[2]
+    for variant in spec or ():
+        if variant.name == name and variant.draw and spec:
+            for value in _bounds(variant):
+                with suppress(MutatorError):  # nothing that is out of range is ever drawn
+                    yield tuple(
+                        resolve(one, models.get(one.model), spec.source, draw=variant.draw, value=value)
+                        for one in variant.injections(fault.reading)
+                    )
+
+
+def _bounds(variant: Variant) -> tuple[float, ...]:
+    assert variant.draw is not None
+    digits = variant.draw.decimals
+    return tuple(end if digits is None else round(end, digits) for end in variant.draw.bounds)
+
+
+def _values(injections: tuple[Injection, ...], models: FaultModels) -> Iterator[tuple[str, _Value]]:
+    for number, injection in enumerate(injections, start=1):
+        prefix = f"{number}." if len(injections) > 1 else ""
+        model = models.get(injection.model)
+        for name, value in injection.params:
+            schema = model.param(name)
+            if isinstance(value, bool | str | None) or (schema and schema.type == "seed"):
+                continue
+            yield prefix + name, float(value) if isfinite(value) else str(value)
+        for name in ("call", "every"):
+            if (count := getattr(injection, name)) is not None:
+                yield prefix + name, float(count)
+        if injection.where:
+            yield f"{prefix}where", injection.where
+
+
+def _range(values: set[_Value]) -> tuple[_Value, ...]:
+    numbers = [value for value in values if not isinstance(value, str)]
+    words = sorted(value for value in values if isinstance(value, str))
+    return (*((min(numbers), max(numbers)) if numbers else ()), *words)

@@ -1,0 +1,164 @@
+"""The file of reviews: it merges under version control, tells a mistake at its line, and is read when old."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.review import review_file
+from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
+from mutator.review.review_file import Content
+
+BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
+AT = "2026-11-24T16:00:00Z"
+OLD = Path(__file__).parents[3] / "fixtures" / "run-3" / "toy" / "fault_library" / "reviews" / "toycar.yaml"
+
+
+def entry(name: str) -> Entry:
+    decision = Decision(
+        group=name * 12,
+        what=f"group {name}",
+        verdict=Verdict.APPROVED,
+        by="Jane Doe",
+        at=AT,
+        commit="1" * 40 + "-dirty",
+        tool="0.2.0",
+        bound=BOUND,
+        values={"by": (-1e-9, 1e22), "to": (0.0, 0.0, "nan")},
+    )
+    remarks = (Remark(by="Joe", at=AT, text="why?"), Remark(by="Jane", at=None, text="{so: \"'}"))
+    flag = Flag(by="Joe", at=AT)
+    return Entry(group=name * 12, what=f"group {name}", decision=decision, remarks=remarks, flag=flag)
+
+
+def written(path: Path, *names: str) -> Path:
+    entries = {name * 12: entry(name) for name in names}
+    review_file.write(path, "toycar", Content(entries=entries, four_eyes=True))
+    return path
+
+
+def test_what_is_written_is_read(tmp_path: Path) -> None:
+    """All that a block holds, and the head, come back; the file says the same each time."""
+    path = written(tmp_path / "toycar.yaml", "b", "a")
+    found = review_file.load(path, "toycar")
+    assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
+    text = path.read_text()
+    review_file.write(path, "toycar", found)
+    assert path.read_text() == text
+
+
+def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
+    """Decisions of two people about different groups merge under version control."""
+    files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
+    merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
+    (path := tmp_path / "toycar.yaml").write_bytes(merged)
+    assert "".join(name[0] for name in review_file.load(path, "toycar").entries) == "018ef"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("approved", "aproved", 9, "aproved"),
+        ('"aaaaaaaaaaaa"', '"aaaa"', 7, "aaaa"),
+        ('ffff"', 'zzzz"', 15, "zzzz"),
+        ('"Jane Doe"', '""', 10, "by"),
+        ('"Jane Doe"', "3", 10, "3"),
+        ("remarks:", "remark:", 20, "remark"),
+        ('"why?"', '" "', 21, "text"),
+        (AT, "yesterday", 11, "yesterday"),
+        ("[-1e-09, 1e+22]", "wide", 18, "wide"),
+        ("toycar", "other", 4, "other"),
+        ("four_eyes: true", "four_eyes: 4", 5, "4"),
+        ("review/2", "review/3", 3, "newer version"),
+        ("decisions:", "decisions: [", 7, "YAML"),
+        ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "second time"),
+        ('    decision: "approved"\n', "", 9, "'by' without a decision"),
+        ('    by: "Jane Doe"\n', "", 7, "a decision without `by`"),
+    ],
+)
+def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, words: str) -> None:
+    """A mistake is told with the file, its line and the offending value."""
+    path = written(tmp_path / "toycar.yaml", "a", "b")
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new, 1))
+    with pytest.raises(MutatorError) as caught:
+        review_file.load(path, "toycar")
+    assert (caught.value.where, caught.value.line) == (str(path), line)
+    assert words in str(caught.value)
+
+
+@pytest.fixture
+def old(tmp_path: Path) -> Path:
+    """A file of `review/1`: three changes under two kinds of triggers each, and the probe; all approved."""
+    return shutil.copy(OLD, tmp_path / "toycar.yaml")
+
+
+def edited(path: Path, group: str, old: str, new: str) -> dict[str, Entry]:
+    """The entries by `what`, once the block of that group says something else."""
+    head, block, rest = path.read_text().partition(f'group: "{group}"')
+    assert old in rest
+    path.write_text(head + block + rest.replace(old, new, 1))
+    return {one.what: one for one in review_file.load(path, "toycar").entries.values()}
+
+
+SENSE = "toycar/sensing.py Sensor.sense"
+GAP = f"{SENSE} after_assign gap: offset(by, low, target=gap)"
+OFFSET = f"{SENSE} after_assign offset: offset(by, target=offset)"
+SILENCE = f"{SENSE} before_call self.publish: omission()"
+PROBE = "the probe, observing at toycar/go.py Drive.step after_assign now"
+
+
+def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
+    """Approved is what was approved under each kind of trigger; what was not kept then is not bound."""
+    found = {one.what: one for one in review_file.load(old, "toycar").entries.values()}
+    assert set(found) == {GAP, OFFSET, SILENCE, PROBE}
+    decision = found[OFFSET].decision
+    assert decision is not None
+    assert (decision.verdict, decision.by, decision.at) == (Verdict.APPROVED, "Jane Doe", None)
+    assert decision.bound == Bound(
+        diff="119123172159a027", function="3eff22e1db4eaddf", template="3307b2f6026230e8", calls=None
+    )
+    assert decision.values is None
+    assert found[PROBE].decision is not None and found[PROBE].decision.by == "reader"
+
+
+def test_an_old_rejection_counts(old: Path) -> None:
+    """A change is rejected if it was under one kind of trigger, by whom it was."""
+    edited(old, "d32713d465f1", "approved", "rejected")
+    found = edited(old, "d32713d465f1", "Jane Doe", "Joe")[OFFSET].decision
+    assert found is not None and (found.verdict, found.by) == (Verdict.REJECTED, "Joe")
+
+
+def test_old_decisions_about_different_things_do_not_hold(old: Path) -> None:
+    """Where two kinds of triggers were approved of different diffs, one of them is no longer true."""
+    found = edited(old, "50d62901775b", "119123172159a027", "9" * 16)[OFFSET].decision
+    assert found is not None
+    assert found.bound == Bound(diff="0" * 16, function="3eff22e1db4eaddf", template="3307b2f6026230e8")
+
+
+def test_old_remarks_are_kept(old: Path) -> None:
+    """A decision's remark becomes a remark, of all kinds of triggers; who has approved one has approved."""
+    edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
+    edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
+    entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]
+    assert {(one.by, one.text, one.at) for one in entry.remarks} == {
+        ("Jane Doe", "once", None),
+        ("Joe", "twice", None),
+    }
+    assert entry.decision is not None and entry.decision.by == "Jane Doe and Joe"
+
+
+def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
+    """What is wrong in an old file stands where it always stood."""
+    with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
+        edited(old, "08a4799889df", "approved", "aproved")
+
+
+def test_writing_upgrades_the_file(old: Path) -> None:
+    """What is written of an old file is a new one that says the same."""
+    found = review_file.load(old, "toycar")
+    review_file.write(old, "toycar", found)
+    assert f"schema: {review_file.SCHEMA}\n" in old.read_text()
+    assert review_file.load(old, "toycar") == found
