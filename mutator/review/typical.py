@@ -6,14 +6,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mutator.model import Fault, Outcome, Status
-from mutator.operators.names import operator_of
+from mutator.model import Outcome, Status
 from mutator.outcomes.counting import endings
 from mutator.outcomes.ranking import places
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import UNUSABLE, Row, lines_of, row_from
 from mutator.review.catalogue import Group
-from mutator.review.groups import injection_label
+from mutator.review.groups import group_label
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
@@ -48,10 +47,14 @@ class Typical:
 
 
 def of_group(run: RunFolder, group: Group) -> Typical | None:
-    """What became of the group in a run; None if that has no experiment of it. MutatorError for a run without
-    results."""
-    results = Results.up_to_date(run.path)
-    return _of_run(run.path, results.path.stat().st_mtime_ns).get("; ".join(group.injections))
+    """What became of the group in a run, by its results table as it was last built; None if that has no
+    experiment of it. MutatorError for a run without a table."""
+    table = Results.of_run(run.path)
+    try:
+        written = table.path.stat().st_mtime_ns
+    except OSError:
+        written = 0  # which reading tells
+    return _of_run(run.path, written).get(group.what)
 
 
 @lru_cache(maxsize=8)
@@ -61,21 +64,13 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 
     texts = Results.of_run(path).texts()
     about = {one["name"]: one["about"] for one in RunFolder.open(path).head.get("about_hazards") or ()}
-    labels = {name: _what(fault) for name, fault in plan_file.read_faults(path).items()}
+    labels = {name: group_label(fault) for name, fault in plan_file.read_faults(path).items()}
     known = [labels.get(name, "") for name in texts["fault_id"]]
     rows: dict[str, list[int]] = {}
     for row in np.argsort(places(texts)).tolist():  # the worst first
         rows.setdefault(known[row], []).append(row)
     ended = endings(texts).tolist()
     return {label: _typical(texts, ended, own, about) for label, own in rows.items() if label}
-
-
-def _what(fault: Fault) -> str:
-    """What its group has in common."""
-    location = fault.injections[0].location
-    if operator := operator_of(fault):
-        return f"{location.path} {location.function}: operator {operator}"
-    return "; ".join(map(injection_label, fault.injections))
 
 
 def _typical(

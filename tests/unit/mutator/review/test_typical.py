@@ -8,7 +8,9 @@ from typing import Any
 import pytest
 
 from mutator.campaigns.plans import Choices, make_plan
+from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
+from mutator.outcomes import results
 from mutator.outcomes.rows import Row
 from mutator.review.catalogue import of_plan
 from mutator.review.typical import of_group, verdict_of
@@ -27,6 +29,7 @@ def test_counts_a_typical_and_the_worst_experiment(
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
     run = write_run(toycar, tmp_path / "run", lambda e: bad.get(e.id, {}))
+    results.ensure(run)
     group = next(g for g in of_plan(toycar, plan) if "offset: offset" in g.what)
     found = of_group(RunFolder.open(run), group)
     assert found is not None
@@ -42,6 +45,7 @@ def test_counts_a_typical_and_the_worst_experiment(
 def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
     """There is nothing to tell of a group that a campaign left out, nor of the probe, which all have."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
+    results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
     told = {group.models for group in groups if of_group(run, group)}
     assert told == {("omission",)}
@@ -51,9 +55,12 @@ def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_
     """A run that went on is read anew."""
     group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
+    with pytest.raises(MutatorError, match="no results here"):
+        of_group(RunFolder.open(tmp_path / "run"), group)
+    results.ensure(tmp_path / "run")
     assert of_group(RunFolder.open(tmp_path / "run"), group) is None
     shutil.rmtree(tmp_path / "run")
-    write_run(toycar, tmp_path / "run")
+    results.ensure(write_run(toycar, tmp_path / "run"))
     assert of_group(RunFolder.open(tmp_path / "run"), group)
 
 
