@@ -32,6 +32,7 @@ from mutator.cli import (
     places,
     reviews,
     run_folders,
+    serving,
 )
 from mutator.cli.console import Terminal, discard, remarking, show_error
 from mutator.cli.options import Library, Place, Root, Target, Templates
@@ -61,6 +62,7 @@ GROUPS = (
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export", "verify")),
     ("One experiment", ("show", "rerun")),
+    ("In a browser", ("serve",)),
 )
 EXAMPLES = f"""\b
 Examples:
@@ -130,6 +132,7 @@ for module in (
     comparisons,
     exports,
     experiments,
+    serving,
     caches,
 ):
     module.register(app)

@@ -37,12 +37,22 @@ def write(comparison: Comparison, out: Path) -> Written:
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
         write_atomic(out / "tables" / f"{sheet.name}.csv", sheet.csv().encode())
-    write_atomic(pairs, _table(pair_line(p) for p in comparison.pairs))
-    unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
-    write_atomic(out / "unmatched.csv", _table(unmatched, heads=("why", "experiment", "words")))
+    write_atomic(pairs, pairs_csv(comparison))
+    write_atomic(out / "unmatched.csv", unmatched_csv(comparison))
     write_atomic(text, markdown(comparison).encode())
     write_atomic(hypertext, page(comparison).encode())
     return Written(markdown=text, page=hypertext, pairs=pairs)
+
+
+def pairs_csv(comparison: Comparison) -> bytes:
+    """The table of all pairs."""
+    return _table(pair_line(p) for p in comparison.pairs)
+
+
+def unmatched_csv(comparison: Comparison) -> bytes:
+    """The experiments that could not be compared, and why."""
+    unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
+    return _table(unmatched, heads=("why", "experiment", "words"))
 
 
 def summary(comparison: Comparison) -> str:
@@ -144,9 +154,19 @@ def page(comparison: Comparison) -> str:
         reasons=_reasons(comparison),
         changed=_changed(comparison),
         limit=SHOWN,
-        base_css=Markup(asset("base.css")),
-        script=Markup(_own("page.js")),
+        style=Markup(style()),
+        script=Markup(script()),
     )
+
+
+def style() -> str:
+    """The CSS that the page carries."""
+    return asset("base.css") + _own("page.css").replace("LIMIT", str(SHOWN + 1))
+
+
+def script() -> str:
+    """The JavaScript that the page carries."""
+    return _own("page.js")
 
 
 def _own(name: str) -> str:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mutator._common.files import half_written
 from mutator.errors import MutatorError
 from mutator.model import Record
 from mutator.outcomes.golden import Trace, times_of
@@ -176,7 +177,8 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
             no_date = {"Date": None} if path.suffix == ".svg" else None
-            figure.savefig(path, dpi=PNG_DPI, metadata=no_date)
+            with half_written(path) as temporary:
+                figure.savefig(temporary, format=path.suffix[1:], dpi=PNG_DPI, metadata=no_date)
 
 
 def finite(values: Any) -> Any:

@@ -2,13 +2,14 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from mutator._common.files import ScratchFolder, make_folder
+from mutator._common.files import ScratchFolder, half_written, make_folder
 from mutator.engines import bytecode
 from mutator.errors import MutatorError
 from mutator.execution.single_run import is_same, manifest_of, run_golden, run_single
@@ -125,8 +126,10 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
     if manifest.overlay is not None:
         tree = folder / "tree"
         bytecode.put(manifest.tree.files, tree)
-    here = {**places, "out": str(shot.out.absolute()), "t": str(shot.t)}
-    make_folder(shot.out.absolute().parent)
+    out, made = shot.out.absolute(), folder / "shown" / shot.out.name
+    here = {**places, "out": str(made), "t": str(shot.t)}
+    for place in (out, made):
+        make_folder(place.parent)
     arguments = (*film.args, *(film.still_args if shot.t is not None else ()))
     done = subprocess.run(
         [sys.executable, "-P", "-s", "-m", film.module, *filled(arguments, here)],
@@ -135,6 +138,9 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         text=True,
         check=False,
     )
-    if done.returncode != 0:
+    if done.returncode != 0 or not made.is_file():
         said = done.stderr.strip().splitlines() or ["it said nothing"]
-        raise MutatorError(said[-1].removeprefix("error: "), where=f"{film.module}")
+        complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
+        raise MutatorError(complaint, where=f"{film.module}")
+    with half_written(out) as temporary:  # a film takes a while, and may be stopped
+        shutil.copyfile(made, temporary)

@@ -31,8 +31,13 @@ def size_in_script(data: bytes) -> int:
 
 def write_script(path: Path, data: bytes) -> None:
     """Write a script that hands `data` to the page, under the name of its file."""
+    write_atomic(path, script_of(path.stem, data))
+
+
+def script_of(name: str, data: bytes) -> bytes:
+    """The script that hands `data` to the page under a name."""
     text = _SPECIAL.sub(lambda found: _ESCAPED[found[0]], data)
-    write_atomic(path, b"".join((f'SeriesFile.loaded("{path.stem}","'.encode(), text, _END)))
+    return b"".join((f'SeriesFile.loaded("{name}","'.encode(), text, _END))
 
 
 def read_script(path: Path) -> bytes:

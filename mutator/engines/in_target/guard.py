@@ -40,12 +40,15 @@ class Space:
         return used(self._home) >= self._most
 
 
-def fork(caller: int, *, wall_s: float = math.inf, space: Space | None = None) -> dict[str, Any] | None:
+def fork(
+    caller: int, *, wall_s: float = math.inf, space: Space | None = None, patience_s: float = 0.0
+) -> dict[str, Any] | None:
     """Fork: None in the child, which leads a session of its own and dies with its parent.
 
     In the parent, wait until the child ends, until a limit stops it, or until the other end of `caller`, a
-    pipe or socket, is closed; then nothing is left of it. Returns how it ended: `code` (of a signal, its
-    negative number), `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
+    pipe or socket, is closed; then nothing is left of it. A child whose caller is gone is asked to end, and
+    has `patience_s` for it. Returns how it ended: `code` (of a signal, its negative number), `cpu_s`,
+    `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
@@ -56,6 +59,8 @@ def fork(caller: int, *, wall_s: float = math.inf, space: Space | None = None) -
         return None
     try:
         stopped = _wait(pid, caller, began + wall_s, space)
+        if stopped == ABANDONED and patience_s:
+            _ask_to_end(pid, patience_s)
     finally:
         os.kill(pid, signal.SIGKILL)
         _, code, usage = os.wait4(pid, 0)
@@ -120,6 +125,16 @@ def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
             if space is not None and space.is_used_up():
                 return DISK
             pause = max(_LOOK_S, (time.monotonic() - began) * _LOOK_SHARE)
+    finally:
+        os.close(handle)
+
+
+def _ask_to_end(pid: int, patience_s: float) -> None:
+    """Tell a child that is not reaped yet to end, and wait for it so long."""
+    os.kill(pid, signal.SIGTERM)
+    handle = os.pidfd_open(pid)
+    try:
+        select.select([handle], [], [], patience_s)
     finally:
         os.close(handle)
 

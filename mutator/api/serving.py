@@ -1,0 +1,33 @@
+"""Reports, reviews and jobs in a browser, served to this machine alone."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from mutator._common.places import RUNS
+from mutator.api.selection import WorkspaceLike, open_workspace
+from mutator.errors import MutatorError
+from mutator.serve.app import Site
+from mutator.serve.runs import Runs
+from mutator.serve.server import serve
+
+
+def serve_runs(
+    runs: Sequence[str | Path] = (),
+    *,
+    port: int = 0,
+    at_once: int = 1,
+    ready: Callable[[str], None],
+    workspace: WorkspaceLike = None,
+) -> None:
+    """Serve runs (run folders, or folders of them; default: runs/) and the library's reviews, until the
+    process is asked to end.
+
+    `ready` is called with the address, which holds a token: who has it may do what the user may. `at_once` is
+    how many jobs run beside each other. MutatorError for a missing folder, and for a port that is taken.
+    """
+    roots = tuple(map(Path, runs)) or (RUNS,)
+    for root in roots:
+        if not root.is_dir() and root != RUNS:
+            raise MutatorError("no such folder", where=root, expected="a run folder, or a folder of them")
+    site = Site(workspace=open_workspace(workspace), runs=Runs(roots), at_once=at_once)
+    serve(site, port=port, ready=ready)

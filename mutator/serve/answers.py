@@ -1,0 +1,87 @@
+"""What is answered: files, JSON, and errors. None tells where on the disk things lie."""
+
+import os
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from starlette.requests import Request
+from starlette.responses import FileResponse, JSONResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from mutator.errors import MutatorError
+from mutator.serve.home import error_page
+from mutator.serve.runs import Absent
+
+_KINDS = {
+    ".css": "text/css; charset=utf-8",
+    ".csv": "text/csv; charset=utf-8",
+    ".gif": "image/gif",
+    ".html": "text/html; charset=utf-8",
+    ".jpg": "image/jpeg",
+    ".js": "text/javascript",  # of series each byte is a character: the page says so
+    ".md": "text/plain; charset=utf-8",
+    ".mp4": "video/mp4",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+}
+_FOLDERS = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
+
+
+class OpenFile(FileResponse):
+    """Sends a file by its descriptor, which it closes."""
+
+    def __init__(self, descriptor: int, name: str) -> None:
+        self._descriptor = descriptor
+        place = f"/proc/self/fd/{descriptor}"
+        super().__init__(place, media_type=kind_of(name), stat_result=os.fstat(descriptor))
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        try:
+            await super().__call__(scope, receive, send)
+        finally:
+            os.close(self._descriptor)
+
+
+def kind_of(name: str) -> str:
+    """The media type of a file that is served."""
+    return _KINDS[Path(name).suffix]
+
+
+def without_places(text: str) -> str:
+    """The text with the last part alone of each absolute path; below the current folder, with the rest."""
+    for folder in (Path.cwd(), Path.home(), Path(tempfile.gettempdir())):
+        if folder != Path("/"):
+            text = text.replace(f"{folder}/", "")
+    return _FOLDERS.sub("", text)
+
+
+def error_facts(error: MutatorError) -> dict[str, Any]:
+    """An error for JSON."""
+    place = error.where or error.argument
+    parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
+    facts: dict[str, Any] = {name: without_places(text) if text else None for name, text in parts.items()}
+    if error.where and error.line is not None:
+        facts["where"] += f":{error.line}"
+    return {"error": facts}
+
+
+def on_error(request: Request, error: Exception) -> Response:
+    """The answer to a request that cannot be granted: JSON for scripts, a page for people."""
+    known = _known(error)
+    status = 404 if isinstance(known, Absent) else 400
+    facts = error_facts(known)
+    if request.url.path.startswith("/api/"):
+        return JSONResponse(facts, status)
+    return Response(error_page(facts["error"]), status, media_type="text/html")
+
+
+def _known(error: Exception) -> MutatorError:
+    if isinstance(error, MutatorError):
+        return error
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        return MutatorError(str(first["msg"]), where=".".join(map(str, first["loc"])) or None)
+    return Absent("no such page", remedy="go back to the first page")

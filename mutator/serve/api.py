@@ -1,0 +1,97 @@
+"""What scripts of the pages ask for, and send: JSON."""
+
+from urllib.parse import parse_qsl
+
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+
+from mutator.errors import MutatorError
+from mutator.serve.answers import error_facts
+from mutator.serve.jobs import Ended, Jobs
+from mutator.serve.orders import Desk
+from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
+from mutator.serve.runs import Runs
+
+
+class ReviewApi:
+    """Reviews for scripts."""
+
+    def __init__(self, reviews: Reviews, runs: Runs) -> None:
+        self._reviews, self._runs = reviews, runs
+
+    def told(self, request: Request) -> Response:
+        """What was said of each group."""
+        return JSONResponse(self._reviews.told(asked(self._reviews, request)))
+
+    def decide(self, request: Request, body: bytes) -> Response:
+        """Decisions, remarks and flags: all of them or none."""
+        chosen, wanted = asked(self._reviews, request), Decisions.model_validate_json(body)
+        try:
+            return JSONResponse(self._reviews.decide(chosen, wanted))
+        except Moved as moved:
+            return JSONResponse({"conflict": moved.got, "groups": moved.groups}, 409)
+
+    def changes(self, request: Request) -> Response:
+        """What has changed of a group since it was approved."""
+        found = self._reviews.changes(asked(self._reviews, request), request.path_params["group"])
+        return JSONResponse({"changes": found})
+
+    def typical(self, request: Request) -> Response:
+        """What became of a group in a run."""
+        run = self._runs.folder(request.query_params.get("run", ""))
+        chosen = asked(self._reviews, request)
+        return JSONResponse(self._reviews.typical(chosen, request.path_params["group"], run))
+
+    def before(self, request: Request) -> Response:
+        """A picture before a group's effect."""
+        return self._picture(request, after=False)
+
+    def after(self, request: Request) -> Response:
+        """The same after it."""
+        return self._picture(request, after=True)
+
+    def _picture(self, request: Request, *, after: bool) -> Response:
+        given, chosen = request.path_params, asked(self._reviews, request)
+        data = self._reviews.picture(chosen, given["group"], given["level"], after=after)
+        return Response(data, media_type="image/jpeg")
+
+
+class JobApi:
+    """Jobs for scripts."""
+
+    def __init__(self, desk: Desk, jobs: Jobs) -> None:
+        self._desk, self._jobs = desk, jobs
+
+    def told(self, _: Request) -> Response:
+        """All jobs."""
+        return JSONResponse({"jobs": [job.told() for job in self._jobs.all()]})
+
+    def submit(self, _: Request, body: bytes) -> Response:
+        """A new job."""
+        return JSONResponse({"id": self._jobs.submit(self._desk.work(body)).id}, 201)
+
+    def log(self, request: Request) -> Response:
+        """What a job printed."""
+        return JSONResponse({"log": self._jobs.get(request.path_params["job"]).text})
+
+    def cancel(self, request: Request, _: bytes) -> Response:
+        """The end of a job."""
+        try:
+            self._jobs.cancel(request.path_params["job"])
+        except Ended as err:
+            return JSONResponse(error_facts(err), 409)
+        return JSONResponse({"id": request.path_params["job"]})
+
+
+def asked(reviews: Reviews, request: Request) -> Selection:
+    """Which groups an address asks for; MutatorError for words that it does not know."""
+    given = parse_qsl(request.url.query, keep_blank_values=True, max_num_fields=100)
+    if strange := [name for name, _ in given if name not in ("campaign", "spec", "run")]:
+        raise MutatorError(
+            f"'{strange[0]}' in the address", expected="campaign, or spec, which may be repeated"
+        )
+    campaigns = [value for name, value in given if name == "campaign"]
+    specs = [value for name, value in given if name == "spec"]
+    if len(campaigns) > 1:
+        raise MutatorError("several campaigns in the address", expected="one")
+    return reviews.selection(request.path_params["target"], campaigns[0] if campaigns else None, specs)

@@ -1,0 +1,66 @@
+"""The first page, what its forms offer, and the page of an error."""
+
+from collections.abc import Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+from urllib.parse import quote
+
+from jinja2 import Environment, StrictUndefined
+
+from mutator.errors import MutatorError
+from mutator.workspace import Workspace
+
+_MOST_PAIRS = 20  # of runs, that the page offers to compare
+
+
+def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]]) -> str:
+    """The first page: runs, comparisons, reviews."""
+    return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=tuple(workspace.targets))
+
+
+def error_page(facts: Mapping[str, Any]) -> str:
+    """A page that says what is wrong."""
+    return _rendered("error.html", **facts)
+
+
+def offered(workspace: Workspace) -> dict[str, Any]:
+    """What there is to choose from: faults, scenarios, triggers, campaigns. What cannot be read is left out,
+    and told as a `problem`."""
+    names = ("targets", "scenarios", "campaigns")
+    found: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
+    found |= {"specs": [], "contexts": [], "readings": [], "problem": None}
+    try:
+        found["readings"] = [*workspace.readings().names]
+        found["contexts"] = [
+            {"name": row.id, "condition": row.condition}
+            for table in map(workspace.context_table, workspace.context_tables)
+            for row in table.rows
+        ]
+        found["specs"] = [
+            {"name": spec.name, "variants": [variant.name for variant in spec]} for spec in workspace.specs()
+        ]
+    except MutatorError as err:
+        found["problem"] = err.got
+    return found
+
+
+def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
+    """Runs of one campaign and target that follow each other, for a comparison."""
+    latest: dict[tuple[str, str], str] = {}
+    pairs = []
+    for run in runs:
+        if run["outcomes"]:
+            kind = (run["campaign"], run["target"])
+            if kind in latest:
+                pairs.append((latest[kind], run["key"]))
+            latest[kind] = run["key"]
+    return pairs[-_MOST_PAIRS:]
+
+
+def _rendered(name: str, **content: Any) -> str:
+    environment = Environment(
+        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters["quoted"] = lambda text: quote(text, safe="")
+    text = files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return environment.from_string(text).render(content)

@@ -1,0 +1,265 @@
+"""What a job may be asked to do, checked as the command line checks it, and the command line that does it.
+
+A name must be one of the library's, an id one of a run's plan; nothing that is asked for is a path, or begins
+like an option.
+"""
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, Field, TypeAdapter
+
+from mutator._common.cores import usable_cores
+from mutator._common.text import suggestion
+from mutator.campaigns.filters import compile_filter
+from mutator.config.yaml_files import StrictModel
+from mutator.errors import MutatorError
+from mutator.outcomes.columns import PLAN_COLUMNS
+from mutator.serve.runs import Runs, check_no_links, report_of
+from mutator.store import plan_file
+from mutator.triggers.conditions import check_condition
+from mutator.workspace import Workspace
+
+
+def _plain(text: str) -> str:
+    if not text.strip() or text.startswith("-") or not text.isprintable():
+        raise ValueError("not plain text: empty, begins with `-`, or cannot be printed")
+    return text
+
+
+TRIES = "try"  # folder of single tries, beside the runs
+Text = Annotated[str, Field(max_length=500), AfterValidator(_plain)]
+ExperimentId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
+Seed = Annotated[int, Field(ge=0, lt=2**63)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class Rerun(StrictModel):
+    """Drive an experiment again; with `plot`, keep its exact plot and series."""
+
+    kind: Literal["rerun", "plot"]
+    run: Text
+    experiment: ExperimentId
+
+
+class Film(StrictModel):
+    """Film an experiment."""
+
+    kind: Literal["film"]
+    run: Text
+    experiment: ExperimentId
+
+
+class Still(StrictModel):
+    """A picture of that film, at `t` s."""
+
+    kind: Literal["still"]
+    run: Text
+    experiment: ExperimentId
+    t: Annotated[Finite, Field(ge=0, le=1e6)]
+
+
+class Report(StrictModel):
+    """Write the report of a run anew."""
+
+    kind: Literal["report"]
+    run: Text
+
+
+class Try(StrictModel):
+    """Put one fault in and drive once."""
+
+    kind: Literal["try"]
+    spec: Text
+    scenario: Text
+    trigger: Text = "always"
+    variant: Text | None = None
+    value: Finite | None = None
+    seed: Seed | None = None
+    reading: Text | None = None
+    target: Text | None = None
+
+
+class Campaign(StrictModel):
+    """Run a part of a campaign into the new folder `name`."""
+
+    kind: Literal["campaign"]
+    campaign: Text
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")]
+    limit: Annotated[int, Field(ge=1, le=1000)] = 20
+    only: Text | None = None
+    seed: Seed | None = None
+    workers: Annotated[int, Field(ge=1)] | None = None
+
+
+Order = Rerun | Film | Still | Report | Try | Campaign
+_ORDERS: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="kind")])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Work:
+    """What a job does: the `words` of its command line. `folder` is the run folder that it is about."""
+
+    order: Order
+    title: str
+    words: tuple[str, ...]
+    folder: Path | None = None
+    result: str | None = None  # the page that shows what came of it
+
+
+@dataclass(frozen=True, slots=True)
+class Desk:
+    """Takes orders for a library and the runs that are served."""
+
+    workspace: Workspace
+    runs: Runs
+
+    def work(self, body: bytes) -> Work:
+        """What is asked for in JSON; MutatorError or ValidationError for what cannot be done."""
+        order = _ORDERS.validate_json(body)
+        makers: dict[type[Any], Callable[[Any], Work]] = {
+            Rerun: self._rerun,
+            Film: self._film,
+            Still: self._still,
+            Report: self._report,
+            Try: self._try,
+            Campaign: self._campaign,
+        }
+        return makers[type(order)](order)
+
+    def _rerun(self, order: Rerun) -> Work:
+        trace = ["--trace"] if order.kind == "plot" else []
+        what = "exact plot" if trace else "again"
+        return self._of_experiment(order, what, "rerun", order.experiment, *trace)
+
+    def _film(self, order: Film) -> Work:
+        film = self.runs.folder(order.run) / "plots" / f"{order.experiment}.mp4"
+        return self._of_experiment(order, "film", "show", order.experiment, "--no-plot", f"--video={film}")
+
+    def _still(self, order: Still) -> Work:
+        what = f"picture at {order.t:.2f} s"
+        return self._of_experiment(
+            order, what, "show", order.experiment, "--no-plot", f"--still={order.t:.2f}"
+        )
+
+    def _of_experiment(self, order: Rerun | Film | Still, what: str, *words: str) -> Work:
+        folder = self._folder(order.run)
+        if order.experiment not in plan_file.ids(folder):
+            raise MutatorError(
+                f"no experiment '{order.experiment}'", where=order.run, expected="the id of one of the run"
+            )
+        return Work(
+            order=order,
+            title=f"{order.experiment} of {order.run}: {what}",
+            words=(*words, f"--run={folder}", *self._place()),
+            folder=folder,
+            result=f"{report_of(order.run)}#e={order.experiment}",
+        )
+
+    def _report(self, order: Report) -> Work:
+        folder = self._folder(order.run)
+        words = ("report", str(folder), *self._place())
+        title, result = f"report of {order.run}", report_of(order.run)
+        return Work(order=order, title=title, words=words, folder=folder, result=result)
+
+    def _try(self, order: Try) -> Work:
+        spec = next((one for one in self.workspace.specs() if one.name == order.spec), None)
+        if spec is None:
+            raise _unknown("spec", order.spec, [one.name for one in self.workspace.specs()])
+        variants = [variant.name for variant in spec]
+        for what, given, known in (
+            ("scenario", order.scenario, self.workspace.scenarios),
+            ("variant", order.variant, variants),
+            ("reading", order.reading, self.workspace.readings().names),
+            ("target", order.target, self.workspace.targets),
+        ):
+            if given is not None and given not in known:
+                raise _unknown(what, given, known)
+        self._check_trigger(order.trigger, order.target)
+        given_options = {
+            "--scenario": order.scenario,
+            "--trigger": order.trigger,
+            "--variant": order.variant,
+            "--value": order.value,
+            "--seed": order.seed,
+            "--reading": order.reading,
+            "--manifest": order.target,
+            "--out": self._new(TRIES),
+        }
+        words = ("try", order.spec, *_options(given_options), *self._place())
+        return Work(order=order, title=f"{order.spec} in {order.scenario}, {order.trigger}", words=words)
+
+    def _campaign(self, order: Campaign) -> Work:
+        if order.campaign not in self.workspace.campaigns:
+            raise _unknown("campaign", order.campaign, self.workspace.campaigns)
+        if order.only is not None:
+            compile_filter(order.only, PLAN_COLUMNS)
+        folder = self._new(order.name)
+        given_options = {
+            "--out": folder,
+            "--limit": order.limit,
+            "--only": order.only,
+            "--seed": order.seed,
+            "--workers": min(order.workers or usable_cores(), usable_cores()),
+        }
+        return Work(
+            order=order,
+            title=f"{order.campaign} into {order.name}",
+            words=("run", order.campaign, *_options(given_options), *self._place()),
+            folder=folder,
+        )
+
+    def _check_trigger(self, text: str, target: str | None) -> None:
+        """As `try` reads it: a context, a time in s, `always`, or a condition over what is observed."""
+        tables = map(self.workspace.context_table, self.workspace.context_tables)
+        names = {
+            name for table in tables for row in table.rows for name in (row.id, f"{table.name}/{row.id}")
+        }
+        if text == "always" or text in names:
+            return
+        try:
+            time = float(text)
+        except ValueError:
+            manifest = self.workspace.manifest(self.workspace.target_name(target))
+            check_condition(text, None, manifest.observation.variables)
+            return
+        if not math.isfinite(time) or time < 0:
+            raise MutatorError(f"'{text}'", where="trigger", expected="a time in s")
+
+    def _folder(self, key: str) -> Path:
+        """The run folder with that key, which a command may write into."""
+        folder = self.runs.folder(key)
+        check_no_links(folder)
+        return folder
+
+    def _new(self, name: str) -> Path:
+        """A folder beside the runs."""
+        folder = self.runs.new / name
+        if folder.is_symlink():
+            raise MutatorError(f"a link, {name}", expected="a new folder", remedy="choose another name")
+        if folder.is_dir():
+            check_no_links(folder)
+        return folder.resolve()
+
+    def _place(self) -> list[str]:
+        """The options that name this very library."""
+        place = self.workspace
+        options = {"--library": place.library, "--templates": place.templates, "--target": place.target}
+        return _options(options)
+
+
+def _options(given: dict[str, Any]) -> list[str]:
+    """Options with their values, each in one word: no value is taken for an option."""
+    return [f"{name}={value}" for name, value in given.items() if value is not None]
+
+
+def _unknown(what: str, name: str, known: Collection[str]) -> MutatorError:
+    return MutatorError(
+        f"no {what} '{name}'",
+        where=what,
+        expected=f"one of {', '.join(known) or 'none'}",
+        remedy="correct the name" + suggestion(name, list(known)),
+    )

@@ -1,0 +1,216 @@
+"""Reviews: the groups of a target as they are now, and decisions that are written as they are made."""
+
+import os
+import threading
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from mutator.campaigns.plans import Choices, make_plan
+from mutator.config.yaml_files import StrictModel
+from mutator.errors import MutatorError
+from mutator.review import catalogue, pictures, typical
+from mutator.review.catalogue import Group
+from mutator.review.commits import user_name
+from mutator.review.decisions import Change, Conflict, Kind, Review, load_review, record
+from mutator.review.page import page_html, state_of
+from mutator.serve.runs import Absent
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+_MOST_KEPT = 8  # selections whose groups are remembered
+_SKIPPED = {"reviews", "__pycache__", ".git", "runs"}
+Short = Annotated[str, Field(max_length=2000)]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Selection:
+    """Which groups a page shows: all of a target's, those of some specs, or those of a campaign."""
+
+    target: str
+    campaign: str | None = None
+    specs: tuple[str, ...] = ()
+
+    @property
+    def options(self) -> list[str]:
+        """The options of `mutator review` that select the same."""
+        if self.campaign:
+            return ["--campaign", self.campaign]
+        return ["--manifest", self.target, *(word for spec in self.specs for word in ("--spec", spec))]
+
+
+class _ChangeModel(StrictModel):
+    group: str = Field(pattern=r"^[0-9a-f]{12}$")
+    kind: Annotated[Kind, Field(strict=False)]
+    text: Short = ""
+
+
+class Decisions(StrictModel):
+    """What a page sends. `seen` has the revision of each group as the page has it; `digests` say which diffs
+    it shows, where it tells."""
+
+    changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
+    by: Short
+    seen: dict[str, Short]
+    digests: dict[str, Short] = Field(default_factory=dict)
+
+
+class Moved(MutatorError):
+    """What was decided about is not what is there now; `groups` are those, as they are now."""
+
+    def __init__(self, got: str, groups: dict[str, Any]) -> None:
+        super().__init__(got)
+        self.groups = groups
+
+
+class Reviews:
+    """The reviews of a library. Groups are made when they are first asked for, and again when a file that
+    they follow from has changed."""
+
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
+        self._made: dict[Selection, tuple[object, tuple[Group, ...]]] = {}
+        self._making = threading.Lock()
+
+    @property
+    def reviewer(self) -> str:
+        """Who works here, as git knows; empty if it does not."""
+        return user_name(self.workspace) or ""
+
+    def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
+        """What an address asks for; Absent for a target or campaign that the library does not have."""
+        if target not in self.workspace.targets:
+            raise Absent(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
+        if campaign is not None and campaign not in self.workspace.campaigns:
+            raise Absent(
+                f"no campaign '{campaign}'", expected=f"one of {', '.join(self.workspace.campaigns)}"
+            )
+        if campaign and specs:
+            raise MutatorError("a campaign together with specs", expected="one or the other")
+        for spec in specs:
+            if spec.endswith((".yaml", ".yml")):
+                raise Absent(f"no spec '{spec}'", expected="a name of the library's, or a pattern over them")
+        return Selection(target=target, campaign=campaign, specs=tuple(specs))
+
+    def groups(self, chosen: Selection) -> tuple[Group, ...]:
+        """The groups of a selection as they are now."""
+        with self._making:
+            stamp = self._stamp(chosen.target)
+            if (made := self._made.pop(chosen, None)) is None or made[0] != stamp:
+                made = stamp, self._found(chosen)
+            self._made[chosen] = made
+            for old in list(self._made)[:-_MOST_KEPT]:
+                del self._made[old]
+            return made[1]
+
+    def group(self, chosen: Selection, name: str) -> Group:
+        """One of them, by its whole id; Absent if there is none."""
+        found = next((group for group in self.groups(chosen) if group.id == name), None)
+        if found is None:
+            raise Absent(f"no group '{name}'", expected="the id of one that the page shows")
+        return found
+
+    def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]]) -> str:
+        """The page of a selection; `runs` are those of its target."""
+        review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
+        served = {
+            "target": chosen.target,
+            "by": self.reviewer,
+            "api": f"/api/review/{chosen.target}",
+            "query": f"?{query}" if query else "",
+            "runs": runs,
+        }
+        return page_html(review, review.in_turn(groups), chosen.options, served)
+
+    def told(self, chosen: Selection) -> dict[str, Any]:
+        """What was said of each group."""
+        review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
+        return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
+
+    def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:
+        """Make the changes, or none of them; Moved where others have said something, or a diff is another."""
+        known = {group.id: group for group in self.groups(chosen)}
+        if strangers := [one.group for one in wanted.changes if one.group not in known]:
+            raise Absent(f"no group '{strangers[0]}'", expected="the id of one that the page shows")
+        if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
+            raise MutatorError(f"group {unseen[0]} without what was seen", where="seen")
+        touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
+        self._refuse_others(chosen, touched, wanted.digests)
+        changes = [
+            Change(group=known[one.group], kind=one.kind, by=wanted.by, text=one.text)
+            for one in wanted.changes
+        ]
+        try:
+            review = record(self.workspace, chosen.target, changes, wanted.seen)
+        except Conflict as conflict:
+            others = [known[name] for name in conflict.groups]
+            raise Moved(conflict.got, _states(conflict.review, others)) from None
+        return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
+
+    def changes(self, chosen: Selection, name: str) -> str:
+        """What has changed of a group since it was approved, as a diff."""
+        return load_review(self.workspace, chosen.target).changes(self.group(chosen, name))
+
+    def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
+        """A picture of what the group does to one, as a JPEG file; Absent where there is none."""
+        manifest = self.workspace.manifest(chosen.target)
+        found = pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
+        if found is None:
+            raise Absent(
+                "no such picture", expected=f"a level ({', '.join(pictures.LEVELS)}) that the group has"
+            )
+        return found[after]
+
+    def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any]:
+        """What became of the group in a run; Absent where the run has none of it."""
+        found = typical.of_group(RunFolder.open(run), self.group(chosen, name))
+        if found is None:
+            raise Absent("the run has no experiment of this group")
+        return asdict(found)
+
+    def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:
+        now = _states(load_review(self.workspace, chosen.target), groups)
+        other = {
+            name: facts
+            for name, facts in now.items()
+            if digests.get(name, facts["digest"]) != facts["digest"]
+        }
+        if other:
+            names = ", ".join(other)
+            raise Moved(f"{names}: another diff than the page shows; load the page again", other)
+
+    def _found(self, chosen: Selection) -> tuple[Group, ...]:
+        workspace = self.workspace
+        if chosen.campaign is None:
+            return catalogue.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
+        plan = make_plan(workspace, chosen.campaign, Choices())
+        if plan.campaign.target != chosen.target:
+            raise Absent(f"campaign '{chosen.campaign}' is of the target '{plan.campaign.target}'")
+        return catalogue.of_plan(workspace, plan)
+
+    def _stamp(self, target: str) -> object:
+        """Another one as soon as a file changes that groups follow from."""
+        manifest = self.workspace.manifest(target)
+        places = (self.workspace.library, self.workspace.templates, manifest.root)
+        return [_files_in(place) for place in places]
+
+
+def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
+    return {group.id: state_of(review, group) for group in groups}
+
+
+def _files_in(place: Path) -> list[tuple[str, int, int]]:
+    """Path, time and size of each file below a folder."""
+    found = []
+    for folder, inner, names in os.walk(place):
+        inner[:] = sorted({*inner} - _SKIPPED)
+        for name in names:
+            path = os.path.join(folder, name)  # noqa: PTH118 - a thousand of them at each look
+            with suppress(OSError):  # it may go meanwhile
+                facts = os.lstat(path)
+                found.append((path, facts.st_mtime_ns, facts.st_size))
+    return found

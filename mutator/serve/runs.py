@@ -1,0 +1,168 @@
+"""The run folders that are served: found anew at each look, told in short, and their files opened."""
+
+import os
+import stat
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from mutator._common.places import RUN_HEAD
+from mutator.errors import MutatorError
+from mutator.outcomes.counting import outcome_counts
+from mutator.outcomes.reader import Results
+from mutator.store.run_folder import RunFolder
+
+REPORT = "report/index.html"
+# folder in a run folder -> kinds of files in it that are served
+SERVED: Mapping[str, tuple[str, ...]] = {
+    "": (".csv",),
+    "report": (".html", ".md"),
+    "report/tables": (".csv",),
+    "report/figures": (".svg", ".png"),
+    "plots": (".svg", ".png", ".jpg", ".mp4", ".gif"),
+    "series": (".js",),
+    "series/kept": (".js",),
+}
+_WRITTEN = ("", "report", "plots", "series", "traces", "work")  # folders that commands write into
+_FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+
+
+class Absent(MutatorError):
+    """There is no such thing here, or none that is served."""
+
+
+@dataclass(frozen=True, slots=True)
+class Runs:
+    """Run folders below `roots`, each a run folder or a folder of them. A run is known by its folder's name;
+    of several that share one, the later have `-2`, `-3` and so on."""
+
+    roots: tuple[Path, ...]
+
+    def folders(self) -> dict[str, Path]:
+        """The run folders by key. A link to a folder elsewhere is left out."""
+        found: dict[str, Path] = {}
+        for root in self.roots:
+            for path in _runs_in(root.resolve()):
+                if path not in found.values():
+                    found[_free(path.name, found)] = path
+        return found
+
+    def folder(self, key: str) -> Path:
+        """The run folder with that key; Absent if there is none."""
+        with suppress(KeyError):
+            return self.folders()[key]
+        raise Absent(
+            f"no run '{key}'", expected="one of the runs that are served", remedy="see the first page"
+        )
+
+    def key_of(self, folder: Path) -> str | None:
+        """The key of a run folder; None for one that is not served."""
+        return next((key for key, path in self.folders().items() if path == folder.resolve()), None)
+
+    @property
+    def new(self) -> Path:
+        """Where a new run folder goes: the first folder of runs."""
+        return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
+
+
+def _runs_in(root: Path) -> list[Path]:
+    if RunFolder.exists(root):
+        return [root]
+    try:
+        inside = sorted(root.glob(f"*/{RUN_HEAD}"))
+    except OSError:
+        return []
+    folders = [head.parent for head in inside]
+    return [path for path in folders if path.resolve() == path and str(path).isprintable()]
+
+
+def report_of(key: str) -> str:
+    """The address of a run's report."""
+    return f"/runs/{quote(key, safe='')}/{REPORT}"
+
+
+def _free(name: str, taken: Iterable[str]) -> str:
+    known, number, key = set(taken), 1, name
+    while key in known:
+        number += 1
+        key = f"{name}-{number}"
+    return key
+
+
+def told(key: str, path: Path) -> dict[str, Any]:
+    """A run in short: campaign, target, how far it is, how its experiments ended."""
+    facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
+    facts |= {"report": report_of(key)}
+    facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
+    try:
+        folder = RunFolder.unverified(path)
+        facts |= {"campaign": str(folder.head["campaign"]), "target": str(folder.head["target"])}
+        facts |= {"planned": folder.planned, "state": "finished" if folder.finished else "unfinished"}
+        with suppress(FileNotFoundError):
+            table = Results.of_run(path).path.stat()
+            outcomes = _outcomes(path, table.st_mtime_ns, table.st_size)
+            facts |= {"outcomes": outcomes, "done": sum(outcomes.values())}
+    except MutatorError as err:
+        facts["problem"] = err.got
+    except (LookupError, TypeError, ValueError):
+        facts["problem"] = "its head is damaged"
+    return facts
+
+
+@lru_cache(maxsize=1000)
+def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
+    """How the experiments ended; the table is read again when it has changed."""
+    return outcome_counts(Results.of_run(run).texts())
+
+
+def check_no_links(run: Path) -> None:
+    """MutatorError for a link among what commands write in a run folder: they would write where it leads."""
+    for folder in _WRITTEN:
+        with suppress(FileNotFoundError), os.scandir(run / folder) as entries:
+            for entry in entries:
+                if entry.is_symlink():
+                    raise MutatorError(
+                        f"a link, {Path(folder, entry.name)}",
+                        where=run.name,
+                        expected="files and folders, as a run writes them",
+                        remedy="delete the link",
+                    )
+
+
+def open_in_run(run: Path, name: str) -> int:
+    """A descriptor of a file that is served; Absent for anything else, be it there or not."""
+    folder, _, last = name.rpartition("/")
+    if Path(last).suffix not in SERVED.get(folder, ()):
+        raise _absent()
+    return open_below(run, [part for part in folder.split("/") if part], last)
+
+
+def open_below(root: Path, folders: Sequence[str], name: str) -> int:
+    """A descriptor of a plain file in the innermost of these folders; Absent where there is none.
+
+    No link is followed on the way: each folder is opened in the one before it.
+    """
+    try:
+        handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            for part in folders:
+                inner = os.open(part, _FOLDER, dir_fd=handle)
+                os.close(handle)
+                handle = inner
+            file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=handle)
+        finally:
+            os.close(handle)
+    except (OSError, ValueError):  # a name with a NUL, or one that is no text
+        raise _absent() from None
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise _absent()
+    return file
+
+
+def _absent() -> Absent:
+    return Absent("no such file", expected="a file of a report, not a link")

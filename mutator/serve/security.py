@@ -1,0 +1,172 @@
+"""Who is answered at all, and what a browser may do with an answer.
+
+Other pages in the user's browser, and other users of the machine, can reach a port of the loopback interface.
+So each request needs the token, in a cookie that other sites never send; it must name this server, or a page
+whose name leads here could read answers; and it must not come from a page of another origin.
+"""
+
+import base64
+import hashlib
+import hmac
+from collections.abc import Iterable
+from functools import cache
+from importlib.resources import files
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from mutator.comparison import pages
+from mutator.web import asset
+
+HOST = "127.0.0.1"
+MOST_BYTES = 1_000_000  # of a request's body
+_METHODS = ("GET", "HEAD", "POST")
+_OWN_SITE = ("same-origin", "none")  # what a browser says of its own pages, and of a typed address
+
+
+class Guarded:
+    """An application behind these checks, on a port of this machine."""
+
+    def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
+        self._app, self._token, self._cookie = app, token, f"mutator-{port}"
+        self._hosts = (f"{HOST}:{port}", f"localhost:{port}")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self._app(scope, receive, send)
+            return
+        if scope["type"] != "http":
+            await send({"type": "websocket.close", "code": 1008})
+            return
+        send = _with_policy(send)
+        answer = self._refused(scope) or self._entered(scope)
+        if answer is None and scope["method"] == "POST":
+            body = await _body(Headers(scope=scope), receive)
+            if body is None:
+                answer = _refusal("a body of more than 1 MB", 413)
+            else:
+                receive = _replayed(body, receive)
+        await (answer or self._app)(scope, receive, send)
+
+    def _refused(self, scope: Scope) -> Response | None:
+        """The answer to a request that comes from elsewhere."""
+        headers, method = Headers(scope=scope), scope["method"]
+        origins = headers.getlist("origin")
+        if method not in _METHODS:
+            return _refusal(f"the method is none of {', '.join(_METHODS)}", 405)
+        if len(hosts := headers.getlist("host")) != 1 or hosts[0] not in self._hosts:
+            return _refusal("the request names another host")
+        if len(origins) > 1 or any(origin != f"http://{hosts[0]}" for origin in origins):
+            return _refusal("the request comes from another origin")
+        if method == "POST" and not origins:
+            return _refusal("the request does not say where it comes from")
+        if headers.get("sec-fetch-site", "none") not in _OWN_SITE:
+            return _refusal("the request comes from another site")
+        return None
+
+    def _entered(self, scope: Scope) -> Response | None:
+        """None for who has the cookie; who has the token in the address gets it, and an address without."""
+        query = parse_qs(scope["query_string"].decode("latin-1"))
+        if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
+            if not all(self._is_token(given) for given in query["token"]):
+                return _refusal("another token than that of this server: use the address that it printed")
+            answer = RedirectResponse("/", 303)
+            answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
+            return answer
+        if any(self._is_token(given) for given in _cookies(Headers(scope=scope), self._cookie)):
+            return None
+        return _refusal("no token: open the address that the server printed")
+
+    def _is_token(self, given: str) -> bool:
+        return hmac.compare_digest(given.encode(), self._token.encode())
+
+
+def _cookies(headers: Headers, name: str) -> Iterable[str]:
+    for line in headers.getlist("cookie"):
+        for part in line.split(";"):
+            key, _, value = part.strip().partition("=")
+            if key == name:
+                yield value
+
+
+def _refusal(why: str, status: int = 403) -> Response:
+    return PlainTextResponse(f"refused: {why}\n", status)
+
+
+async def _body(headers: Headers, receive: Receive) -> bytes | None:
+    """The whole body of a request; None as soon as it is too long, whatever length was told."""
+    told = headers.get("content-length", "0")
+    if not told.isascii() or not told.isdigit() or len(told) > 20 or int(told) > MOST_BYTES:
+        return None
+    parts: list[bytes] = []
+    size, more = 0, True
+    while more:
+        message = await receive()
+        if message["type"] == "http.disconnect":
+            break
+        parts.append(message.get("body", b""))
+        size += len(parts[-1])
+        if size > MOST_BYTES:
+            return None
+        more = message.get("more_body", False)
+    return b"".join(parts)
+
+
+def _replayed(body: bytes, receive: Receive) -> Receive:
+    """What gives a body that was read, and then what comes after it."""
+    messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
+
+    async def replay() -> Message:
+        return messages.pop() if messages else await receive()
+
+    return replay
+
+
+def _with_policy(send: Send) -> Send:
+    async def guarded(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            headers = MutableHeaders(scope=message)
+            headers["Content-Security-Policy"] = policy()
+            headers["X-Content-Type-Options"] = "nosniff"
+            headers["Referrer-Policy"] = "no-referrer"
+            headers["Cross-Origin-Resource-Policy"] = "same-origin"
+            headers["Cross-Origin-Opener-Policy"] = "same-origin"
+            headers["Cache-Control"] = "no-store"
+        await send(message)
+
+    return guarded
+
+
+@cache
+def policy() -> str:
+    """What pages may load and run: what lies in `mutator.web`, as files or as the pages carry it. Whatever
+    else a file of a run folder carries is not among the hashes."""
+    scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")] + [_hash(f"\n{pages.script()}\n")]
+    styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
+    return "; ".join(
+        (
+            "default-src 'none'",
+            f"script-src 'self' {' '.join(scripts)}",
+            f"style-src 'self' {' '.join(styles)}",
+            "style-src-attr 'unsafe-inline'",  # the lengths of bars
+            "img-src 'self' data:",
+            "connect-src 'self'",
+            "media-src 'self'",
+            "frame-ancestors 'none'",
+            "base-uri 'none'",
+            "form-action 'none'",
+        )
+    )
+
+
+@cache
+def assets(suffix: str) -> tuple[str, ...]:
+    """The files of `mutator.web` with that suffix."""
+    return tuple(sorted(one.name for one in files("mutator.web").iterdir() if one.name.endswith(suffix)))
+
+
+def _hash(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
