@@ -40,18 +40,14 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
 
 
 @contextmanager
-def beside(work: Callable[[], None], processes: int) -> Iterator[None]:
-    """Do `work` in another process while the block runs; for fewer than two processes in this one, after it.
-
-    The block's end waits for it, and raises what it raised.
-    """
+def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
+    """Another process does `work` while the block runs. What the block is given waits for its result, and
+    raises what it raised; for fewer than two processes it does the work itself."""
     if processes < 2:
-        yield
-        work()
+        yield work
         return
     with _workers(lambda _: work(), [None], 1) as [receiver]:
-        yield
-        _received(receiver)
+        yield lambda: _received(receiver)
 
 
 @contextmanager

@@ -68,8 +68,9 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     Experiments are read by their ids, a batch at a time: a million takes some hundred MB. Two processes make
     the batches of a large run.
     """
-    with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)):
+    with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)) as end:
         _write_results(folder, paths)
+        end()
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:

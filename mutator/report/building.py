@@ -3,15 +3,16 @@
 Written from results.csv and the run folder, so it can be made again at any time, the same each time.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mutator._common.files import write_atomic
+from mutator._common.processes import beside, processes_for
 from mutator._common.tables import Table
 from mutator.outcomes.counting import outcome_counts
 from mutator.outcomes.reader import Results
-from mutator.report.browse import browse_data
+from mutator.report.browse import Browse, browse_data
 from mutator.report.page import Content, markdown, page_html, study_html, study_markdown
 from mutator.report.panel import FOLDER, Panel
 from mutator.report.panels import PANELS, study_panels
@@ -58,8 +59,9 @@ def write(run: Path, workspace: Workspace | None) -> Report:
     remove_stamp(out)
     sources = made_from(folder, workspace)
     reported = ReportedRun.open(folder, workspace)
-    study = study_panels(reported)
-    content = _content(replace(reported, compared=bool(study)))
+    with beside(lambda: browse_data(reported), processes_for(len(reported.texts))) as browse:
+        study = study_panels(reported)
+        content = _content(replace(reported, compared=bool(study)), browse)
     text, hypertext = _files(out)
     _write_study(content, study, out)
     write_atomic(text, markdown(content).encode())
@@ -84,7 +86,7 @@ def _files(out: Path) -> tuple[Path, Path]:
     return out / "REPORT.md", out / "index.html"
 
 
-def _content(run: ReportedRun) -> Content:
+def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
     panels = [panel for panel_of in PANELS if (panel := panel_of(run)) is not None]
     return Content(
         name=str(run.folder.head["campaign"]),
@@ -95,7 +97,7 @@ def _content(run: ReportedRun) -> Content:
         study=run.study.about if run.study and run.compared else "",
         answers=answers_panel(run),
         panels=panels,
-        browse=browse_data(run),
+        browse=browse(),
     )
 
 
