@@ -17,6 +17,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.probe import tag_words
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
+from mutator.review.pictures import has_pictures
 from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset, embedded, plainly_embedded
 
@@ -31,6 +32,7 @@ SCRIPTS = (  # each uses those before it
     "review_stacks.js",
     "review_commands.js",
     "review_outbox.js",
+    "review_question.js",
     "review.js",
 )
 
@@ -105,16 +107,13 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
 
 
 def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
-    """The groups, those of a state with one template in one function next to each other, each with the number
-    of its kind."""
+    """The groups, each with the number of its kind: those of a state with one template in one function, which
+    call the same code. They stand next to each other."""
     kinds: dict[tuple[object, ...], int] = {}
-    numbered = [
-        (
-            group,
-            kinds.setdefault((review.state(group), group.files, group.functions, group.models), len(kinds)),
-        )
-        for group in groups
-    ]
+    numbered = []
+    for group in groups:
+        kind = (review.state(group), group.files, group.functions, group.models, group.bound.calls)
+        numbered.append((group, kinds.setdefault(kind, len(kinds))))
     return sorted(numbered, key=lambda pair: pair[1])
 
 
@@ -132,7 +131,7 @@ def _group(review: Review, group: Group, like: int) -> dict[str, Any]:
         "runs": group.runs,
         "diff": group.diff,
         "changes": review.changes(group),
-        "pictures": "image_effect" in group.models,
+        "pictures": has_pictures(group),
         "heads": heads,
         "rows": rows,
     }

@@ -2,6 +2,7 @@
 // One experiment opened beside the list: what happened, its path and replay, what was changed, how to do it again.
 
 class Experiment {
+  static open = null; // what a server's script adds buttons to: {id, experiment}, also told by the event `filled`
   static NO_PICTURES = "A campaign on pictures takes some of its worst experiments by itself, as each of them has to be driven again. "
     + "This command makes those of this one; write the report again to have them here:";
 
@@ -20,6 +21,7 @@ class Experiment {
   async show() {
     const id = this.state.experiment, row = id ? this.table.find(id) : -1;
     if (!id) {
+      Experiment.open = null;
       this.place.hidden = true;
       this.place.replaceChildren(); // or its replay would play on
       this.row = -1;
@@ -95,6 +97,8 @@ class Experiment {
       section("The fault's spec, with the value of this experiment", "spec"),
       el("section.again", {}, el("h3", {}, "Run it again"), this.#commands()),
       el("details", {}, el("summary", {}, "All results"), this.#results()));
+    Experiment.open = { id, experiment: this };
+    this.place.dispatchEvent(new CustomEvent("filled", { detail: Experiment.open }));
   }
 
   #link() {

@@ -21,8 +21,8 @@ const Review = (() => {
       this.stacks = new Stacks(this.cards, { ...actions, mark: (ids, kind) => this.#ask(ids, kind) });
       this.conflicts = new Map(); // group id -> the mark that was not kept
       this.#read();
-      this.#controls();
       this.#draw();
+      this.#controls();
       this.marks = data.served ? this.#outbox() : new Commands(data, (ids) => this.#changed(ids));
       for (const [id, card] of this.cards) card.update(this.marks.pending(id));
       this.#apply();
@@ -98,13 +98,12 @@ const Review = (() => {
       name.addEventListener("input", () => localStorage.setItem(key, name.value.trim()));
       find("run-label").hidden = runs.length === 0;
       run.append(...runs.map(({ key: value, name: text }) => el("option", { value }, text)), el("option", { value: "" }, "none"));
-      const observer = Beside.nearby((card) => {
-        const id = card.id.slice("group-".length);
-        Beside.typical(card.querySelector(":scope > .typical"), id, this.data.served, run.value);
-      });
+      const cards = [...this.cards.values()], idOf = (place) => place.closest(".group").id.slice("group-".length);
+      Beside.nearby((place) => Beside.pictures(place, idOf(place), this.data.served), document.querySelectorAll(".pictures"));
+      let watched = null;
       const watch = () => {
-        observer.disconnect();
-        for (const { element } of this.cards.values()) observer.observe(element);
+        watched?.disconnect();
+        watched = Beside.nearby((card) => Beside.typical(card.querySelector(":scope > .typical"), idOf(card), this.data.served, run.value), cards.map((card) => card.element));
       };
       run.addEventListener("change", watch);
       if (runs.length) watch();
@@ -184,14 +183,9 @@ const Review = (() => {
       if (!ids.length) return;
       const verb = Card.VERBS[kind][0], folded = ids.filter((id) => this.cards.get(id).element.hidden).length;
       const states = this.data.states.map((state) => [state, ids.filter((id) => this.groups.get(id).state === state).length]).filter(([, n]) => n);
-      find("ask-title").textContent = `${verb} ${plural(ids.length, "group")}?`;
-      find("ask-about").textContent = `Their states now: ${states.map(([state, n]) => `${n} ${state}`).join(", ")}.`
+      const about = `Their states now: ${states.map(([state, n]) => `${n} ${state}`).join(", ")}.`
         + (folded ? ` ${folded} of them ${folded === 1 ? "is" : "are"} folded under others like them.` : "");
-      find("ask-yes").textContent = `${verb} ${ids.length}`;
-      find("ask").returnValue = "";
-      find("ask").showModal();
-      find("ask-yes").focus();
-      find("ask").addEventListener("close", () => find("ask").returnValue === "yes" && this.mark(ids, kind), { once: true });
+      Question.ask(`${verb} ${plural(ids.length, "group")}?`, about, `${verb} ${ids.length}`, () => this.mark(ids, kind));
     }
 
     /** Hide what is not asked for; `isKept`: what is shown stays, although it may fit no more. */
@@ -255,7 +249,10 @@ const Review = (() => {
     #key(event) {
       if (event.ctrlKey || event.metaKey || event.altKey || find("help").open || find("ask").open) return;
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) {
-        if (event.key === "Escape") this.#leave(event.target);
+        if (event.key === "Escape") {
+          event.preventDefault(); // a browser would empty the field to find in
+          this.#leave(event.target);
+        }
         return;
       }
       const done = this.#keys()[event.key];

@@ -3,7 +3,7 @@
 
 const Beside = (() => {
   const { el } = Dom;
-  const LEVELS = [["least", "least"], ["middle", "middle"], ["most", "most severe"]];
+  const LEVELS = { least: "least", middle: "middle", most: "most severe" };
 
   /** An address with the query of the page, and more of it. */
   const query = (served, more = {}) => {
@@ -25,16 +25,20 @@ const Beside = (() => {
     throw new Error(error ? words(error) : `the server answers ${response.status}`);
   }
 
-  /** The road as the camera sees it, and the same road behind the effect, at three levels. */
-  function pictures(group, served) {
-    const figure = (level, side, title) => {
-      const image = el("img", { src: `/review/${encodeURIComponent(served.target)}/${group.id}/picture/${level}-${side}.jpg${served.query}`, loading: "lazy", alt: `Road ${title}` });
-      const shown = el("figure", {}, image, el("figcaption", {}, title));
+  /** The picture as the target has it, and behind the effect, at up to three levels. */
+  async function pictures(place, id, served) {
+    const address = (name) => `/review/${encodeURIComponent(served.target)}/${id}/picture/${name}.jpg${served.query}`;
+    const figure = (name, title, about) => {
+      const image = el("img", { src: address(name), alt: `Picture ${title}` });
+      const shown = el("figure", {}, image, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
       image.addEventListener("error", () => image.replaceWith(el("p.quiet.none", {}, "no picture")));
       return shown;
     };
-    return el("div.pictures", { role: "group", "aria-label": "Pictures" }, figure("middle", "before", "before"),
-      LEVELS.map(([level, title]) => figure(level, "after", `after, ${title}`)));
+    const found = await get(`${served.api}/${id}/pictures${served.query}`).catch((error) => error);
+    if (found instanceof Error) place.replaceChildren(el("p.quiet", {}, `No pictures: ${found.message}.`));
+    else if (!found?.levels.length) place.hidden = true;
+    else place.replaceChildren(figure("most-before", "before", ""),
+      ...found.levels.map(({ name, label }) => figure(`${name}-after`, `after, ${LEVELS[name] || name}:`, label)));
   }
 
   /** What the experiments of a group came to in a run, with links to a typical and the worst one. */
@@ -53,17 +57,22 @@ const Beside = (() => {
   function told(found) {
     if (!found) return [el("span.quiet", {}, "This run has no experiment of this group.")];
     const counts = Object.entries(found.outcomes).map(([name, n]) => [el(`span.ending.${name}`, {}, `${n} ${name.replaceAll("_", " ")}`), " "]);
-    const one = (title, experiment) => experiment && el("p", {}, el("b", {}, `${title}: `), experiment.verdict, " ",
+    const one = (title, experiment) => experiment && el("p", {}, el("b", {}, `${title}: `), `${experiment.label}: ${experiment.verdict} `,
       el("a", { href: experiment.link, target: "_blank", rel: "noopener", "aria-label": `Replay of experiment ${experiment.id}` }, "Replay"));
     const isOther = found.worst && found.worst.id !== found.typical?.id;
     return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
   }
 
-  /** Calls `seen(element)` once for each observed element that comes near the screen. */
-  function nearby(seen) {
+  /** Tell of each of `elements` once it comes near the screen. */
+  function nearby(seen, elements) {
     const observer = new IntersectionObserver((entries) => {
-      for (const { isIntersecting, target } of entries) if (isIntersecting) seen(target);
+      for (const { isIntersecting, target } of entries) {
+        if (!isIntersecting) continue;
+        observer.unobserve(target);
+        seen(target);
+      }
     }, { rootMargin: "300px" });
+    for (const element of elements) observer.observe(element);
     return observer;
   }
 

@@ -34,7 +34,7 @@ class Card {
       el("div.conflict", { role: "alert", hidden: true }),
       el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
       el("p.facts.quiet", {}, this.#facts()),
-      this.isServed && group.pictures ? Beside.pictures(group, this.data.served) : null,
+      this.isServed && group.pictures ? el("div.pictures", { role: "group", "aria-label": "Pictures" }, el("p.quiet", {}, "Pictures are drawn …")) : null,
       el("div.typical", { hidden: true }),
       el("details.since", { hidden: true }, el("summary", {}, "Changed since the decision"), el("div.content")),
       el("div.diffs"),

@@ -7,7 +7,10 @@ import json
 import pytest
 
 from mutator import web
-from mutator.report.page import SCRIPTS, STYLES
+from mutator.report import page as report
+from mutator.review import page as review
+
+SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # loaded by address from a server
 
 
 def test_carried_data_come_back_and_are_the_same_each_time() -> None:
@@ -35,7 +38,10 @@ def test_what_json_does_not_know_is_refused() -> None:
         web.packed([float("nan")])
 
 
-@pytest.mark.parametrize("name", [*STYLES, *SCRIPTS])
+@pytest.mark.parametrize(
+    "name",
+    sorted({*report.STYLES, *report.SCRIPTS, *review.STYLES, *review.SCRIPTS, *SERVED}),
+)
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
     """`asset` refuses one that would; a script of more than 300 lines is two."""
     assert len(web.asset(name).splitlines()) <= 300

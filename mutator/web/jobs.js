@@ -1,0 +1,153 @@
+"use strict";
+// What the server is asked to do: a list of jobs with progress, cancel, log and result, on every served page. The server
+// keeps the list, so a reload finds it again.
+
+const Jobs = (() => {
+  const { el } = Dom;
+  const SOON_MS = 1000, LATER_MS = 5000, SHOWN = 20;
+  const ACTIVE = ["queued", "running"];
+  const isActive = (job) => ACTIVE.includes(job.state);
+  const rows = new Map(); // id of a job -> its row
+  const watchers = [];
+  let place = null, timer = null, known = [];
+
+  /** An error of the server in words. */
+  const words = ({ got, where, expected, remedy }) =>
+    [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
+
+  /** What the server answers; an Error in words where it refuses or is gone. */
+  async function ask(address, body) {
+    const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
+    let response = null;
+    try {
+      response = await fetch(address, post);
+    } catch {
+      throw new Error("the server does not answer");
+    }
+    const data = await response.json().catch(() => null);
+    if (response.ok && data) return data;
+    throw new Error(data?.error ? words(data.error) : `the server answers ${response.status}`);
+  }
+
+  /** Ask for a job; gives its id. */
+  async function start(body) {
+    const { id } = await ask("/api/jobs", body);
+    await poll();
+    return id;
+  }
+
+  /** Call `seen(jobs)` with the jobs, newest first, whenever they have been asked for. */
+  function watch(seen) {
+    watchers.push(seen);
+    seen(known);
+  }
+
+  async function poll() {
+    clearTimeout(timer);
+    try {
+      known = (await ask("/api/jobs")).jobs;
+      show(known);
+      for (const seen of watchers) seen(known);
+      tell("");
+    } catch (error) {
+      tell(`The jobs cannot be shown: ${error.message}.`);
+    }
+    timer = setTimeout(poll, known.some(isActive) ? SOON_MS : LATER_MS);
+  }
+
+  function tell(text) {
+    const said = place.querySelector(".jobs-said");
+    if (said.textContent !== text) said.textContent = text;
+    if (text) place.hidden = false;
+  }
+
+  function show(jobs) {
+    place.hidden = jobs.length === 0 && !place.dataset.always;
+    const active = jobs.filter(isActive).length, failed = jobs.filter((job) => job.state === "failed").length;
+    const waiting = active ? `${active} to do` : "none to do";
+    place.querySelector(".jobs-count").textContent = `${jobs.length} in all, ${waiting}${failed ? `, ${failed} failed` : ""}`;
+    place.querySelector(".jobs-none").hidden = jobs.length > 0;
+    const list = place.querySelector("ul"), shown = jobs.slice(0, SHOWN);
+    for (const [id, row] of rows) {
+      if (shown.some((job) => job.id === id)) continue;
+      row.element.remove();
+      rows.delete(id);
+    }
+    shown.forEach((job, at) => {
+      if (!rows.has(job.id)) rows.set(job.id, rowOf(job.id));
+      const row = rows.get(job.id);
+      row.update(job);
+      if (list.children[at] !== row.element) list.insertBefore(row.element, list.children[at] || null);
+    });
+  }
+
+  /** A row that stays the same element while its job goes on, so that its buttons keep the keyboard. */
+  function rowOf(id) {
+    const state = el("span.job-state"), title = el("b"), progress = el("progress", { max: 1 }), message = el("span.quiet"), result = el("a", {}, "Show it");
+    const button = (text, onclick) => el("button", { type: "button", onclick }, text);
+    const cancel = button("Cancel", () => ask(`/api/jobs/${id}/cancel`, {}).then(poll, (error) => (message.textContent = error.message)));
+    const log = button("Log", () => showLog(id, title.textContent));
+    result.addEventListener("click", opened);
+    function update(job) {
+      state.textContent = job.state;
+      state.className = `job-state ${job.state}`;
+      title.textContent = job.title;
+      cancel.setAttribute("aria-label", `Cancel ${job.title}`);
+      log.setAttribute("aria-label", `Log of ${job.title}`);
+      progress.hidden = job.state !== "running";
+      progress.setAttribute("aria-label", `Progress of ${job.title}`);
+      if (job.progress === null) progress.removeAttribute("value");
+      else progress.value = job.progress;
+      message.textContent = job.message;
+      cancel.hidden = !isActive(job);
+      result.hidden = !job.result;
+      if (job.result) result.href = job.result;
+    }
+    return { element: el("li", {}, state, title, progress, message, el("span.job-do", {}, result, cancel, log)), update };
+  }
+
+  /** A link to the page that is open loads it anew: its report has been made anew. */
+  function opened(event) {
+    const to = new URL(event.currentTarget.href);
+    if (to.pathname !== location.pathname) return;
+    event.preventDefault();
+    history.replaceState(null, "", to);
+    location.reload();
+  }
+
+  async function showLog(id, title) {
+    const dialog = document.getElementById("job-log"), text = dialog.querySelector("pre");
+    dialog.querySelector("h2").textContent = title;
+    text.textContent = "…";
+    dialog.showModal();
+    for (;;) {
+      const answer = await ask(`/api/jobs/${id}/log`).catch((error) => ({ log: error.message }));
+      const isAtEnd = text.scrollTop + text.clientHeight >= text.scrollHeight - 4;
+      if (text.textContent !== answer.log) text.textContent = answer.log || "Nothing was printed yet.";
+      if (isAtEnd) text.scrollTop = text.scrollHeight;
+      const job = known.find((one) => one.id === id);
+      await new Promise((done) => setTimeout(done, SOON_MS));
+      if (!dialog.open || !job || !isActive(job)) return;
+    }
+  }
+
+  /** Put the list into the page: into its section `jobs`, or as a bar at its foot. */
+  function install() {
+    const section = document.getElementById("jobs");
+    place = section || el("aside.jobs", { id: "jobs", "aria-label": "Jobs", hidden: true });
+    if (section) section.dataset.always = "yes";
+    const list = [el("ul"), el("p.quiet.jobs-none", {}, "Nothing was asked for since the server was started.")];
+    const count = el("span.quiet.jobs-count");
+    place.classList.add("jobs");
+    place.append(...(section ? [el("h2", {}, "Jobs ", count), ...list]
+      : [el("details", { open: true }, el("summary", {}, el("b", {}, "Jobs"), " ", count, " ", el("a", { href: "/" }, "All runs and reviews")), ...list)]),
+      el("p.jobs-said", { role: "status" }));
+    if (!section) document.body.append(place);
+    document.body.append(el("dialog", { id: "job-log", "aria-labelledby": "job-log-title" }, el("h2", { id: "job-log-title" }),
+      el("pre", { tabindex: 0 }), el("form", { method: "dialog" }, el("button", {}, "Close"))));
+    poll();
+  }
+
+  install();
+  return { ask, start, watch, isActive };
+})();

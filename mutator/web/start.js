@@ -1,0 +1,86 @@
+"use strict";
+// The forms of the first page: a single try of a fault, and a small campaign.
+
+(() => {
+  const { el } = Dom;
+  const place = document.getElementById("start");
+  if (!place) return;
+
+  const option = (value, text = value) => el("option", { value }, text);
+  const select = (name, options, more = {}) => el("select", { name, ...more }, options);
+  const labelled = (text, field, hint = "") => el("label", {}, el("span", {}, text), field, hint ? el("small.quiet", {}, hint) : null);
+
+  /** A form that becomes a job; `order(fields)` is what is asked of the server. */
+  function form(title, about, fields, verb, order) {
+    const said = el("p", { role: "status" }), button = el("button.main", {}, verb);
+    const made = el("form.order", { "aria-label": title, onsubmit: sent }, el("h3", {}, title), el("p.quiet", {}, about), el("div.fields", {}, fields), el("p", {}, button), said);
+    async function sent(event) {
+      event.preventDefault();
+      button.disabled = true;
+      said.className = "";
+      said.textContent = "…";
+      try {
+        await Jobs.start(order(Object.fromEntries(new FormData(made))));
+        said.textContent = "It is among the jobs.";
+      } catch (error) {
+        said.className = "bad";
+        said.textContent = `It is not done: ${error.message}.`;
+      }
+      button.disabled = false;
+    }
+    return made;
+  }
+
+  const orNull = (text) => (text?.trim() ? text.trim() : null);
+  const numberOrNull = (text) => (text?.trim() ? Number(text) : null);
+
+  function tryForm({ specs, scenarios, contexts, readings, targets }) {
+    const variants = select("variant", []);
+    const fill = () => {
+      const found = specs.find((spec) => spec.name === name.value);
+      variants.replaceChildren(option("", "all"), ...(found ? found.variants.map((variant) => option(variant)) : []));
+    };
+    const name = el("input", { name: "spec", list: "specs", required: true, autocomplete: "off", spellcheck: "false", placeholder: specs[0]?.name || "", oninput: fill });
+    const time = el("input", { name: "time", type: "number", min: 0, step: "0.01", value: 10, "aria-label": "Time in seconds", hidden: true });
+    const trigger = select("trigger", [option("always"), option("time", "from a time on (s)"), ...contexts.map((c) => option(c.name, `${c.name}: ${c.condition}`))],
+      { onchange: () => (time.hidden = trigger.value !== "time") });
+    fill();
+    return form("Try a fault", "Put one fault in and drive once: diff, verdict and plot.", [
+      labelled("Fault", el("span", {}, name, el("datalist", { id: "specs" }, specs.map((spec) => option(spec.name))))),
+      labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map((s) => option(s)))),
+      labelled("Trigger", el("span.two", {}, trigger, time)),
+      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: drawn"),
+      labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: 0"),
+      readings.length > 1 ? labelled("Reading", select("reading", readings.map((r) => option(r)))) : null,
+      targets.length > 1 ? labelled("Target", select("target", targets.map((t) => option(t)))) : null,
+    ], "Try it", (given) => ({
+      kind: "try", spec: given.spec.trim(), scenario: given.scenario, trigger: given.trigger === "time" ? given.time : given.trigger,
+      variant: orNull(given.variant), value: numberOrNull(given.value), seed: numberOrNull(given.seed), reading: orNull(given.reading), target: orNull(given.target),
+    }));
+  }
+
+  function campaignForm({ campaigns }) {
+    const name = el("input", { name: "name", required: true, pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*", title: "letters, digits, dots, hyphens", autocomplete: "off" });
+    const campaign = select("campaign", campaigns.map((c) => option(c.name, campaigns.some((o) => o.target !== c.target) ? `${c.name} (${c.target})` : c.name)), { onchange: suggest });
+    function suggest() {
+      const now = new Date(), two = (n) => String(n).padStart(2, "0");
+      name.value = `${campaign.value}-${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}`;
+    }
+    suggest();
+    return form("Run a small campaign", "Some experiments of a campaign, spread over its plan.", [
+      labelled("Campaign", campaign),
+      labelled("At most", el("input", { name: "limit", type: "number", min: 1, max: 1000, value: 20, required: true }), "experiments"),
+      labelled("Run folder", name, "beside the other runs"),
+      labelled("Only", el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" }), "a filter; empty: all"),
+      labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
+    ], "Run it", (given) => ({
+      kind: "campaign", campaign: given.campaign, name: given.name.trim(), limit: Number(given.limit), only: orNull(given.only), seed: numberOrNull(given.seed),
+    }));
+  }
+
+  Jobs.ask("/api/library").then((library) => {
+    const problem = library.templates_problem;
+    place.append(el("h2", {}, "Start something"), problem ? el("p.bad", {}, problem) : "",
+      el("div.orders", {}, library.specs.length ? tryForm(library) : null, library.campaigns.length ? campaignForm(library) : null));
+  }).catch((error) => place.append(el("p.bad", { role: "alert" }, `The library cannot be read: ${error.message}.`)));
+})();
