@@ -37,7 +37,7 @@ class ReviewApi:
         return JSONResponse({"changes": found})
 
     def typical(self, request: Request) -> Response:
-        """What became of a group in a run."""
+        """What became of a group in a run; null where the run has none of it."""
         run = self._runs.folder(request.query_params.get("run", ""))
         chosen = asked(self._reviews, request)
         return JSONResponse(self._reviews.typical(chosen, request.path_params["group"], run))

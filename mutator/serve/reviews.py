@@ -165,12 +165,11 @@ class Reviews:
             )
         return found[after]
 
-    def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any]:
-        """What became of the group in a run; Absent where the run has none of it."""
-        found = typical.of_group(RunFolder.open(run), self.group(chosen, name))
-        if found is None:
-            raise Absent("the run has no experiment of this group")
-        return asdict(found)
+    def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
+        """What became of the group in a run; None where the run has none of it."""
+        folder, group = RunFolder.open(run), self.group(chosen, name)
+        found = typical.of_group(folder, group) if folder.head["target"] == chosen.target else None
+        return asdict(found) if found else None
 
     def _refuse_others(self, chosen: Selection, groups: Sequence[Group], digests: Mapping[str, str]) -> None:
         now = _states(load_review(self.workspace, chosen.target), groups)
