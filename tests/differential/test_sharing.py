@@ -2,16 +2,26 @@
 
 import csv
 import json
+import os
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from mutator._common.hashing import canonical
+from mutator.campaigns.chunks import Pending, pending
 from mutator.campaigns.freezing import freeze
 from mutator.campaigns.plans import load_plan, make_plan
 from mutator.engines.reference import ReferenceEngine
 from mutator.errors import CheckFailed
+from mutator.execution.cluster import bundle
+from mutator.execution.cluster.board import Board
+from mutator.execution.cluster.bundle import Bundle, Site
+from mutator.execution.cluster.child import PieceRunner
 from mutator.execution.running import run_campaign
+from mutator.store import plan_file
+from mutator.store.records import line_of
 from mutator.store.run_folder import RunFolder
 from mutator.verification.preflight import run_checks
 from mutator.workspace import Workspace
@@ -99,6 +109,28 @@ def test_the_checks_prove_it(runs: tuple[Path, Path]) -> None:
     """The fault-free runs of scenarios that are said to be one are compared, and the check is kept."""
     checks = json.loads((runs[0] / "checks.json").read_text())["results"]
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
+
+
+def test_part_of_a_shared_run_is_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
+    """Where a kill or a split left one experiment of a shared run, a worker drives that one's own golden run,
+    and has its record."""
+    folder = RunFolder.open(runs[0])
+    toy = Workspace(
+        library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"
+    )
+    bundle.lay_out(Bundle.of(toy, folder, "reference").data, tmp_path)
+    chunk = next(one for one in pending(folder, {}) if any(name == "C" for name in _scenarios(folder, one)))
+    left = replace(chunk, places=(_scenarios(folder, chunk).index("C"),))
+    piece = Board(folder, [left], ()).take("w")
+    assert piece is not None and piece.golden == "A+alone"
+    [record] = PieceRunner(Site(tmp_path), "w", os.getpid()).run(piece, lambda name: None).records
+    [name] = piece.ids
+    assert record == canonical(line_of(folder.records()[name])).encode()
+
+
+def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
+    lines = plan_file.chunk_lines(folder.path, folder.head["chunks"][chunk.chunk])
+    return [json.loads(line)["scenario"] for line in lines]
 
 
 def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> None:

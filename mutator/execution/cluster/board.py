@@ -5,15 +5,14 @@ a share of what is left, by the times that were measured so far. Work of the gol
 to that worker. Near the end, who has nothing else to do repeats what others are late with.
 """
 
-import json
 import time
-from collections import Counter, deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import groupby, islice
-from typing import Any
+from itertools import islice
 
 from mutator.campaigns.chunks import Pending
+from mutator.execution.cluster.groups import Group, Run, faults_of, golden_of, groups_of, id_of
 from mutator.execution.cluster.pieces import Kind, Piece
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
@@ -26,25 +25,7 @@ _GUESS_S = 0.5  # a run takes, before anything was measured
 _LATE = 3.0  # times the expected time after which a piece is repeated elsewhere
 _LATE_S = 5.0  # and at least so long
 _DEATHS = 2  # of workers, until a piece is split
-_PROOF_S = 20.0  # without other work, until a worker proves what it ran itself
-
-_OF_A_RUN = ("fault", "trigger", "seed")  # equal in experiments that are one run in several scenarios
-
-Run = dict[str, bytes]  # lines of the plan by experiment id: a run, and those that share it
-
-
-@dataclass
-class _Group:
-    """What is left of the work with one golden run."""
-
-    golden: str
-    runs: Iterator[Run]
-    left: int  # experiments that were not cut off yet
-    again: deque[Piece] = field(default_factory=deque)  # pieces that came back
-
-    @property
-    def waiting(self) -> int:
-        return self.left + sum(len(piece.lines) for piece in self.again)
+_PROOF_S = 20.0  # without other work, until a worker proves what it ran itself; longer where runs are long
 
 
 @dataclass
@@ -56,6 +37,15 @@ class _Out:
     since: float
     expected_s: float
     others: set[str] = field(default_factory=set)  # workers that repeat it
+
+    def goes_on_without(self, worker: str) -> bool:
+        """Whether somebody is still at it when this worker is not."""
+        if worker not in self.others and self.others:
+            self.worker = self.others.pop()
+            return True
+        known = worker in self.others
+        self.others.discard(worker)
+        return known
 
 
 class Board:
@@ -71,7 +61,7 @@ class Board:
         self._now, self._folder = now, folder
         self._number = 0
         self._faults = plan_file.fault_lines(folder.path)
-        self._groups = _groups(folder, pending, self._faults)
+        self._groups = groups_of(folder, pending, self._faults)
         self._sampled = {sample.id for sample in proof}
         self._proof = [self._proof_piece(line) for line in plan_file.lines_named(folder.path, self._sampled)]
         self._out: dict[int, _Out] = {}
@@ -139,42 +129,34 @@ class Board:
         """A worker does not do a piece after all, for reasons that are not the piece's."""
         if (out := self._out.get(piece.number)) is None:
             return
-        if worker in out.others:
-            out.others.discard(worker)
-        elif out.others:
-            out.worker = out.others.pop()
-        else:
+        if not out.goes_on_without(worker):
             del self._out[piece.number]
-            self._again(piece)
+            self._again(out.piece)
 
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
-        """A worker died of a piece, maybe while it ran the experiment `at`. What died twice is split; returns
-        a piece of one experiment that died twice: it is given up."""
-        if piece.number not in self._out:
+        """A worker, or its process, died of a piece, maybe while it ran the experiment `at`. Another worker
+        tries next, if there is one. What died twice is split; returns a piece of one experiment that died
+        twice: it is given up."""
+        if (out := self._out.get(piece.number)) is None:
+            return None
+        out.piece = piece = replace(out.piece, died_at=(*out.piece.died_at, worker))
+        if out.goes_on_without(worker):
             return None
         del self._out[piece.number]
-        piece = replace(piece, deaths=piece.deaths + 1)
-        if len(piece.lines) == 1 and piece.deaths >= _DEATHS:
+        lines, twice = piece.lines, len(piece.died_at) >= _DEATHS
+        if len(lines) == 1 and twice:
             return piece
-        if at in piece.lines and len(piece.lines) > 1:
-            rest = {name: line for name, line in piece.lines.items() if name != at}
-            self._again(self._part(piece, {at: piece.lines[at]}, piece.deaths))
-            self._again(self._part(piece, rest, 0))
-        elif piece.deaths >= _DEATHS:
-            names = list(piece.lines)
+        if at in lines and len(lines) > 1:
+            rest = {name: line for name, line in lines.items() if name != at}
+            self._again(self._part(piece, {at: lines[at]}, piece.died_at))
+            self._again(self._part(piece, rest, ()))
+        elif twice:
+            names = list(lines)
             for half in (names[: len(names) // 2], names[len(names) // 2 :]):
-                self._again(self._part(piece, {name: piece.lines[name] for name in half}, _DEATHS - 1))
+                self._again(self._part(piece, {name: lines[name] for name in half}, (worker,)))
         else:
             self._again(piece)
         return None
-
-    def remaining_s(self) -> float | None:
-        """How long the work that is left will take; None before anything was measured."""
-        if not self._done[Kind.RUN] and not self._done[Kind.PROVE]:
-            return None
-        out = sum(max(0.0, one.expected_s - (self._now() - one.since)) for one in self._out.values())
-        proof_s = len(self._proof) * self._mean_s(Kind.PROVE)
-        return (self._waiting * self._mean_s(Kind.RUN) + proof_s + out) / self._at_once
 
     @property
     def _at_once(self) -> int:
@@ -193,8 +175,10 @@ class Board:
         if group is None:
             return None
         self._at[worker] = group.golden
-        if group.again:
-            return group.again.popleft()
+        for place, piece in enumerate(group.again):
+            if self._may_try(worker, piece):
+                del group.again[place]
+                return piece
         runs = list(islice(group.runs, self._runs()))
         lines = {name: line for run in runs for name, line in run.items()}
         group.left -= len(lines)
@@ -208,24 +192,32 @@ class Board:
         share_s = self._waiting * mean_s / (_SHARE * self._at_once)
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
-    def _group_for(self, worker: str) -> _Group | None:
+    def _group_for(self, worker: str) -> Group | None:
         """The work with the golden run that the worker has; else that with the most left for each worker."""
         own = self._groups.get(self._at.get(worker, ""))
-        if own is not None and own.waiting:
+        if own is not None and self._has_for(own, worker):
             return own
         there = Counter(self._at.values())
-        waiting = [group for group in self._groups.values() if group.waiting]
+        waiting = [group for group in self._groups.values() if self._has_for(group, worker)]
         return max(waiting, key=lambda group: group.waiting / (1 + there[group.golden]), default=None)
+
+    def _has_for(self, group: Group, worker: str) -> bool:
+        return bool(group.left) or any(self._may_try(worker, piece) for piece in group.again)
+
+    def _may_try(self, worker: str, piece: Piece) -> bool:
+        """Whether a piece did not take this worker down before, or there is nobody else."""
+        return worker not in piece.died_at or self._slots.keys() <= set(piece.died_at)
 
     def _proof_for(self, worker: str) -> Piece | None:
         """An experiment of the proof that another worker ran, or that was run before; its own, where there
         are no others, or where they have left it for long."""
         running = {name for out in self._out.values() for name in out.piece.lines if name in self._sampled}
         idle_s = self._now() - self._idle_since.get(worker, self._now())
-        takes_own = len(self._slots) <= 1 or idle_s > _PROOF_S
+        takes_own = len(self._slots) <= 1 or idle_s > max(_PROOF_S, _LATE * self._mean_s(Kind.RUN))
         for place, piece in enumerate(self._proof):
             name = next(iter(piece.lines))
-            if takes_own or not (name in running or self._maker.get(name) == worker):
+            other = not (name in running or self._maker.get(name) == worker)
+            if (takes_own or other) and self._may_try(worker, piece):
                 return self._proof.pop(place)
         return None
 
@@ -237,72 +229,34 @@ class Board:
             for out in self._out.values()
             if worker != out.worker
             and not out.others
+            and self._may_try(worker, out.piece)
             and now - out.since > max(_LATE * out.expected_s, _LATE_S)
         ]
         return max(late, key=lambda one: one[0])[1] if late else None
 
-    def _piece(self, kind: Kind, golden: str, lines: Run, *, runs: int = 1, deaths: int = 0) -> Piece:
+    def _piece(
+        self, kind: Kind, golden: str, lines: Run, *, runs: int = 1, died_at: tuple[str, ...] = ()
+    ) -> Piece:
         self._number += 1
         return Piece(
             number=self._number,
             kind=kind,
             golden=golden,
             lines=lines,
-            faults=_faults_of(lines, self._faults),
+            faults=faults_of(lines, self._faults),
             runs=runs,
-            deaths=deaths,
+            died_at=died_at,
         )
 
     def _proof_piece(self, line: bytes) -> Piece:
-        lines = {_read(line)["id"]: line}
-        return self._piece(Kind.PROVE, _golden_of(self._folder, line, self._faults), lines)
+        lines = {id_of(line): line}
+        return self._piece(Kind.PROVE, golden_of(self._folder, line, self._faults), lines)
 
-    def _part(self, piece: Piece, lines: Run, deaths: int) -> Piece:
-        return self._piece(piece.kind, piece.golden, lines, runs=len(lines), deaths=deaths)
+    def _part(self, piece: Piece, lines: Run, died_at: tuple[str, ...]) -> Piece:
+        return self._piece(piece.kind, piece.golden, lines, runs=len(lines), died_at=died_at)
 
     def _again(self, piece: Piece) -> None:
         if piece.kind is Kind.PROVE:
             self._proof.append(piece)
         else:
             self._groups[piece.golden].again.append(piece)
-
-
-_Faults = Mapping[str, bytes]  # lines of the plan's faults by id
-
-
-def _groups(folder: RunFolder, pending: Sequence[Pending], faults: _Faults) -> dict[str, _Group]:
-    """The pending work by golden run. A chunk has one."""
-    chunks: dict[str, list[Pending]] = {}
-    for one in pending:
-        first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
-        chunks.setdefault(_golden_of(folder, first, faults), []).append(one)
-    return {
-        golden: _Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
-        for golden, ours in chunks.items()
-    }
-
-
-def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """What is left of these chunks, run by run: those that share one are side by side."""
-    for one in pending:
-        lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
-        read = [(_read(lines[place]), lines[place]) for place in one.places]
-        for _, same in groupby(read, key=lambda item: [item[0][key] for key in _OF_A_RUN]):
-            yield {data["id"]: line for data, line in same}
-
-
-def _golden_of(folder: RunFolder, line: bytes, faults: _Faults) -> str:
-    data = _read(line)
-    fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
-    experiment = plan_file.experiment_from(data, {fault.id: fault})
-    return folder.golden_of(experiment).key
-
-
-def _faults_of(lines: Run, faults: _Faults) -> tuple[bytes, ...]:
-    """The lines of the faults that these experiments have, each once."""
-    return tuple(dict.fromkeys(faults[_read(line)["fault"]] for line in lines.values()))
-
-
-def _read(line: bytes) -> dict[str, Any]:
-    data: dict[str, Any] = json.loads(line)
-    return data

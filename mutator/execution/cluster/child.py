@@ -16,9 +16,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from mutator._common import caches
-from mutator._common.files import DiskFull
+from mutator._common.files import DiskFull, raising_disk_full
 from mutator._common.hashing import canonical
 from mutator._common.shortages import Shortage, shortage
+from mutator.campaigns.shared_runs import runs
 from mutator.engines.jobs import FAST, Job, Setting
 from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.engines.registry import make_engine
@@ -47,6 +48,7 @@ class PieceRunner:
     def __init__(self, site: Site, name: str, parent: int) -> None:
         self._site, self._name, self._parent = site, name, parent
         check_requirements(site.manifest)
+        self.place = site.place
         self._work = site.place / f"work-{os.getpid()}"
         self._work.mkdir()
         self._base = prepare_base(site.manifest, self._work / "base")
@@ -58,11 +60,13 @@ class PieceRunner:
         """Run a piece; `tell` is called with each experiment that is finished. Unlike where this machine
         drives another golden run."""
         began = time.monotonic()
-        if piece.golden not in self._alike:
-            self._drive_golden(piece.golden)
+        experiments = piece.experiments()
+        for same in runs(self._site.manifest, experiments):  # compared with the golden run of its first
+            if (key := self._golden_of(same[0]).key) not in self._alike:
+                self._drive_golden(key)
         runner = self._runner(piece.kind)
         finished: list[Finished] = []
-        for one in runner.run(piece.experiments()):
+        for one in runner.run(experiments):
             finished.append(one)
             tell(one.experiment.id)
         made = _made(finished, self._name, proof=piece.kind is Kind.PROVE)
@@ -90,8 +94,11 @@ class PieceRunner:
                     parent=self._parent,
                 )
                 engine = make_engine(site.meta["engine"], setting)  # type: ignore[assignment]
-            several = site.meta["several_seeds"]
-            goldens = Goldens(site.manifest, self._golden_folder, several_seeds=several)
+            goldens = Goldens(
+                site.manifest,
+                lambda experiment: self._goldens / self._golden_of(experiment).key,
+                several_seeds=site.meta["several_seeds"],
+            )
             with_series = kind is Kind.RUN and site.meta["series"]
             self._runners[kind] = Runner(
                 site.manifest, site.models, engine, goldens, site.scenario, with_series=with_series
@@ -120,9 +127,8 @@ class PieceRunner:
                 caches.make_room(site.manifest.name)
         self._alike.add(key)
 
-    def _golden_folder(self, experiment: Experiment) -> Path:
-        several = self._site.meta["several_seeds"]
-        return self._goldens / GoldenRun.of(experiment, several_seeds=several).key
+    def _golden_of(self, experiment: Experiment) -> GoldenRun:
+        return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
@@ -147,21 +153,19 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
 def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> Result:
     """What comes of a piece, however it ends."""
     try:
-        return runner.run(piece, tell)
+        with raising_disk_full(runner.place):
+            return runner.run(piece, tell)
     except Unlike as err:
         return Result(number=piece.number, ending=Ending.UNLIKE, text=str(err))
     except Exception as err:
         known = err if isinstance(err, MutatorError) else shortage(err)
         short = isinstance(known, DiskFull | Shortage)
         text = str(known) if known else "".join(traceback.format_exception(err)).rstrip()
-        return Result(number=piece.number, ending=Ending.SHORT if short else Ending.FAILED, text=text)
+        return Result(number=piece.number, ending=Ending.UNFIT if short else Ending.FAILED, text=text)
 
 
-def main() -> int:
+def _serve(connection: Connection, runner: PieceRunner) -> None:
     """Run pieces until the host closes the connection."""
-    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host's to answer
-    runner = PieceRunner(site, name, os.getppid())
     try:
         with suppress(EOFError):
             while True:
@@ -169,6 +173,27 @@ def main() -> int:
                 connection.send(_result(runner, piece, connection.send).packed())
     finally:
         runner.close()
+
+
+def _refuse(connection: Connection, err: Exception) -> None:
+    """Say of the first piece that none can be run here."""
+    with suppress(EOFError):
+        piece = Piece.of(connection.recv_bytes())
+        text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))
+        connection.send(Result(number=piece.number, ending=Ending.UNFIT, text=text).packed())
+
+
+def main() -> int:
+    """Run pieces until the host closes the connection, or say why that cannot be done here."""
+    connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host's to answer
+    try:
+        with raising_disk_full(site.place):
+            runner = PieceRunner(site, name, os.getppid())
+    except Exception as err:
+        _refuse(connection, err)
+        return 1
+    _serve(connection, runner)
     return 0
 
 

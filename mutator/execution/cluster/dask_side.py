@@ -58,7 +58,8 @@ def attend(run: str) -> None:
         host.attend(wanted)
     finally:
         with _arrived:
-            _hosts.pop(run, None)
+            if _hosts.get(run) is host:  # the run may have come again meanwhile
+                del _hosts[run]
 
 
 def leave(run: str) -> None:

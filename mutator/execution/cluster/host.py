@@ -15,11 +15,12 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from mutator._common.files import is_disk_full, raising_disk_full, remove_folder
+from mutator._common.files import raising_disk_full, remove_folder
+from mutator._common.shortages import shortage
 from mutator.execution.cluster import bundle
 from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Piece, Result
@@ -48,22 +49,29 @@ class _Child:
         """Have it run a piece. NotWanted as soon as nobody waits for it; the process is then of no use."""
         finished: set[str] = set()
         try:
-            self.connection.send_bytes(data)
-            since = time.monotonic()
-            while time.monotonic() - since < patience_s:
-                if not wanted():
-                    raise NotWanted
-                if self.connection.poll(_LOOK_S):
-                    said = self.connection.recv()
-                    if isinstance(said, bytes):
-                        return Result.of(said)
-                    finished.add(said)
-                    since = time.monotonic()
+            result = self._answer(data, patience_s, wanted, finished)
+        except TimeoutError:
             text = f"a worker's process gave no sign of life for {patience_s:.0f} s"
+            result = Result(number=piece.number, ending=Ending.DIED, text=text)
         except (EOFError, OSError):
             text = f"a worker's process {self._end()}"
-        at = next((name for name in piece.ids if name not in finished), "")
-        return Result(number=piece.number, ending=Ending.DIED, text=text, at=at)
+            result = Result(number=piece.number, ending=Ending.DIED, text=text)
+        return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
+
+    def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
+        """What it says of a piece; notes what is finished. TimeoutError when it says nothing for so long."""
+        self.connection.send_bytes(data)
+        since = time.monotonic()
+        while time.monotonic() - since < patience_s:
+            if not wanted():
+                raise NotWanted
+            if self.connection.poll(_LOOK_S):
+                said = self.connection.recv()
+                if isinstance(said, bytes):
+                    return Result.of(said)
+                finished.add(said)
+                since = time.monotonic()
+        raise TimeoutError
 
     def end(self) -> None:
         """Kill it; what it started dies with it."""
@@ -135,10 +143,9 @@ class Host:
         """Run a piece. NotWanted when nobody waits for it any more; MutatorError for a damaged one."""
         piece = Piece.of(data)
         try:
-            child = self._borrowed(wanted)
+            child = self._borrowed()
         except OSError as err:
-            ending = Ending.SHORT if is_disk_full(err) else Ending.FAILED
-            return Result(number=piece.number, ending=ending, text=str(err))
+            return Result(number=piece.number, ending=Ending.UNFIT, text=str(shortage(err) or err))
         keep = False
         try:
             result = child.run(data, piece, self.patience_s, wanted)
@@ -152,14 +159,14 @@ class Host:
             if not keep:
                 child.end()
 
-    def _borrowed(self, wanted: Wanted) -> _Child:
-        """A process that has nothing to do, or a new one."""
+    def _borrowed(self) -> _Child:
+        """A process that has nothing to do, or a new one; NotWanted once nobody starts any more."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
         answer: queue.Queue[_Child | Exception] = queue.Queue()
         self._orders.put(answer)
-        while wanted():
+        while not self._ended:
             with suppress(queue.Empty):
                 got = answer.get(timeout=_LOOK_S)
                 if isinstance(got, Exception):

@@ -23,14 +23,14 @@ class Ending(StrEnum):
 
     DONE = "done"
     UNLIKE = "unlike"  # the worker drives another golden run than the campaign's
-    SHORT = "short"  # it has no more room, memory, files or processes
+    UNFIT = "unfit"  # it has no more room, memory, files or processes, or lacks what the target needs
     DIED = "died"  # the process that runs pieces ended in the middle of it
     FAILED = "failed"  # by a defect of the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """Experiments that one worker is to run, all with the golden run `golden`.
+    """Experiments that one worker is to run, most of them with the golden run `golden`.
 
     `lines` are those of the plan, by experiment id, in the plan's order; `faults` the lines of their faults.
     A run that several experiments share is whole in one piece.
@@ -42,7 +42,7 @@ class Piece:
     lines: Mapping[str, bytes]
     faults: tuple[bytes, ...]
     runs: int = 1  # that its experiments are: several may share one
-    deaths: int = 0  # of workers, while they ran it
+    died_at: tuple[str, ...] = ()  # workers that it took down
 
     @property
     def ids(self) -> tuple[str, ...]:

@@ -98,6 +98,9 @@ class Scheduler:
         with importing("cluster"):
             import distributed  # noqa: F401
         async with connected(self.address, where=self.file) as client:
+            listens = str(client.scheduler_info()["address"])
+            if not insecure and not is_closed(listens):
+                raise refused(f"{self.address}, a scheduler that listens at {listens}", where=self.file)
             yield client
 
 

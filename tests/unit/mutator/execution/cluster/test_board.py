@@ -141,12 +141,14 @@ def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clo
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:
-        piece = taken(there, "alpha")
-        if deadly not in piece.lines:
-            there.done(piece, "alpha", 0.1)
-            done.update(piece.ids)
-        elif (found := there.died(piece, "alpha")) is not None:
-            given_up += found.lines
+        for worker in ("alpha", "beta"):
+            if (piece := there.take(worker)) is None:
+                continue
+            if deadly not in piece.lines:
+                there.done(piece, worker, 0.1)
+                done.update(piece.ids)
+            elif (found := there.died(piece, worker)) is not None:
+                given_up += found.lines
     assert given_up == [deadly]
     assert sorted([*done.elements(), deadly]) == sorted(ids)
 
@@ -157,9 +159,54 @@ def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids:
     piece = taken(there, "alpha")
     deadly = piece.ids[-1]
     assert there.died(piece, "alpha", deadly) is None
-    apart = next(one for one in iter(lambda: taken(there, "alpha"), None) if deadly in one.lines)
+    apart = next(one for one in iter(lambda: taken(there, "beta"), None) if deadly in one.lines)
     assert apart.ids == (deadly,)
-    assert there.died(apart, "alpha", deadly) is not None
+    assert there.died(apart, "beta", deadly) is not None
+
+
+def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock) -> None:
+    """A worker tries again what it died of only when it is alone, and does not repeat it when it is late."""
+    there = board(folder, clock)
+    deadly = taken(there, "alpha")
+    there.died(deadly, "alpha")
+    while (piece := there.take("alpha")) is not None:
+        assert piece.number != deadly.number
+        there.done(piece, "alpha", 0.1)
+    assert taken(there, "beta").number == deadly.number
+    clock.now += 60.0
+    assert there.take("alpha") is None
+    there.give_back(deadly, "beta")
+    there.leave("beta")
+    assert taken(there, "alpha").number == deadly.number
+
+
+def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, clock: Clock) -> None:
+    """The death of one of two workers at a piece takes nothing from the other."""
+    for first in ("alpha", "beta"):
+        there = board(folder, clock)
+        late = taken(there, "alpha")
+        while (piece := there.take("beta")) is not None:
+            there.done(piece, "beta", 0.1)
+        clock.now += 60.0
+        assert taken(there, "beta") == late
+        assert there.died(late, first) is None
+        assert there.take(first) is None
+        assert there.done(late, "beta" if first == "alpha" else "alpha", 0.1)
+        assert there.is_empty
+
+
+def test_a_worker_waits_longer_for_others_where_runs_are_long(folder: RunFolder, clock: Clock) -> None:
+    """An idle worker leaves the proof of its own runs to others that are still at work of a usual length."""
+    there = board(folder, clock, taken(board(folder, clock), "alpha").ids[:1])
+    first = taken(there, "alpha")
+    there.done(first, "alpha", 60.0 * first.runs)
+    last = taken(there, "beta")
+    while (piece := there.take("alpha")) is not None:
+        there.done(piece, "alpha", 60.0 * piece.runs)
+    clock.now += 50.0
+    assert there.take("alpha") is None
+    there.done(last, "beta", 60.0 * last.runs)
+    assert taken(there, "beta").kind is Kind.PROVE
 
 
 def test_random_losses_lose_nothing(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
@@ -177,7 +224,7 @@ def test_random_losses_lose_nothing(folder: RunFolder, clock: Clock, ids: list[s
         fate = draw.random()
         if fate < 0.2:
             there.give_back(piece, who)
-        elif fate < 0.25 and piece.deaths == 0:
+        elif fate < 0.25 and not piece.died_at:
             there.died(piece, who)
         elif there.done(piece, who, 0.3):
             done.update(piece.ids)

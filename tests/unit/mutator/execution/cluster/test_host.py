@@ -98,6 +98,18 @@ def _first(host: Host) -> int:
     return found[0]
 
 
+def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
+    host: Host, sent: tuple[Bundle, Piece]
+) -> None:
+    """A worker whose process does not get ready, as without room on its disk, says why, and did not die of
+    the piece."""
+    (host.folder / "meta.json").unlink()
+    with attended(host):
+        result = host.run(sent[1].packed(), lambda: True)
+    assert result.ending is Ending.UNFIT
+    assert "meta.json" in result.text
+
+
 def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece]) -> None:
     """A piece that nobody waits for ends within a second, with its process."""
     asked: list[float] = []

@@ -4,19 +4,23 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
 from mutator.errors import MutatorError
-from mutator.execution.cluster import connecting
+from mutator.execution.cluster import connecting, where
 from mutator.execution.cluster.where import Local, Scheduler, Where, parse
 
 from .loops import run
 
 
-async def opened(where: Where, insecure: bool = False) -> None:
-    async with where.open(insecure=insecure):
+async def opened(place: Where, insecure: bool = False) -> None:
+    async with place.open(insecure=insecure):
         pass
 
 
@@ -60,10 +64,10 @@ def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
     """As `dask scheduler --scheduler-file` writes it; an error about it names the file."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
-    where = parse(str(file))
-    assert where == Scheduler(address="tcp://10.0.0.1:8786", file=file)
+    found = parse(str(file))
+    assert found == Scheduler(address="tcp://10.0.0.1:8786", file=file)
     with pytest.raises(MutatorError, match=r"scheduler.json: tcp://10.0.0.1:8786, which is neither"):
-        run(opened(where))
+        run(opened(found))
 
 
 @pytest.mark.parametrize(
@@ -106,6 +110,21 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
         MutatorError, match=r"neither on the loopback nor encrypted.*tls://.*`insecure_network`"
     ):
         run(opened(parse("tcp://10.0.0.1:8786")))
+
+
+def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """`dask scheduler` listens on all networks: reached over the loopback, it is as open as it was."""
+
+    @asynccontextmanager
+    async def found(*given: Any, **more: Any) -> AsyncIterator[Any]:
+        yield SimpleNamespace(scheduler_info=lambda: {"address": "tcp://10.0.0.5:8786"})
+
+    monkeypatch.setattr(where, "connected", found)
+    with pytest.raises(MutatorError, match=r"127.0.0.1:8786, a scheduler that listens at tcp://10.0.0.5"):
+        run(opened(parse("tcp://127.0.0.1:8786")))
+    run(opened(parse("tcp://127.0.0.1:8786"), insecure=True))
 
 
 def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,292 @@
+"""Work dealt out by Dask, which carries the bytes and knows who is there.
+
+Which worker does what is the board's business: each task names its worker, so that a worker has at most two
+for each of its threads, and a task that is over is released at once.
+"""
+
+import asyncio
+import time
+import uuid
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from distributed import Client, Future
+
+from mutator._common.files import DiskFull
+from mutator.errors import MutatorError
+from mutator.execution.cluster import dask_side
+from mutator.execution.cluster.board import Board
+from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.calls import Cut, Refused, answer, call, submit
+from mutator.execution.cluster.crew import Crew, describe
+from mutator.execution.cluster.intake import Intake
+from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.execution.session import Session
+from mutator.verification import equivalence
+
+_LOOK_S = 0.5  # how often it is looked who is there
+_ALONE_S = 60.0  # without any worker, until the command gives up
+_AHEAD = 2  # pieces that a thread of a worker has at once: one waits while the other is done
+_FAILURES = 3  # of a worker's machine, until it gets no more work
+_PAUSE_S = 0.1  # of a worker for whom there is nothing to do
+_PART_S = 5.0  # for workers to drop the run
+_PATIENCE_S = 30.0  # with a scheduler that does not answer
+
+
+class _Gone(Exception):
+    """The scheduler does not answer any more."""
+
+
+@dataclass
+class _Tended:
+    """A worker that is there: what is done with it, and the pieces that it has, oldest first."""
+
+    name: str
+    address: str
+    slots: int
+    lease: "Future[None] | None" = None  # the task that is its part in the run
+    task: "asyncio.Task[None] | None" = None
+    has: dict[int, Piece] = field(default_factory=dict)
+    is_cut: bool = False  # it is to be let in anew
+    failures: int = 0  # since it finished something
+    ailment: str = ""  # the last of them
+    facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted
+
+
+class Deal:
+    """The work of a session, dealt out to the workers of a scheduler. `remark` is called with what a person
+    should know; `queued` is how many workers will come in time, None where nobody knows."""
+
+    def __init__(
+        self, session: Session, client: Client, remark: Callable[[str], None], *, queued: int | None
+    ) -> None:
+        self._session, self._client, self._remark, self._queued = session, client, remark, queued
+        folder = session.folder
+        self._bundle = Bundle.of(session.workspace, folder, session.engine)
+        self._board = Board(folder, session.pending, session.proof)
+        self._intake = Intake(folder, session.manifest, session.worker_name("cluster"))
+        self._crew = Crew(folder.stretches[-1], accept=session.accept_versions)
+        self._run = f"mutator-{uuid.uuid4().hex}"
+        self._tended: dict[str, _Tended] = {}
+        self._changed = asyncio.Event()  # somebody who found nothing to do may find something now
+        self._writing = asyncio.Lock()
+        self._writes: set[asyncio.Task[None]] = set()
+        self._forked = False
+        self._alone_since = time.monotonic()
+
+    async def run(self) -> None:
+        """Until all is done, or nobody is left to do it."""
+        try:
+            while not (self._board.is_empty and not self._writes) and not self._session.problem:
+                await self._meet()
+                self._drop_needless_proof()
+                self._session.working = self._told()
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._changed.wait(), _LOOK_S)
+                self._changed.clear()
+        except _Gone:
+            self._session.problem = (
+                f"the scheduler at {self._address} does not answer any more; nothing that finished is lost: "
+                "start it and its workers again, and give the same command"
+            )
+        except DiskFull as err:
+            self._session.problem = str(err)
+        finally:
+            tasks = [one.task for one in self._tended.values() if one.task is not None]
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            await self._part()
+            self._session.working = ""
+            await asyncio.gather(*self._writes, return_exceptions=True)
+            self._intake.close()
+
+    async def _part(self) -> None:
+        """Have the workers drop the run; who does not answer does so when the client is gone."""
+        present = [one for one in self._tended.values() if one.lease is not None]
+        parting = [call(self._client, one.address, dask_side.leave, self._run) for one in present]
+        with suppress(TimeoutError):
+            async with asyncio.timeout(_PART_S):
+                await asyncio.gather(*parting, return_exceptions=True)
+        for one in present:
+            if one.lease is not None:
+                one.lease.release()
+
+    @property
+    def _address(self) -> str:
+        return str(self._client.scheduler.address) if self._client.scheduler else "its address"
+
+    def _told(self) -> str:
+        link = self._client.dashboard_link
+        return self._crew.told() + (f"; {link}" if link else "")
+
+    async def _meet(self) -> None:
+        """See who is there; tend who is new, and take back the work of who is gone."""
+        try:
+            async with asyncio.timeout(_PATIENCE_S):
+                scheduler = self._client.scheduler
+                known = await scheduler.identity(n_workers=-1) if scheduler is not None else None
+        except (OSError, TimeoutError):
+            known = None
+        if known is None:
+            raise _Gone
+        there = {f"{address} {one['id']}": one for address, one in known["workers"].items()}
+        for key in [key for key, one in self._tended.items() if key not in there or one.is_cut]:
+            await self._mourn(self._tended.pop(key))
+        for key in there.keys() - self._tended.keys():
+            address, told = key.partition(" ")[0], there[key]
+            name = str(told["name"])
+            name = name if name == address else f"{name} at {address}"
+            one = _Tended(name, address, int(told["nthreads"]))
+            one.task = asyncio.create_task(self._tend(one))
+            self._tended[key] = one
+        for one in self._tended.values():
+            if one.task is not None and one.task.done():
+                one.task.result()  # raises what ended the work of all
+        self._check_left()
+
+    async def _mourn(self, one: _Tended) -> None:
+        """A worker is gone: what it was at may be why, what it had waiting is not."""
+        assert one.task is not None
+        one.task.cancel()
+        await asyncio.gather(one.task, return_exceptions=True)
+        for place, piece in enumerate(one.has.values()):
+            if place < one.slots:
+                lost = Result(number=piece.number, ending=Ending.DIED, text=f"worker {one.name} was lost")
+                await self._died(piece, one, lost)
+            else:
+                self._board.give_back(piece, one.name)
+
+    def _check_left(self) -> None:
+        """End the session when nobody is left, or comes, to do the work."""
+        if any(one.task is not None and not one.task.done() for one in self._tended.values()):
+            self._alone_since = time.monotonic()
+        elif len(self._tended) >= (self._queued or 1):
+            reasons = "; ".join(dict.fromkeys(self._crew.refused.values()))
+            self._session.problem = f"no worker is left that may do the work: {reasons}"
+        elif self._queued is None and time.monotonic() - self._alone_since > _ALONE_S:
+            self._session.problem = (
+                f"no worker at {self._address} for {_ALONE_S:.0f} s; start some (`dask worker`), and give "
+                "the same command"
+            )
+
+    def _drop_needless_proof(self) -> None:
+        """Once all is run, nothing is to be proved if nothing was forked."""
+        if self._board.ran_all and self._session.proof and not self._forked:
+            self._forked = True  # asked once
+            if equivalence.needless(self._session.folder) is not None:
+                self._board.drop_proof()
+
+    async def _tend(self, one: _Tended) -> None:
+        """Let a worker in, and have it work as long as it is there."""
+        facts: Mapping[str, Any] = {}
+        try:
+            facts = await call(self._client, one.address, dask_side.facts, tuple(self._crew.packages))
+            if why := self._crew.objection(facts):
+                raise Refused(why)
+            data, digest = self._bundle.data, self._bundle.digest
+            await call(self._client, one.address, dask_side.deliver, self._run, one.name, data, digest)
+            one.lease = submit(self._client, one.address, dask_side.attend, self._run)
+            self._crew.let_in(one.name, facts)
+            self._board.join(one.name, one.slots)
+            one.facts = facts
+            await self._employ(one, one.lease)
+        except Refused as why:
+            for piece in one.has.values():
+                self._board.give_back(piece, one.name)
+            one.has.clear()
+            one.is_cut = isinstance(why, Cut)
+            if not one.is_cut:
+                self._crew.refuse(one.name, str(why))
+                self._remark(f"worker {describe(one.name, facts)} gets no work: {why}")
+        finally:
+            self._crew.leave(one.name)
+            self._board.leave(one.name)
+            self._changed.set()
+
+    async def _employ(self, one: _Tended, lease: "Future[None]") -> None:
+        """Give a worker pieces until it is cancelled, or its part in the run ends."""
+
+        async def watch() -> None:
+            await answer(lease)
+            raise Refused("it left the run")
+
+        try:
+            async with asyncio.TaskGroup() as group:
+                group.create_task(watch())
+                for _ in range(one.slots * _AHEAD):
+                    group.create_task(self._serve(one))
+        except* Refused as found:
+            raise found.exceptions[0] from None
+        except* MutatorError as found:
+            raise found.exceptions[0] from None
+
+    async def _serve(self, one: _Tended) -> None:
+        """Give a worker one piece after the other."""
+        while True:
+            if one.failures >= _FAILURES:
+                raise Refused(one.ailment)
+            piece = self._board.take(one.name, ahead=len(one.has) >= one.slots)
+            if piece is None:
+                await asyncio.sleep(_PAUSE_S)
+                continue
+            one.has[piece.number] = piece
+            data = await call(self._client, one.address, dask_side.work, self._run, piece.packed())
+            del one.has[piece.number]
+            await self._take(one, piece, _read(data, piece))
+
+    async def _take(self, one: _Tended, piece: Piece, result: Result) -> None:
+        """Take in what came of a piece."""
+        if result.ending is Ending.DONE:
+            one.failures = 0
+            if self._board.done(piece, one.name, result.seconds):
+                await self._done(piece, one, result)
+            self._changed.set()
+            return
+        one.ailment = result.text
+        if result.ending in (Ending.DIED, Ending.FAILED):
+            await self._died(piece, one, result)
+            return
+        self._board.give_back(piece, one.name)
+        one.failures += 1
+        if result.ending is Ending.UNLIKE:
+            raise Refused(result.text)
+
+    async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
+        """A piece is done for the first time."""
+        if one.facts:  # its first results: the run says where they come from
+            self._session.note_machine({"worker": one.name, **one.facts})
+            one.facts = {}
+        for other in self._tended.values():  # it was not the piece's fault
+            other.failures += other.name in piece.died_at and other is not one
+        self._forked |= result.forked
+        self._crew.finished(one.name, len(piece.lines))
+        await self._write(self._intake.take, piece, result)
+
+    async def _died(self, piece: Piece, one: _Tended, result: Result) -> None:
+        """A worker, or its process, died of a piece: it is tried again, or given up."""
+        if (given_up := self._board.died(piece, one.name, result.at)) is not None:
+            what = "takes down what runs it, and did so" if result.ending is Ending.DIED else "failed"
+            await self._write(self._intake.give_up, given_up, f"{what} twice: {result.text}")
+
+    async def _write(self, function: Callable[[Piece, Any], None], piece: Piece, what: Any) -> None:
+        """Write into the run folder, one after the other. What has begun when all ends is written."""
+
+        async def in_turn() -> None:
+            async with self._writing:
+                await asyncio.to_thread(function, piece, what)
+
+        write = asyncio.create_task(in_turn())
+        self._writes.add(write)
+        write.add_done_callback(self._writes.discard)
+        await asyncio.shield(write)
+
+
+def _read(data: bytes, piece: Piece) -> Result:
+    """What came of a piece; a result that arrived damaged is none."""
+    try:
+        return Result.of(data)
+    except MutatorError as err:
+        return Result(number=piece.number, ending=Ending.UNFIT, text=str(err))

@@ -1,0 +1,76 @@
+"""The pending work of a run folder by golden run, read from the plan as it is asked for."""
+
+import json
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+from typing import Any
+
+from mutator.campaigns.chunks import Pending
+from mutator.execution.cluster.pieces import Piece
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+
+_OF_A_RUN = ("fault", "trigger", "seed")  # equal in experiments that are one run in several scenarios
+
+Run = dict[str, bytes]  # lines of the plan by experiment id: a run, and those that share it
+Faults = Mapping[str, bytes]  # lines of the plan's faults by id
+
+
+@dataclass
+class Group:
+    """What is left of the work with one golden run."""
+
+    golden: str
+    runs: Iterator[Run]
+    left: int  # experiments that were not cut off yet
+    again: deque[Piece] = field(default_factory=deque)  # pieces that came back
+
+    @property
+    def waiting(self) -> int:
+        return self.left + sum(len(piece.lines) for piece in self.again)
+
+
+def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> dict[str, Group]:
+    """The pending work by golden run. A chunk has one."""
+    chunks: dict[str, list[Pending]] = {}
+    for one in pending:
+        first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
+        chunks.setdefault(golden_of(folder, first, faults), []).append(one)
+    return {
+        golden: Group(golden, _runs_of(folder, ours), sum(len(one.places) for one in ours))
+        for golden, ours in chunks.items()
+    }
+
+
+def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
+    """What is left of these chunks, run by run: those that share one are side by side."""
+    for one in pending:
+        lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
+        read = [(_read(lines[place]), lines[place]) for place in one.places]
+        for _, same in groupby(read, key=lambda item: [item[0][key] for key in _OF_A_RUN]):
+            yield {data["id"]: line for data, line in same}
+
+
+def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
+    """The name of the golden run that the experiment on a line of the plan is compared with."""
+    data = _read(line)
+    fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
+    experiment = plan_file.experiment_from(data, {fault.id: fault})
+    return folder.golden_of(experiment).key
+
+
+def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
+    """The lines of the faults that these experiments have, each once."""
+    return tuple(dict.fromkeys(faults[_read(line)["fault"]] for line in lines.values()))
+
+
+def id_of(line: bytes) -> str:
+    """The id of the experiment on a line of the plan."""
+    return str(_read(line)["id"])
+
+
+def _read(line: bytes) -> dict[str, Any]:
+    data: dict[str, Any] = json.loads(line)
+    return data

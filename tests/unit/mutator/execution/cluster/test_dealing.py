@@ -1,0 +1,255 @@
+"""Work dealt out to workers that fail in many ways: nobody's fault is taken for another's."""
+
+import asyncio
+import json
+import threading
+import time
+import warnings
+from collections.abc import Callable, Generator, Sequence
+from contextlib import asynccontextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from distributed.client import FutureCancelledError
+
+from mutator.campaigns.chunks import pending
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.errors import MutatorWarning
+from mutator.execution.cluster import dask_workers
+from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.crew import Crew
+from mutator.execution.cluster.dask_workers import ClusterWorkers
+from mutator.execution.cluster.dealing import Deal
+from mutator.execution.cluster.intake import Intake
+from mutator.execution.cluster.pieces import Ending, Piece, Result
+from mutator.model import Record, Status
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from .loops import run
+
+FACTS = {"host": "here", "cpu": "", "platform": "", "python": "", "mutator": "", "blas": []}
+Work = Callable[[Piece], Result]
+
+
+def healthy(piece: Piece) -> Result:
+    """What a worker makes of a piece."""
+    line = {"detail": "", "hazards": [], "max_dev": [], "outcome": "masked", "status": "ok", "tree": ""}
+    line |= {"activation": None, "alerts": [], "t_manifest": None, "trace_digest": ""}
+    records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.lines]
+    return Result(
+        number=piece.number,
+        ending=Ending.DONE,
+        seconds=0.5 * piece.runs,
+        records=tuple(text.encode() for text in records),
+    )
+
+
+def sick(ending: Ending, deadly: str = "") -> Work:
+    """A worker on which each piece ends like this, or only those with this experiment."""
+
+    def work(piece: Piece) -> Result:
+        if deadly and deadly not in piece.lines:
+            return healthy(piece)
+        return Result(number=piece.number, ending=ending, text="the reason", at=deadly or piece.ids[0])
+
+    return work
+
+
+class Answer:
+    """A future of Dask's."""
+
+    def __init__(self, future: "asyncio.Future[Any]") -> None:
+        self.future = future
+
+    def __await__(self) -> Generator[Any, None, Any]:
+        return self.future.__await__()
+
+    def release(self) -> None:
+        self.future.cancel()
+
+
+class Workers:
+    """A client of a scheduler with these workers, who answer at once."""
+
+    dashboard_link = None
+
+    def __init__(self, **workers: Work) -> None:
+        self.workers, self.scheduler, self.address = workers, self, "here"
+        self.began: list[str] = []  # pieces, by worker
+        self.cut_at = -1  # pieces, until the scheduler forgets this client's tasks
+        self._open: list[asyncio.Future[Any]] = []
+
+    async def identity(self, n_workers: int) -> dict[str, Any]:
+        """As the scheduler tells it."""
+        told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
+        return {"workers": {f"tcp://{name}": one for name, one in told.items()}}
+
+    def submit(
+        self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
+    ) -> Answer:
+        """As Dask's."""
+        future = asyncio.get_running_loop().create_future()
+        self._open.append(future)
+        if function.__name__ == "work":
+            name = workers[0].removeprefix("tcp://")
+            self.began.append(name)
+            asyncio.get_running_loop().call_later(0.02, self._end, future, name, given[1])
+            if len(self.began) == self.cut_at:
+                for one in self._open:
+                    if not one.done():
+                        one.set_exception(FutureCancelledError("some", "lost"))
+        elif function.__name__ != "attend":
+            future.set_result(FACTS if function.__name__ == "facts" else None)
+        return Answer(future)
+
+    def _end(self, future: "asyncio.Future[Any]", name: str, piece: bytes) -> None:
+        if not future.done():
+            future.set_result(self.workers[name](Piece.of(piece)).packed())
+
+
+@pytest.fixture
+def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
+    """A plan of twelve experiments."""
+    return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
+
+
+@pytest.fixture
+def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A session in which all is to be run; the workers' versions do not matter."""
+    monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
+    monkeypatch.setattr(Crew, "objection", lambda *given: "")
+    folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
+    return SimpleNamespace(
+        workspace=toycar,
+        folder=folder,
+        manifest=toycar.manifest("toycar"),
+        pending=pending(folder, {}),
+        proof=(),
+        engine="fork",
+        accept_versions=True,
+        worker_name=lambda name: f"0001-{name}",
+        note_machine=lambda machine: None,
+        problem="",
+        interrupted=False,
+        working="",
+    )
+
+
+def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[dict[str, Record], list[str]]:
+    """The records that the run folder has afterwards, and what was remarked."""
+    remarks: list[str] = []
+
+    async def deal() -> None:
+        client: Any = workers
+        async with asyncio.timeout(20.0):
+            await Deal(session, client, remarks.append, queued=queued).run()
+
+    run(deal())
+    return dict(session.folder.records()), remarks
+
+
+def errors(records: dict[str, Record]) -> list[str]:
+    return [name for name, one in records.items() if one.status is Status.HARNESS_ERROR]
+
+
+@pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
+def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending) -> None:
+    """What ends badly on one worker alone is done by the other; the sick one is refused by name with the
+    reason, and no experiment is blamed."""
+    records, remarks = dealt(session, Workers(odd=sick(ending), alpha=healthy))
+    assert (len(records), errors(records), session.problem) == (12, [], "")
+    assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
+
+
+@pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
+def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Ending) -> None:
+    """What ends badly on every worker gets a harness error with the reason; both workers go on."""
+    deadly = list(plan_file.ids(session.folder.path))[5]
+    records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
+    assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
+    assert records[deadly].detail.endswith("twice: the reason")
+
+
+def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
+    """When the command's connection breaks for a moment, the scheduler forgets all tasks, and the command
+    gives its work again instead of waiting for ever."""
+    workers = Workers(alpha=healthy, beta=healthy)
+    workers.cut_at = 2
+    records, remarks = dealt(session, workers)
+    assert (len(records), errors(records), session.problem, remarks) == (12, [], "", [])
+
+
+def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> None:
+    """A cluster file asks for two workers: the work waits for the second one when the first is refused."""
+    workers = Workers(odd=sick(Ending.UNLIKE))
+
+    async def late() -> None:
+        await asyncio.sleep(1.5)
+        workers.workers["alpha"] = healthy
+
+    async def deal() -> None:
+        client: Any = workers
+        async with asyncio.timeout(20.0), asyncio.TaskGroup() as group:
+            group.create_task(late())
+            group.create_task(Deal(session, client, lambda remark: None, queued=2).run())
+
+    run(deal())
+    assert (len(session.folder.records()), session.problem) == (12, "")
+
+
+def test_a_refused_worker_is_the_last_where_nobody_queues(session: Any) -> None:
+    """The command ends with the reason."""
+    dealt(session, Workers(odd=sick(Ending.UNLIKE)))
+    assert session.problem == "no worker is left that may do the work: the reason"
+
+
+def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is given up is not written while results are: both append to the same file."""
+    inside, most = [0], [0]
+
+    def slow(real: Callable[..., None]) -> Callable[..., None]:
+        def call(*given: Any) -> None:
+            inside[0] += 1
+            most[0] = max(most[0], inside[0])
+            time.sleep(0.2)
+            real(*given)
+            inside[0] -= 1
+
+        return call
+
+    for name in ("take", "give_up"):
+        monkeypatch.setattr(Intake, name, slow(getattr(Intake, name)))
+    deadly = next(iter(plan_file.ids(session.folder.path)))
+    work = sick(Ending.DIED, deadly)
+    records, _ = dealt(session, Workers(alpha=work, beta=work, gamma=work))
+    assert errors(records) == [deadly]
+    assert most == [1]
+
+
+def test_a_remark_that_is_an_error_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where warnings are errors, nothing goes on in the background after the first one."""
+
+    class Place:
+        @asynccontextmanager
+        async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]
+            yield None
+
+    class Remarking:
+        def __init__(self, session: Any, client: Any, remark: Callable[[str], None], **more: Any) -> None:
+            self._remark = remark
+
+        async def run(self) -> None:
+            self._remark("something")
+            await asyncio.sleep(60.0)
+
+    monkeypatch.setattr(dask_workers, "Deal", Remarking)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(MutatorWarning, match="something"):
+            ClusterWorkers(Place()).run(session)
+    assert not [one for one in threading.enumerate() if one.name == "cluster" and one.is_alive()]
