@@ -8,9 +8,10 @@ from mutator.api.selection import WorkspaceLike, open_workspace
 from mutator.campaigns.filters import compile_filter
 from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
-from mutator.review import catalogue
+from mutator.review import catalogue, gate
 from mutator.review.catalogue import Group
 from mutator.review.columns import COLUMNS
+from mutator.review.commits import user_name
 from mutator.review.decisions import Change, Kind, Review, State, record
 from mutator.review.decisions import load_review as load_decisions
 from mutator.review.page import write_page
@@ -33,6 +34,19 @@ class ReviewedGroups:
     def undecided(self) -> tuple[Group, ...]:
         """The groups that are new, or have changed since the decision about them."""
         return tuple(g for g in self.groups if self.review.state(g) in (State.NEW, State.CHANGED))
+
+    @property
+    def lacking(self) -> tuple[tuple[Group, str], ...]:
+        """What `run --require-reviewed` would refuse, and why: `missing, 12 experiments`."""
+        return tuple(
+            (group, f"{gate.reason(self.review, group)}, {gate.share(group)}")
+            for group in self.review.in_turn(self.groups)
+            if self.review.state(group) is not State.APPROVED
+        )
+
+    def reread(self) -> "ReviewedGroups":
+        """The same groups with what is kept of them now."""
+        return replace(self, review=load_decisions(self.workspace, self.review.target))
 
     def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
         """Those for which the filters hold: expressions over what `facts` gives."""
@@ -144,3 +158,8 @@ def facts(review: Review, group: Group) -> dict[str, object]:
         "faults": len(group.faults),
         "runs": group.runs,
     }
+
+
+def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
+    """What git calls who works here (`user.name`); None if it does not know."""
+    return user_name(open_workspace(workspace))

@@ -32,6 +32,7 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
     heads, rows = value_table(group)
     return facts | {
         "diff": group.diff,
+        "changes": review.changes(group),
         "values": [dict(zip(heads, row, strict=True)) for row in rows],
         "triggers": [asdict(trigger) for trigger in group.triggers],
     }
@@ -73,14 +74,37 @@ def _when(group: "Group") -> str:
     return f"{group.trigger}, {group.hold}" if group.trigger else "always"
 
 
+def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
+    """What was said of a group."""
+    state, flag = review.state(group).value, review.flag(group.id)
+    terminal.say(f"group {group.id}: {state}", style=STYLES[state])
+    if decision := review.describe(group):
+        terminal.say(decision)
+    if flag:
+        terminal.say(f"flagged by {flag.by} on {flag.at[:10]}")
+    for one in review.remarks(group.id):
+        terminal.say(f"{one.by}{f' on {one.at[:10]}' if one.at else ''}: {one.text}")
+
+
+def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
+    """What has changed of a group since it was decided."""
+    _print_head(terminal, review, group)
+    terminal.say(f"  {group.what}", style="bold")
+    terminal.say()
+    if changes := review.changes(group):
+        terminal.diff(changes)
+    elif review.changed(group):
+        terminal.say("what was seen then is not kept")
+    else:
+        terminal.say("nothing has changed since" if review.decision(group.id) else "nobody has decided yet")
+    terminal.say()
+
+
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     """One group: what it is, what was said of it, diff with holes, values, triggers."""
     from mutator.review.readable_groups import condition_lines, value_table
 
-    state = review.state(group).value
-    terminal.say(f"group {group.id}: {state}", style=STYLES[state])
-    if decision := review.describe(group):
-        terminal.say(decision)
+    _print_head(terminal, review, group)
     for injection in group.injections:
         terminal.say(f"  {injection}", style="bold")
     runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from mutator.cli import review_view
-from mutator.cli.console import Terminal, short_path
+from mutator.cli.console import Terminal, short_path, show_error
 from mutator.errors import MutatorError
 
 if TYPE_CHECKING:
@@ -16,8 +16,11 @@ if TYPE_CHECKING:
 KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 
 
-def walk_through(terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], by: str) -> None:
-    """Show every group that is new or changed and do what is answered; each decision is kept at once.
+def walk_through(
+    terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], reviewer: Callable[[], str]
+) -> None:
+    """Show every group that is new or changed and do what is answered; each decision is kept at once. Where
+    it cannot be, as somebody else has said something meanwhile, the question is asked again.
 
     MutatorError, before anything is made, when there is nobody to answer.
     """
@@ -27,17 +30,25 @@ def walk_through(terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"
             where="mutator review walk",
             remedy="decide by `mutator review approve GROUP... --by NAME`, or `reject`",
         )
-    found = load()
-    left = found.undecided
-    for number, group in enumerate(left, start=1):
+    by, found = reviewer(), load()
+    waiting = list(enumerate(found.undecided, start=1))
+    count = len(waiting)
+    while waiting:
+        number, group = waiting.pop(0)
         review_view.print_group(terminal, found.review, group)
-        key = _asked(terminal, f"{number} of {len(left)}")
+        key = _asked(terminal, f"{number} of {count}")
         if key == "q":
             break
         if key == "s":
             continue
         remark = typer.prompt("remark (Enter: none)", default="", show_default=False)
-        found = (found.approve if key == "a" else found.reject)([group], by, remark)
+        try:
+            found = (found.approve if key == "a" else found.reject)([group], by, remark)
+        except MutatorError as error:
+            show_error(error)
+            found = found.reread()
+            waiting.insert(0, (number, group))
+            continue
         style = review_view.STYLES[found.review.state(group).value]
         terminal.say(f"{group.id} {found.review.describe(group)}", style=style)
     review = found.review

@@ -9,35 +9,22 @@ from typer.core import TyperGroup
 
 import mutator
 from mutator._common.text import counted
-from mutator.cli import review_view
+from mutator.cli import review_changes, review_view
 from mutator.cli.console import Terminal, short_path
 from mutator.cli.options import Json, Manifest, Place, Reading, Seed, with_place
-from mutator.errors import MutatorError
-from mutator.review.columns import COLUMNS
+from mutator.cli.review_options import (
+    By,
+    Campaign,
+    ExcludeGroups,
+    Groups,
+    OnlyGroups,
+    Specs,
+    load,
+    reviewer,
+)
 
 if TYPE_CHECKING:
     from mutator.review.catalogue import Group
-
-Campaign = Annotated[
-    str | None,
-    typer.Option(metavar="NAME", help="What this campaign runs, with its readings and triggers."),
-]
-Specs = Annotated[
-    list[str] | None,
-    typer.Option("--spec", metavar="SPEC", help="Only these specs, globs or spec files; may be repeated."),
-]
-OnlyGroups = Annotated[
-    str | None,
-    typer.Option("--only", metavar="EXPR", help=f"Only groups for which this holds: {', '.join(COLUMNS)}."),
-]
-ExcludeGroups = Annotated[
-    str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups for which this holds.")
-]
-Groups = Annotated[
-    list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the starts of them.")
-]
-By = Annotated[str, typer.Option("--by", metavar="NAME", help="Who has looked.")]
-Remark = Annotated[str, typer.Option(metavar="TEXT", help="Kept with the decision.")]
 
 EXAMPLES = """\b
 Examples:
@@ -46,13 +33,17 @@ Examples:
   mutator review --only 'state == "new" and match(file, "*radar*")'
   mutator review show 3f9a                         one group: diff with holes, values
   mutator review show 3f9a --pictures DIR          what an image effect does to a picture, too
+  mutator review show 3f9a --changes               what has changed since it was decided
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
+  mutator review approve --only 'state == "new" and model == "offset"'
+  mutator review remark 3f9a --text "why not below 10 m?"
+  mutator review status --campaign quickstart      what is stale and why, what the campaign lacks
   mutator review walk --by "A. Reviewer"           one after the other
   mutator review page --out review.html
 
 \b
-`mutator review` alone is `mutator review list`. Decisions are kept in fault_library/reviews/, for version
-control; `mutator run --require-reviewed` runs nothing but what is approved there.
+`mutator review` alone is `mutator review list`. What reviewers say is kept in fault_library/reviews/, for
+version control; `mutator run --require-reviewed` runs nothing but what is approved there.
 """
 
 
@@ -75,8 +66,13 @@ def register(app: typer.Typer) -> None:
     for name, verb in (
         ("list", list_groups),
         ("show", show),
-        ("approve", approve),
-        ("reject", reject),
+        ("status", status),
+        ("approve", review_changes.approve),
+        ("reject", review_changes.reject),
+        ("clear", review_changes.clear),
+        ("remark", review_changes.remark),
+        ("flag", review_changes.flag),
+        ("unflag", review_changes.unflag),
         ("walk", walk),
         ("page", page),
     ):
@@ -103,13 +99,16 @@ def list_groups(
 ) -> None:
     """List groups, new and changed ones first (what `review` alone does)."""
     terminal = Terminal(as_json)
-    found = _load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
+    found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
     review_view.print_list(terminal, found.review, found.groups)
 
 
 @with_place
 def show(
     groups: Groups,
+    changes: Annotated[
+        bool, typer.Option("--changes", help="Show only what has changed since the decision, as a diff.")
+    ] = False,
     pictures: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Write pictures before and after an image effect there, too."),
@@ -125,10 +124,10 @@ def show(
 ) -> None:
     """Show a group: its diff with holes, and the values that fill them."""
     terminal = Terminal(as_json)
-    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
+    found = load(terminal, place, campaign, specs, reading, seed, manifest)
     shown = found.find(groups)
     for group in () if as_json else shown:
-        review_view.print_group(terminal, found.review, group)
+        (review_view.print_changes if changes else review_view.print_group)(terminal, found.review, group)
     written: dict[str, dict[str, str]] = {}
     if pictures:
         written = _write_pictures(terminal, place, found.review.target, shown, pictures)
@@ -154,10 +153,7 @@ def _write_pictures(
 
 
 @with_place
-def approve(
-    groups: Groups,
-    by: By,
-    remark: Remark = "",
+def status(
     campaign: Campaign = None,
     specs: Specs = None,
     reading: Reading = None,
@@ -167,48 +163,18 @@ def approve(
     *,
     place: Place,
 ) -> None:
-    """Approve groups as they are now."""
+    """Say how far the review is: how many groups are in which state, what has changed since it was decided
+    and what of it, what is flagged, and with --campaign what keeps it from running."""
+    from mutator.cli.review_status import print_status
+
     terminal = Terminal(as_json)
-    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
-    chosen = found.find(groups)
-    _print_decided(terminal, found.approve(chosen, by, remark), chosen)
-
-
-@with_place
-def reject(
-    groups: Groups,
-    by: By,
-    remark: Remark = "",
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
-    *,
-    place: Place,
-) -> None:
-    """Reject groups as they are now: `run --require-reviewed` does not run them."""
-    terminal = Terminal(as_json)
-    found = _load(terminal, place, campaign, specs, reading, seed, manifest)
-    chosen = found.find(groups)
-    _print_decided(terminal, found.reject(chosen, by, remark), chosen)
-
-
-def _print_decided(terminal: Terminal, found: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
-    decided = found.review
-    if terminal.as_json:
-        terminal.emit([review_view.data(decided, group) for group in groups])
-    for group in groups:
-        terminal.say(
-            f"{group.id} {decided.describe(group)}", style=review_view.STYLES[decided.state(group).value]
-        )
-    terminal.say(f"{short_path(decided.path)}: {review_view.counts(decided, found.groups)}")
+    found = load(terminal, place, campaign, specs, reading, seed, manifest)
+    print_status(terminal, found, campaign)
 
 
 @with_place
 def walk(
-    by: By,
+    by: By = None,
     campaign: Campaign = None,
     specs: Specs = None,
     only: OnlyGroups = None,
@@ -224,11 +190,11 @@ def walk(
 
     terminal = Terminal()
 
-    def load() -> "mutator.ReviewedGroups":
-        found = _load(terminal, place, campaign, specs, reading, seed, manifest)
+    def groups() -> "mutator.ReviewedGroups":
+        found = load(terminal, place, campaign, specs, reading, seed, manifest)
         return found.matching(only, exclude)
 
-    walk_through(terminal, load, by)
+    walk_through(terminal, groups, lambda: reviewer(place, by))
 
 
 @with_place
@@ -247,33 +213,10 @@ def page(
 ) -> None:
     """Write a page of all groups, complete in itself, to look at and to copy commands from."""
     terminal = Terminal(as_json)
-    found = _load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
+    found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
     found.write_page(out)
     if as_json:
         terminal.emit({"page": str(out), "groups": len(found.groups)})
     terminal.say(
         f"{counted(len(found.groups), 'group')} in {short_path(out)} ({out.stat().st_size / 1e6:.2f} MB)"
     )
-
-
-def _load(
-    terminal: Terminal,
-    place: Place,
-    campaign: str | None,
-    specs: Sequence[str] | None,
-    reading: str | None,
-    seed: int | None,
-    manifest: str | None,
-) -> "mutator.ReviewedGroups":
-    if campaign and specs:
-        raise MutatorError("--campaign together with --spec", expected="one or the other")
-    workspace = place.workspace()
-    with terminal.wait("making the mutants"):
-        return mutator.load_review(
-            campaign=campaign,
-            specs=tuple(specs or ()),
-            reading=reading,
-            seed=seed,
-            target=manifest,
-            workspace=workspace,
-        )

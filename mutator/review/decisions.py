@@ -172,6 +172,11 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
         return _written(workspace, review, made)
 
 
+def _text_of(kind: Kind) -> str:
+    """The argument that has the text of a change."""
+    return "text" if kind is Kind.REMARK else "remark"
+
+
 def _check(change: Change) -> None:
     """MutatorError for a change by nobody, and for a remark that says nothing."""
     if not change.by:

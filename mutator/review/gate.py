@@ -58,7 +58,7 @@ def _kept(review: Review, group: Group) -> dict[str, Any]:
 
 def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Group]) -> CheckFailed:
     lines = [
-        f"  {group.id}  {_reason(review, group)}, {_share(group)}: {group.what}"
+        f"  {group.id}  {reason(review, group)}, {share(group)}: {group.what}"
         for group in review.in_turn(refused)
     ]
     many = f"{len(refused)} groups of mutants are" if len(refused) > 1 else "a group of mutants is"
@@ -76,7 +76,7 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
     )
 
 
-def _reason(review: Review, group: Group) -> str:
+def reason(review: Review, group: Group) -> str:
     """Why a group may not run: `missing`, what has `changed`, or by whom it was `rejected`."""
     state, decision = review.state(group), review.decision(group.id)
     if decision is None:
@@ -86,7 +86,7 @@ def _reason(review: Review, group: Group) -> str:
     return decision.words
 
 
-def _share(group: Group) -> str:
+def share(group: Group) -> str:
     """The part of a campaign that a group is: a number of experiments, or the canary alone."""
     return counted(group.runs, "experiment") if group.runs else "the canary"
 

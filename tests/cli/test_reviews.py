@@ -13,6 +13,7 @@ import pytest
 import typer
 
 from mutator.cli import review_walk
+from mutator.cli.app import main
 from mutator.review.catalogue import of_library
 from mutator.workspace import Workspace
 
@@ -103,12 +104,96 @@ def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]
     assert cli("review", "approve", group, *JANE, "--json").json[0]["state"] == "approved"
 
 
-def test_no_name_is_no_decision(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Somebody must have looked."""
+def test_no_name_is_no_decision(
+    cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody must have looked: who is named, or else whom git names."""
+    monkeypatch.setenv("HOME", str(root))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     group = next(iter(known))
-    assert cli("review", "approve", group).code == 2
-    assert "who has reviewed" in cli("review", "approve", group, "--by", " ").err
+    for words in ((), ("--by", " ")):
+        answer = cli("review", "approve", group, *words)
+        assert (answer.code, "expected: who has reviewed" in answer.err) == (2, True)
+        assert "give --by, or tell git: `git config user.name NAME`" in answer.err
     assert not (root / "fault_library/reviews").exists()
+    (root / ".gitconfig").write_text("[user]\nname = Git Smith\n")
+    assert " approved by Git Smith on " in cli("review", "approve", group).out
+
+
+def test_all_that_a_filter_finds_is_decided_after_a_question(
+    cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It says how many; without a terminal only --yes will do; ids and a filter at once cannot be meant."""
+    words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
+    asked = cli(*words)
+    assert (asked.code, "--only: 3 groups (3 new)" in asked.err) == (2, True)
+    assert "say --yes to approve them" in asked.err
+    questions: list[str] = []
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr(typer, "confirm", lambda text: bool(questions.append(text)))
+    assert (cli(*words).code, questions) == (0, ["approve 3 groups (3 new)?"])
+    assert not (root / "fault_library/reviews").exists()
+    assert cli(*words, "--yes").out.splitlines()[-1].endswith(": 2 new, 3 approved")
+    assert "no group for which" in cli(*words, "--yes").err
+    for wrong in ((), (next(iter(known)), "--only", "flagged")):
+        assert "expected: the ids of groups, or a filter" in cli("review", "reject", *wrong, *JANE).err
+
+
+def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """They are shown with who made them, and can be asked for; a decision that is cleared is gone."""
+    first, second, *_ = known
+    cli("review", "approve", first, *JANE)
+    cli("review", "remark", first, second, *JANE, "--text", "why not\nbelow?")
+    assert cli("review", "flag", second, "--by", "Joe").out.startswith(f"{second} new, flagged\n")
+    assert ids(cli, "--only", "flagged") == [second]
+    shown = cli("review", "show", second).out
+    assert re.search(r"^flagged by Joe on 20..-..-..$", shown, re.MULTILINE)
+    assert re.search(r"^Jane Doe on 20..-..-..: why not below\?$", shown, re.MULTILINE)
+    assert cli("review", "clear", first, *JANE, "--remark", "looked at the wrong one").code == 0
+    [data] = cli("review", "show", first, "--json").json
+    assert (data["state"], data["by"], len(data["remarks"])) == ("new", None, 2)
+    cli("review", "unflag", second, *JANE)
+    assert ids(cli, "--only", "flagged") == []
+    assert "--text: no text" in cli("review", "remark", first, *JANE, "--text", " ").err
+
+
+def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Counts, what has changed and why, what is flagged; of a campaign what keeps it from running."""
+    gap = about(known, "offset(by, low, target=gap)")
+    cli("review", "approve", *known, *JANE)
+    cli("review", "flag", gap, *JANE)
+    assert "all of small is approved" in cli("review", "status", "--campaign", "small").out
+    spec = root / "fault_library/faults/sensor/distance.yaml"
+    spec.write_text(spec.read_text().replace("[450, 459]", "[500, 509]"))
+    changed = "values (by: -509 to -400; approved -459 to -400)"
+    lines = cli("review", "status").out.splitlines()
+    assert lines[0].endswith("toycar.yaml: 5 groups: 1 changed, 4 approved")
+    assert lines[1] == "changed since the decision:"
+    assert lines[2].startswith(f"  {gap}  approved by Jane Doe on ") and f"since: {changed})" in lines[2]
+    assert lines[3:] == ["flagged:", f"  {gap}  by Jane Doe: {known[gap]}"]
+    told = cli("review", "status", "--campaign", "small").out
+    assert re.search(
+        rf"^small lacks:\n  {gap}  changed \({re.escape(changed)}\), \d+ exp", told, re.MULTILINE
+    )
+    facts = cli("review", "status", "--json").json
+    assert facts["states"] == {"new": 0, "changed": 1, "rejected": 0, "approved": 4}
+    assert [one["group"] for one in facts["lacking"]] == [gap]
+
+
+def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[str, str]) -> None:
+    """Of a group that is not what was approved any more; of others that there is nothing to show."""
+    gap = about(known, "offset(by, target=gap)")
+    assert "nobody has decided yet" in cli("review", "show", gap, "--changes").out
+    cli("review", "approve", gap, *JANE)
+    assert "nothing has changed since" in cli("review", "show", gap, "--changes").out
+    template = root / "templates/offset.py.j2"
+    template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} + 0.0"))
+    shown = cli("review", "show", gap, "--changes").out
+    assert "++            gap = gap ⟨⟩ ⟨⟩  # fi:⟨⟩" in shown
+    assert "-    {{ target }} = {{ target }} {{ by | signed }}\n" in shown
+    assert shown.count("gap = gap") == 2
+    shutil.rmtree(root / "fault_library/reviews/seen")
+    assert "what was seen then is not kept" in cli("review", "show", gap, "--changes").out
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
@@ -168,6 +253,27 @@ def test_a_walk_asks_group_by_group(
     keys("q")
     again = cli("review", "walk", *JANE, "--only", 'model != "omission"').out
     assert f"group {first}" not in again
+
+
+def test_a_walk_tells_what_somebody_else_says_meanwhile(
+    cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing of theirs is lost: the group is shown again with what they said, and asked about again."""
+    first, *_ = known
+    keys("aaq", "", "")
+    ask = typer.getchar
+    others = iter([lambda: main(["review", "reject", first, "--by", "Joe"])])
+
+    def pressed() -> str:
+        next(others, lambda: 0)()
+        return ask()
+
+    monkeypatch.setattr(typer, "getchar", pressed)
+    answer = cli("review", "walk", *JANE)
+    assert answer.code == 0
+    assert f"  {first}  rejected by Joe on" in answer.err
+    assert answer.out.count("1 of 5:") == 2
+    assert cli("review", "show", first, "--json").json[0]["by"] == "Jane Doe"
 
 
 def test_a_walk_ends_with_the_input(
