@@ -42,6 +42,11 @@ class ReviewApi:
         chosen = asked(self._reviews, request)
         return JSONResponse(self._reviews.typical(chosen, request.path_params["group"], run))
 
+    def levels(self, request: Request) -> Response:
+        """The levels that there are pictures of."""
+        chosen = asked(self._reviews, request)
+        return JSONResponse({"levels": self._reviews.levels(chosen, request.path_params["group"])})
+
     def before(self, request: Request) -> Response:
         """A picture before a group's effect."""
         return self._picture(request, after=False)

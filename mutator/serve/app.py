@@ -73,6 +73,7 @@ def application(site: Site) -> Starlette:
         Route("/api/review/{target}", _quick(reviews.told)),
         Route("/api/review/{target}", _sent(reviews.decide), methods=["POST"]),
         Route("/api/review/{target}/{group}/changes", _quick(reviews.changes)),
+        Route("/api/review/{target}/{group}/pictures", _quick(reviews.levels)),
         Route("/api/review/{target}/{group}/typical", _quick(reviews.typical)),
         Route("/review/{target}/{group}/picture/{level}-before.jpg", _quick(reviews.before)),
         Route("/review/{target}/{group}/picture/{level}-after.jpg", _quick(reviews.after)),

@@ -21,7 +21,9 @@ from mutator.workspace import Workspace
 
 _STUDY = "report/study.html"
 _STYLES = b'<link rel="stylesheet" href="/assets/served.css">\n</head>'
-_SCRIPT = b'<script src="/assets/served.js" defer></script>\n</body>'
+_SCRIPT = b"""<script src="/assets/jobs.js" defer></script>
+<script src="/assets/served.js" defer></script>
+</body>"""
 _MOST_COMPARED = 4  # comparisons that are remembered
 
 

@@ -165,6 +165,12 @@ class Reviews:
             )
         return found[after]
 
+    def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
+        """The levels that there are pictures of, each with its value in words; none of other groups."""
+        manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
+        found = pictures.of_groups(self.workspace, manifest, [group]).get(name)
+        return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
+
     def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
         """What became of the group in a run; None where the run has none of it."""
         folder, group = RunFolder.open(run), self.group(chosen, name)

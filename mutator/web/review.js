@@ -132,7 +132,7 @@ const Review = (() => {
       const outbox = this.data.served && this.marks;
       if (!outbox) return this.marks.mark(all, kind);
       const ids = all.filter((id) => !this.groups.get(id).isOther);
-      for (const id of all) if (!ids.includes(id)) this.#say(id, "made anew since: reload this page", true);
+      for (const id of all) if (!ids.includes(id)) this.#say(id, `not saved: ${Outbox.OTHER}`, true);
       if (!ids.length) return false;
       const by = find("by").value.trim();
       if (!by) {

@@ -51,14 +51,14 @@ const Beside = (() => {
     const found = await get(`${served.api}/${id}/typical${query(served, { run })}`).catch((error) => error);
     if (place.dataset.run !== run) return; // another one was chosen meanwhile
     if (found instanceof Error) place.replaceChildren(el("span.quiet", {}, `No typical experiment: ${found.message}`));
-    else place.replaceChildren(...told(found));
+    else place.replaceChildren(...told(found, run));
   }
 
-  function told(found) {
+  function told(found, run) {
     if (!found) return [el("span.quiet", {}, "This run has no experiment of this group.")];
     const counts = Object.entries(found.outcomes).map(([name, n]) => [el(`span.ending.${name}`, {}, `${n} ${name.replaceAll("_", " ")}`), " "]);
     const one = (title, experiment) => experiment && el("p", {}, el("b", {}, `${title}: `), `${experiment.label}: ${experiment.verdict} `,
-      el("a", { href: experiment.link, target: "_blank", rel: "noopener", "aria-label": `Replay of experiment ${experiment.id}` }, "Replay"));
+      el("a", { href: `/runs/${encodeURIComponent(run)}/report/index.html#e=${experiment.id}`, target: "_blank", rel: "noopener", "aria-label": `Replay of experiment ${experiment.id}` }, "Replay"));
     const isOther = found.worst && found.worst.id !== found.typical?.id;
     return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
   }

@@ -5,6 +5,7 @@
 class Outbox {
   static EVERY_MS = 5000;
   static MOST = 200; // changes in one request
+  static OTHER = "its diff is another by now, load this page again";
 
   /** `events`: changed(ids), kept(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
   constructor(served, groups, events) {
@@ -95,7 +96,8 @@ class Outbox {
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
       const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // the first mark's counts
-      const answer = await this.#ask(this.address, { changes, by, seen });
+      const digests = Object.fromEntries(batch.map((item) => [item.group, this.groups.get(item.group).digest])); // of the diffs that are shown
+      const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {
         this.events.offline(this.#gone(answer));
         return;
@@ -129,15 +131,17 @@ class Outbox {
 
   /** Marks about groups that others have changed: told to the reviewer. The rest is sent again. */
   #conflicted(batch, { conflict, groups }) {
-    const stale = batch.filter((item) => groups[item.group] && groups[item.group].revision !== item.seen);
-    const told = stale.length ? stale : batch;
+    const isOther = (item) => groups[item.group] && groups[item.group].digest !== this.groups.get(item.group).digest;
+    const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));
+    const others = stale.filter(isOther), told = stale.length ? stale.filter((item) => !isOther(item)) : batch;
     const kept = told.filter((item) => groups[item.group] && Outbox.#isThere(item, groups[item.group]));
     const again = told.filter((item) => !kept.includes(item) && item.kind === "remark" && groups[item.group]); // adds, and overwrites nothing
     for (const item of again) item.seen = groups[item.group].revision;
     const lost = told.filter((item) => !kept.includes(item) && !again.includes(item));
-    this.#drop([...kept, ...lost]);
+    this.#drop([...kept, ...lost, ...others]);
     this.#receive(groups, batch.map((item) => item.group));
     this.events.kept(kept.map((item) => item.group));
+    for (const item of others) this.events.refused(item.group, Outbox.OTHER);
     for (const item of lost) this.events.conflict(item.group, conflict, item);
   }
 

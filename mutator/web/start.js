@@ -61,7 +61,7 @@
 
   function campaignForm({ campaigns }) {
     const name = el("input", { name: "name", required: true, pattern: "[A-Za-z0-9][A-Za-z0-9._\\-]*", title: "letters, digits, dots, hyphens", autocomplete: "off" });
-    const campaign = select("campaign", campaigns.map((c) => option(c.name, campaigns.some((o) => o.target !== c.target) ? `${c.name} (${c.target})` : c.name)), { onchange: suggest });
+    const campaign = select("campaign", campaigns.map((c) => option(c)), { onchange: suggest });
     function suggest() {
       const now = new Date(), two = (n) => String(n).padStart(2, "0");
       name.value = `${campaign.value}-${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}`;
@@ -79,8 +79,7 @@
   }
 
   Jobs.ask("/api/library").then((library) => {
-    const problem = library.templates_problem;
-    place.append(el("h2", {}, "Start something"), problem ? el("p.bad", {}, problem) : "",
+    place.append(el("h2", {}, "Start something"), library.problem ? el("p.bad", {}, library.problem) : "",
       el("div.orders", {}, library.specs.length ? tryForm(library) : null, library.campaigns.length ? campaignForm(library) : null));
   }).catch((error) => place.append(el("p.bad", { role: "alert" }, `The library cannot be read: ${error.message}.`)));
 })();
