@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from copy import copy
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from itertools import chain
 from pathlib import Path
@@ -161,13 +162,15 @@ class Expansion:
         return list(selected.values())
 
     def _mutants(self) -> list[OperatorFault]:
-        """The mutants of operators, each once."""
+        """The mutants of operators, each once; one of several selections is active when any of them says."""
         found: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.faults):
             if selection.operators is not None:
                 with self._placed(("faults", i, "in")):
                     mutants = self._operators.of(selection.operators, self._drives(), self.seed, self.reading)
-                found = {one.fault.id: one for one in mutants} | found
+                for one in mutants:
+                    known = found.get(one.fault.id, one)
+                    found[one.fault.id] = replace(one, when=tuple(dict.fromkeys((*known.when, *one.when))))
         return list(found.values())
 
     def _drives(self) -> dict[str, GoldenDrive]:

@@ -21,7 +21,7 @@ def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
     A function compiles in its file if and only if it does by itself: names of functions around it are what
     it could miss, and it has none.
     """
-    text = b"".join(lines).decode(encoding)
+    text = b"".join(lines).decode(encoding).removeprefix("\ufeff")  # a byte order mark
     indented = text[:1] in (" ", "\t", "\f")
     try:
         return compile(f"if 1:\n{text}" if indented else text, "<function>", "exec", dont_inherit=True)

@@ -62,19 +62,19 @@ def _of_values(
 
 def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
     """Assignments, augmented ones and calls that stand alone on their lines, each left out."""
-    every = (one for f in file.functions.get(function, ()) for one in f.statements)
-    statements = [one for one in every if one.reason is None and one.opens is None]
+    every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
+    found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()
-    for statement in statements:
+    for line, statement in found:
         anchored = None
         for verb in ("assign", "call"):
             for name in statement.names(verb):
                 seen[verb, name] += 1
                 anchored = anchored or (verb, name, seen[verb, name])
-        if anchored is None or not _can_be_left_out(statement, facts, function):
+        if anchored is None or not _can_be_left_out(statement, facts, line):
             continue
         verb, name, number = anchored
-        several = sum(name in one.names(verb) for one in statements) > 1
+        several = sum(name in one.names(verb) for _, one in found) > 1
         kind = AnchorKind.BEFORE_ASSIGN if verb == "assign" else AnchorKind.BEFORE_CALL
         anchor = Anchor(kind=kind, name=name, nth=number if several else None)
         location = FaultLocation(path=file.path, function=function, anchor=anchor)
@@ -93,8 +93,9 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
         )
 
 
-def _can_be_left_out(statement: Statement, facts: Facts, function: str) -> bool:
-    """Not the statement that binds a local name first: without it every later use of the name fails."""
+def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
+    """Not the statement that binds a local name first: without it every later use of the name fails.
+    `function` is the line of the one that it is in."""
     if not statement.alone or statement.is_return:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]

@@ -10,6 +10,8 @@ from mutator.targets.source_tree import SourceTree
 
 Extent = tuple[int, int, int | None, int | None]
 
+_OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda: "body"}
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
@@ -17,13 +19,13 @@ class Facts:
 
     `augmented` has the operator of the augmented assignment that an expression, by its extent, is the value
     of; `texts` the source of each statement that begins on a line; `bound` the line of the first statement
-    that binds a name of a function. `own` are the lines of each statement without those of the statements in
-    it. Lines count from 1.
+    that binds a name of a function, which is known by the line of its `def`: a property and its setter share
+    a name. `own` are the lines of each statement without those of the statements in it. Lines count from 1.
     """
 
     augmented: dict[Extent, ast.operator] = field(default_factory=dict)
     texts: dict[int, str] = field(default_factory=dict)
-    bound: dict[tuple[str, str], int] = field(default_factory=dict)
+    bound: dict[tuple[int, str], int] = field(default_factory=dict)
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
@@ -44,24 +46,24 @@ def facts_of(tree: SourceTree, path: str) -> Facts:
 
 def _facts(path: str, data: bytes, root: Path) -> Facts:
     facts = Facts()
-    _scope(ast.parse(data).body, (), facts, inside=False)
+    _block(ast.parse(data).body, None, facts)
     return facts
 
 
-def _scope(body: list[ast.stmt], scope: tuple[str, ...], facts: Facts, *, inside: bool) -> None:
+def _block(body: list[ast.stmt], function: int | None, facts: Facts) -> None:
+    """Statements of a function, known by its line, or of a module or class."""
     for statement in body:
-        if inside:
-            _statement(statement, ".".join(scope), facts)
+        if function is not None:
+            _statement(statement, function, facts)
         if isinstance(statement, ast.FunctionDef | ast.AsyncFunctionDef):
-            name = ".".join((*scope, statement.name))
             for argument in _arguments(statement.args):
-                facts.bound.setdefault((name, argument.arg), statement.lineno)
-            _scope(statement.body, (*scope, statement.name), facts, inside=True)
+                facts.bound.setdefault((statement.lineno, argument.arg), statement.lineno)
+            _block(statement.body, statement.lineno, facts)
         elif isinstance(statement, ast.ClassDef):
-            _scope(statement.body, (*scope, statement.name), facts, inside=False)
+            _block(statement.body, None, facts)
         else:
             for block in blocks(statement):
-                _scope(block, scope, facts, inside=inside)
+                _block(block, function, facts)
 
 
 def _arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
@@ -69,7 +71,7 @@ def _arguments(arguments: ast.arguments) -> Iterator[ast.arg]:
     yield from (one for one in (arguments.vararg, arguments.kwarg) if one)
 
 
-def _statement(statement: ast.stmt, function: str, facts: Facts) -> None:
+def _statement(statement: ast.stmt, function: int, facts: Facts) -> None:
     inner = [block[0].lineno for block in blocks(statement) if block]
     last = statement.end_lineno or statement.lineno
     facts.own.append(range(statement.lineno, max(statement.lineno, min([last, *(n - 1 for n in inner)])) + 1))
@@ -86,9 +88,16 @@ def _statement(statement: ast.stmt, function: str, facts: Facts) -> None:
 
 
 def _own_nodes(statement: ast.stmt) -> Iterator[ast.AST]:
-    """The nodes of a statement without those of the statements in it."""
+    """The nodes of a statement without those of the statements in it, and without names that comprehensions
+    and lambdas keep to themselves."""
     todo: list[ast.AST] = [statement]
     while todo:
         node = todo.pop()
         yield node
-        todo += [child for child in ast.iter_child_nodes(node) if not isinstance(child, ast.stmt)]
+        own = _OWN_NAMES.get(type(node))
+        hidden = getattr(node, own) if own else None
+        todo += [
+            child
+            for child in ast.iter_child_nodes(node)
+            if child is not hidden and not isinstance(child, ast.stmt)
+        ]

@@ -58,8 +58,9 @@ def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterato
         yield _rule(Operator.CONSTANT, "operator_constant", to=value)
     if expression.answers(AnchorKind.CONDITION, "", None):
         yield _rule(Operator.BRANCH, "operator_prefix", to="not")
-        yield _rule(Operator.BRANCH, "operator_constant", to=True)
-        yield _rule(Operator.BRANCH, "operator_constant", to=False)
+        if not any(isinstance(inner, ast.NamedExpr) for inner in ast.walk(node)):  # its name would be missing
+            yield _rule(Operator.BRANCH, "operator_constant", to=True)
+            yield _rule(Operator.BRANCH, "operator_constant", to=False)
     if expression.answers(AnchorKind.RETURN_VALUE, "", None):
         yield from _returned(node)
     if isinstance(node, ast.Call):
@@ -132,7 +133,7 @@ def _returned(node: ast.expr) -> Iterator[Rule]:
         yield _rule(operator, "operator_empty", to="''")
     elif isinstance(node, ast.Compare | ast.BoolOp) or _is_denied(node):
         yield _rule(operator, "operator_prefix", to="not")
-    elif not isinstance(node, ast.Constant | ast.Lambda):
+    elif not (isinstance(node, ast.Constant | ast.Lambda) or _constants(node)):
         yield _rule(operator, "operator_constant", to=0)
         yield _rule(operator, "operator_prefix", to="-")
 

@@ -84,6 +84,14 @@ def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
     assert kinds[("operators", "near")] == 2 == kinds[("operators", "far")]
 
 
+def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaign: Path) -> None:
+    """Mutants that one selection takes as permanent and another as transient are driven both ways."""
+    both = {one.id for one in make_plan(toycar, campaign).experiments}
+    entry = ENTRY.removesuffix("}")
+    _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
+    assert {one.id for one in make_plan(toycar, campaign).experiments} == both
+
+
 def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
     """The draw follows from the seed: another one takes other mutants."""
     drawn = [

@@ -58,6 +58,7 @@ CHANGES = {
         "if a: return b": ["a -> not a", "a -> True", "a -> False"],
         "return b if a else c": ["a -> not a", "a -> True", "a -> False"],
         "return [b for b in c if a]": ["a -> not a", "a -> True", "a -> False"],
+        "if (c := a) > b: return c": ["(c := a) > b -> not ((c := a) > b)"],  # a constant sets no c
         "return a": [],
     },
     "omission": {
@@ -67,6 +68,7 @@ CHANGES = {
         "a(b)": ["a(b) -> left out"],
         "c = b": [],  # its first value: without it the name would not exist
         "if a: b = c": [],
+        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # a name of its own
     },
     "return": {
         "return a": ["a -> None", "a -> 0", "a -> -a"],
@@ -76,6 +78,7 @@ CHANGES = {
         "return {}": ["{} -> None"],
         "return 'a'": ["'a' -> None", "'a' -> ''"],
         "return 1": ["1 -> None"],
+        "return -1": ["-1 -> None"],
         "return": [],
     },
     "argument": {
@@ -123,6 +126,26 @@ def test_equal_code_is_dropped(make: Make) -> None:
         ("comparison", "not (not a)"),
         ("return", "None"),
     ]
+
+
+def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
+    """A property and its setter share a name: the first value of a local name is left out in neither."""
+    setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
+    made = make(
+        f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",
+        "omission",
+        head="if 1:",
+    )
+    assert [one.text for one in made] == ["self.a = c -> left out"]
+
+
+def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
+    """A function on the first line of a file with a byte order mark has mutants that compile."""
+    (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
+    tree = read_tree(tmp_path, ["m.py"])
+    file, models = parsed(tree, "m.py"), clone.fault_models()
+    made = mutations_of(file, facts_of(tree, "m.py"), "f", models, [Operator.ARITHMETIC])
+    assert made and not distinct(file, made).invalid
 
 
 def test_long_change_shows_what_differs(make: Make) -> None:
