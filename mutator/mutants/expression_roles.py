@@ -8,7 +8,7 @@ from mutator.model import AnchorKind
 Role = tuple[AnchorKind, str, str | None]  # an anchor's kind, name and `which`
 Found = tuple[str, ast.expr, tuple[Role, ...]]
 
-_NOT_ALONE = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom | ast.NamedExpr
+_NOT_ALONE = ast.Starred | ast.Slice | ast.GeneratorExp | ast.Yield | ast.YieldFrom
 _BLOCKS = ("body", "orelse", "finalbody")
 
 

@@ -36,7 +36,7 @@ class Expression:
     end: _Point
     roles: tuple[Role, ...]
     written: str
-    bare: bool  # a tuple without parentheses
+    bare: bool  # a tuple without parentheses, or what sets a name: its parentheses are not part of it
     node: ast.expr
 
     @property
@@ -73,7 +73,9 @@ def expressions_of(
         start, end = _extent(lines, node)
         text, known = source_of(node), all(_extent(lines, one) in seen for one in _known_by(node))
         if text and known and untaggable.isdisjoint((start[0], end[0])):
-            bare = isinstance(node, ast.Tuple) and brackets.get(start) != end
+            bare = isinstance(node, ast.NamedExpr) or (
+                isinstance(node, ast.Tuple) and brackets.get(start) != end
+            )
             roles = (*roles, (AnchorKind.VALUE, text, None))
             found.append(_expression(lines, encoding, (function, node, roles), start, end, bare=bare))
     return _grouped(sorted(found, key=lambda one: (one.start, (-one.end[0], -one.end[1]))))
@@ -85,7 +87,9 @@ def _expression(
     function, node, roles = found
     one_line = start[0] == end[0]
     written = lines[start[0]][start[1] : end[1]] if one_line else roles[-1][1]
-    alone = isinstance(node, _ATOMS) or (isinstance(node, ast.Tuple) and not (bare and one_line))
+    alone = isinstance(node, _ATOMS) or (
+        isinstance(node, ast.Tuple | ast.NamedExpr) and not (bare and one_line)
+    )
     return Expression(
         function=function,
         start=(start[0], len(lines[start[0]][: start[1]].encode(encoding))),

@@ -220,3 +220,28 @@ def test_an_f_string_is_changed_as_a_whole() -> None:
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
     found = parse_file("m.py", source, Path()).expressions["f"]
     assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
+
+
+def test_what_sets_a_name_is_a_value() -> None:
+    """A condition that is `:=` as a whole has an anchor, with parentheses around it or without: while nothing
+    is active it sets its name as it did."""
+    source = "def f(a):\n    while n := a.pop():\n        if (m := n + 1): return g(k := m)\n"
+    places = [
+        location("condition", "(n := a.pop())", function="f"),
+        location("condition", "(m := n + 1)", function="f"),
+        location("argument", "g", which="1", function="f"),
+    ]
+    written = [parsed(source).resolve_value(place).written for place in places]
+    assert written == ["(n := a.pop())", "(m := n + 1)", "(k := m)"]
+    asked = [
+        f'if _fi.active("a{number}") else ({text}))'
+        for number, text in enumerate(("n := a.pop()", "m := n + 1", "k := m"))
+    ]
+    made = changed(source, *zip(places, ("not (n := a.pop())", "-(m := n + 1)", "3"), strict=True))
+    code = [line.partition("  # fi:")[0].strip() for line in made.splitlines()]
+    assert code == [
+        "def f(a):",
+        f"while (not (n := a.pop()) {asked[0]}:",
+        f"if ((-(m := n + 1) {asked[1]}): return g((3 {asked[2]})",
+    ]
+    compile(made, "m.py", "exec")
