@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
+from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response
 from starlette.types import Receive, Scope, Send
@@ -21,7 +22,7 @@ _KINDS = {
     ".gif": "image/gif",
     ".html": "text/html; charset=utf-8",
     ".jpg": "image/jpeg",
-    ".js": "text/javascript",  # of series each byte is a character: the page says so
+    ".js": "application/javascript",  # without an encoding: of series each byte is a character
     ".md": "text/plain; charset=utf-8",
     ".mp4": "video/mp4",
     ".png": "image/png",
@@ -52,9 +53,9 @@ def kind_of(name: str) -> str:
 
 def without_places(text: str) -> str:
     """The text with the last part alone of each absolute path; below the current folder, with the rest."""
-    for folder in (Path.cwd(), Path.home(), Path(tempfile.gettempdir())):
+    for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
-            text = text.replace(f"{folder}/", "")
+            text = text.replace(f"{folder}/", instead)  # their names may have blanks
     return _FOLDERS.sub("", text)
 
 
@@ -72,6 +73,8 @@ def on_error(request: Request, error: Exception) -> Response:
     """The answer to a request that cannot be granted: JSON for scripts, a page for people."""
     known = _known(error)
     status = 404 if isinstance(known, Absent) else 400
+    if isinstance(error, HTTPException):
+        status = error.status_code
     facts = error_facts(known)
     if request.url.path.startswith("/api/"):
         return JSONResponse(facts, status)
@@ -84,4 +87,6 @@ def _known(error: Exception) -> MutatorError:
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return MutatorError(str(first["msg"]), where=".".join(map(str, first["loc"])) or None)
+    if isinstance(error, HTTPException) and error.status_code != 404:
+        return MutatorError(error.detail)
     return Absent("no such page", remedy="go back to the first page")

@@ -69,7 +69,7 @@ class Guarded:
 
     def _entered(self, scope: Scope) -> Response | None:
         """None for who has the cookie; who has the token in the address gets it, and an address without."""
-        query = parse_qs(scope["query_string"].decode("latin-1"))
+        query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
             if not all(self._is_token(given) for given in query["token"]):
                 return _refusal("another token than that of this server: use the address that it printed")

@@ -1,0 +1,150 @@
+"""A server in this process, on a toy library and a made-up run folder, and a client that says anything."""
+
+import http.client
+import json
+import shutil
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.report.panels import figures
+from mutator.serve.app import Site
+from mutator.serve.runs import Runs
+from mutator.serve.security import HOST
+from mutator.serve.server import listening, server_of
+from mutator.workspace import Workspace
+
+from ..report.made_run import make_run
+
+TOKEN = "a-token-that-nobody-guesses"
+SECRET = "what others must not read"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the server said."""
+
+    status: int
+    headers: Mapping[str, str]
+    data: bytes
+
+    @property
+    def text(self) -> str:
+        return self.data.decode("utf-8", "replace")
+
+    @property
+    def json(self) -> Any:
+        return json.loads(self.data)
+
+
+@dataclass(frozen=True)
+class Client:
+    """Asks the server. No answer may have the token, the secret, or a place on the disk."""
+
+    port: int
+    place: Path
+    site: Site
+
+    @property
+    def origin(self) -> str:
+        return f"http://{HOST}:{self.port}"
+
+    def ask(
+        self,
+        method: str,
+        path: str,
+        headers: Mapping[str, str | None] | None = None,
+        body: Any = None,
+        *,
+        chunked: bool = False,
+    ) -> Answer:
+        """Ask as a page of the server would, but for `headers`: None leaves one out."""
+        own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
+        if method == "POST":
+            own |= {"Origin": self.origin, "Content-Type": "application/json"}
+        sent = {name: value for name, value in (own | dict(headers or {})).items() if value is not None}
+        connection = http.client.HTTPConnection(HOST, self.port, timeout=60)
+        try:
+            connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+            data = body if isinstance(body, bytes) or body is None else json.dumps(body).encode()
+            if chunked:
+                sent["Transfer-Encoding"] = "chunked"
+            elif data is not None and "Content-Length" not in sent:
+                sent["Content-Length"] = str(len(data))
+            for name, value in sent.items():
+                connection.putheader(name, value)
+            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before all was sent
+                connection.endheaders(data, encode_chunked=chunked)
+            answer = connection.getresponse()
+            found = Answer(answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read())
+        finally:
+            connection.close()
+        said = found.text + str({k: v for k, v in found.headers.items() if k != "set-cookie"})
+        assert TOKEN not in said
+        assert SECRET not in said
+        assert str(self.place) not in said
+        return found
+
+    def get(self, path: str, **headers: str | None) -> Answer:
+        return self.ask("GET", path, {name.replace("_", "-"): value for name, value in headers.items()})
+
+    def post(self, path: str, body: Any) -> Answer:
+        return self.ask("POST", path, body=body)
+
+    def ended(self, job: str, within_s: float = 60.0) -> dict[str, Any]:
+        """The job once it has ended."""
+        deadline = time.monotonic() + within_s
+        while time.monotonic() < deadline:
+            found = next(one for one in self.get("/api/jobs").json["jobs"] if one["id"] == job)
+            if found["ended"]:
+                return dict(found)
+            time.sleep(0.1)
+        raise AssertionError(f"job {job} goes on: {found}")
+
+
+@pytest.fixture(scope="session")
+def served_at(_caches: Path) -> Callable[[Workspace, Path], Any]:
+    """Serves a library and a folder of runs until the end of a `with`."""
+
+    @contextmanager
+    def serve(workspace: Workspace, runs: Path) -> Iterator[Client]:
+        site = Site(workspace=workspace, runs=Runs((runs,)))
+        listener = listening(0)
+        port = listener.getsockname()[1]
+        server = server_of(site, port=port, token=TOKEN)
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        try:
+            yield Client(port, runs.parent, site)
+        finally:
+            server.should_exit = True
+            thread.join()
+            listener.close()
+
+    return serve
+
+
+@pytest.fixture(scope="module")
+def client(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    served_at: Callable[[Workspace, Path], Any],
+) -> Iterator[Client]:
+    """A server of a copy of the toy's library and of the made-up run `night`, beside which lies a secret."""
+    place = tmp_path_factory.mktemp("served")
+    workspace = copy_toycar(place)
+    shutil.rmtree(workspace.library / "faults" / "hostile")
+    (place / "secret.csv").write_text(SECRET)
+    night = place / "runs" / "night"
+    night.mkdir(parents=True)
+    make_run(night)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds, and are tested elsewhere
+        with served_at(workspace, place / "runs") as client:
+            yield client

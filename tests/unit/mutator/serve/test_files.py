@@ -1,0 +1,231 @@
+"""What of a run folder and of the disk is served: files of reports, and nothing by a trick."""
+
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import quote
+
+import pytest
+
+from mutator._common.hashing import digest
+from mutator.serve.answers import without_places
+from mutator.store.series_script import script_of
+
+from ..report.made_run import make_run
+from .conftest import SECRET, Client
+from .test_security import blocks
+
+STEPS = ("..", "%2e%2e", "..%2f..", "%252e%252e", "....//..", "..%5c..", "%00", ".", "")
+SECRETS = ("secret.csv", "runs/night/run.json")
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "/runs/{}",
+        "/runs/night/{}",
+        "/runs/night/report/{}",
+        "/runs/night/plots/{}",
+        "/runs/{}/report/index.html",
+        "/assets/{}",
+        "/compare/night/{}",
+        "/compare/{}/night/",
+        "/try/{}/plot.svg",
+        "/review/{}",
+        "/api/review/{}",
+        "/api/review/toycar?campaign={}",
+        "/api/review/toycar?spec={}",
+        "/api/review/toycar/{}/changes",
+        "/api/review/toycar/{}/typical?run=night",
+        "/api/review/toycar/0123456789ab/typical?run={}",
+        "/review/toycar/{}/picture/most-after.jpg",
+        "/review/toycar/0123456789ab/picture/{}-after.jpg",
+        "/api/jobs/{}/log",
+    ],
+)
+def test_no_address_leads_out(client: Client, address: str) -> None:
+    """Whatever stands for a name in an address, it is a name of something that is served, or nothing."""
+    ways = [f"{step}/" * 2 + secret for step in STEPS for secret in SECRETS]
+    for way in (*ways, *map(str, (client.place / secret for secret in SECRETS)), "/etc/passwd"):
+        for path in (address.format(way), address.format(quote(way, safe=""))):
+            if str(client.place) in path:  # else the address is in the answer since it was in the question
+                path = path.replace(str(client.place), quote(str(client.place), safe=""))
+            answer = client.get(path)
+            assert answer.status in (307, 400, 404), path
+            assert "root:" not in answer.text and '"schema"' not in answer.text
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["run.json", "digests.json", "campaign.yaml", "plan/faults.jsonl", "owner.lock", "report/made_from.json"],
+)
+def test_only_what_a_report_shows_is_served(client: Client, name: str) -> None:
+    """Other files of a run folder are not, although they are in it."""
+    path = client.place / "runs/night" / name
+    path.parent.mkdir(exist_ok=True)
+    if not path.exists():
+        path.write_text("{}")
+    assert client.get(f"/runs/night/{name}").status == 404
+    if name not in ("run.json", "plan/faults.jsonl"):
+        path.unlink()
+
+
+def test_files_of_a_report_are_served(client: Client) -> None:
+    """Pictures and tables, each as what it is, and parts of a film where a browser asks for them."""
+    assert client.get("/runs/night/results.csv").headers["content-type"].startswith("text/csv")
+    picture = client.get(f"/runs/night/plots/{'0' * 16}-14.50s.jpg")
+    assert (picture.headers["content-type"], picture.data) == ("image/jpeg", b"picture")
+    film = client.place / "runs/night/plots" / f"{'0' * 16}.mp4"
+    film.write_bytes(b"0123456789")
+    part = client.get(f"/runs/night/plots/{film.name}", Range="bytes=2-4")
+    assert (part.status, part.data) == (206, b"234")
+    film.unlink()
+
+
+@pytest.fixture
+def linked(client: Client) -> Iterator[Path]:
+    """A run folder of its own, to put links into."""
+    folder = client.place / "runs" / "linked"
+    folder.mkdir()
+    yield make_run(folder)
+    shutil.rmtree(folder)
+
+
+@pytest.mark.parametrize(
+    "name", ["plots/a.svg", "report/tables/a.csv", "results.csv", "series/index.js", "series/kept/a.js"]
+)
+def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: str) -> None:
+    """A link in a run folder leads nowhere, be it to a file outside or inside."""
+    path = linked / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    for end in (client.place / "secret.csv", linked / "plan.csv"):
+        path.unlink(missing_ok=True)
+        path.symlink_to(end)
+        assert client.get(f"/runs/linked/{name}").status == 404
+
+
+@pytest.mark.parametrize("name", ["plots", "report", "series"])
+def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: str) -> None:
+    """Neither is one on the way; no report is made and no job started where it would be written to."""
+    outside = client.place / "outside"
+    outside.mkdir(exist_ok=True)
+    for kind in ("a.svg", "a.html", "index.js"):
+        (outside / kind).write_text(SECRET)
+    shutil.rmtree(linked / name, ignore_errors=True)
+    (linked / name).symlink_to(outside)
+    before = sorted(outside.iterdir())
+    for path in (f"{name}/a.svg", f"{name}/a.html", f"{name}/index.js", "report/index.html"):
+        assert client.get(f"/runs/linked/{path}").status in (400, 404)
+    refused = client.post("/api/jobs", {"kind": "report", "run": "linked"})
+    assert refused.status == 400
+    assert refused.json["error"]["got"] == f"a link, {name}"
+    assert sorted(outside.iterdir()) == before
+    assert not client.get("/api/jobs").json["jobs"]
+
+
+def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
+    """A folder of runs holds runs; a link in it to one elsewhere is none."""
+    elsewhere = client.place / "elsewhere"
+    elsewhere.mkdir()
+    make_run(elsewhere)
+    (client.place / "runs" / "link").symlink_to(elsewhere)
+    assert "link" not in [run["key"] for run in client.get("/api/runs").json["runs"]]
+    assert client.get("/runs/link/results.csv").status == 404
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "alert(1)",
+        'SeriesFile.loaded("NAME","");alert(1);("");\n',
+        'SeriesFile.loaded("NAME","a\\\\");alert(1);("");\n',
+        'SeriesFile.loaded("NAME","a\nalert(1)//");\n',
+        'SeriesFile.loaded("NAME","a");\nalert(1);\nSeriesFile.loaded("NAME","");\n',
+        'SeriesFile.loaded("other","");\n',
+        'SeriesFile.loaded("NAME",`${alert(1)}`);\n',
+        'SeriesFile.loaded("NAME","\\x41");\n',
+        'SeriesFile.loaded("NAME","");\n ',
+    ],
+)
+@pytest.mark.parametrize("name", ["series/index.js", "series/kept/0123456789abcdef.js"])
+def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: str) -> None:
+    """Series are scripts of this server's origin: only a call with one plain string is one."""
+    path = client.place / "runs/night" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text.replace("NAME", path.stem))
+    assert client.get(f"/runs/night/{name}").status == 404
+    path.unlink()
+
+
+def test_series_are_served_as_they_are(client: Client) -> None:
+    """Every byte can be in them, and no encoding is told, for the page's own counts."""
+    path = client.place / "runs/night/series/kept/0123456789abcdef.js"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(script_of(path.stem, bytes(range(256)) + b'");alert(1);("'))
+    answer = client.get("/runs/night/series/kept/0123456789abcdef.js")
+    assert (answer.status, answer.data) == (200, path.read_bytes())
+    assert answer.headers["content-type"] == "application/javascript"
+    path.unlink()
+
+
+def test_a_hostile_report_runs_no_script(client: Client, linked: Path) -> None:
+    """A page that claims to be the newest report, stamp and all, is shown with a policy that none of its
+    scripts fits."""
+    assert client.get("/runs/linked/report/index.html").status == 200
+    page = linked / "report" / "index.html"
+    page.write_text(
+        "<body onload='alert(1)'><script>alert(2)</script><script src='/runs/linked/plots/a.svg'></script>"
+    )
+    stamp = json.loads((linked / "report/made_from.json").read_text())
+    stamp["files"]["index.html"] = digest(page.read_bytes())
+    (linked / "report/made_from.json").write_text(json.dumps(stamp))
+    answer = client.get("/runs/linked/report/index.html")
+    assert "alert(2)" in answer.text  # else this would prove nothing
+    scripts = answer.headers["content-security-policy"].split("script-src ")[1].split(";")[0]
+    assert "unsafe" not in scripts and "http" not in scripts and "data:" not in scripts
+    assert blocks(answer.text, "script")
+    (linked / "plots/a.svg").write_text("alert(3)")
+    script = client.get("/runs/linked/plots/a.svg").headers
+    assert script["content-type"] == "image/svg+xml" and script["x-content-type-options"] == "nosniff"
+
+
+HOSTILE = "<img src=x onerror=alert(1)>"
+
+
+def test_names_and_words_of_runs_are_text(client: Client) -> None:
+    """A run folder's name, a campaign's and what is wrong with a run are escaped wherever they stand."""
+    folder = client.place / "runs" / HOSTILE
+    folder.mkdir()
+    make_run(folder, campaign=HOSTILE)
+    broken = client.place / "runs" / "broken"
+    broken.mkdir()
+    (broken / "run.json").write_text(json.dumps({"schema": HOSTILE}))
+    try:
+        home = client.get("/")
+        assert HOSTILE not in home.text
+        assert "&lt;img src=x onerror=alert(1)&gt;" in home.text
+        key = quote(HOSTILE, safe="")
+        assert f'href="/runs/{key}/report/index.html"' in home.text
+        report = client.get(f"/runs/{key}/report/index.html")
+        assert report.status == 200 and HOSTILE not in report.text
+        for path in (f"/runs/{key}/nothing", f"/compare/{key}/night/", f"/review/{key}", f"/assets/{key}"):
+            assert HOSTILE not in client.get(path).text
+    finally:
+        shutil.rmtree(folder)
+        shutil.rmtree(broken)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("/srv/data/runs/a/run.json:12: no 'x'", "run.json:12: no 'x'"),
+        ("cannot read '/srv/data/x.csv' (denied)", "cannot read 'x.csv' (denied)"),
+        ("file:///srv/data/x.csv", "file://x.csv"),
+        ("--- a/selfdrive/sim/radar.py +++ /dev/null", "--- a/selfdrive/sim/radar.py +++ /dev/null"),
+        ("1.5 m/s and/or 3", "1.5 m/s and/or 3"),
+    ],
+)
+def test_places_are_left_out(text: str, told: str) -> None:
+    """Of a path that begins at the root its last part is told; other slashes stay."""
+    assert without_places(text) == told

@@ -1,0 +1,165 @@
+"""What a job may be asked to do: names, ids and numbers, each checked before anything is started."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.campaigns.freezing import freeze
+from mutator.campaigns.plans import make_plan
+from mutator.errors import MutatorError
+from mutator.serve.orders import Desk, Work
+from mutator.serve.runs import Runs
+from mutator.store import plan_file
+from mutator.workspace import Workspace
+
+from .conftest import Client
+
+TRY = {"kind": "try", "spec": "sensor/lane", "scenario": "A"}
+CAMPAIGN = {"kind": "campaign", "campaign": "small", "name": "new"}
+ABSENT = "0" * 16
+
+
+@pytest.mark.parametrize(
+    "order",
+    [
+        {},
+        {"kind": "shell"},
+        {"kind": "rerun"},
+        {"kind": "rerun", "run": "night", "experiment": ABSENT},
+        {"kind": "rerun", "run": "night", "experiment": "00"},
+        {"kind": "rerun", "run": "night", "experiment": "--help"},
+        {"kind": "rerun", "run": "night", "experiment": ABSENT, "words": ["rm"]},
+        {"kind": "rerun", "run": "../night", "experiment": ABSENT},
+        {"kind": "rerun", "run": ["night"], "experiment": ABSENT},
+        {"kind": "still", "run": "night", "experiment": ABSENT, "t": "1=/tmp/x.png"},
+        {"kind": "still", "run": "night", "experiment": ABSENT, "t": -1},
+        {"kind": "report", "run": "no such"},
+        {"kind": "report", "run": "/etc"},
+        {"kind": "report", "run": "--root=/"},
+        TRY | {"spec": "../../secret.yaml"},
+        TRY | {"spec": "toy/fault_library/faults/sensor/lane.yaml"},
+        TRY | {"spec": "-sensor/lane"},
+        TRY | {"spec": "sensor/*"},
+        TRY | {"spec": ""},
+        TRY | {"scenario": "/etc/passwd"},
+        TRY | {"scenario": "../targets/toycar.yaml"},
+        TRY | {"scenario": "--out=/tmp/x"},
+        TRY | {"variant": "none such"},
+        TRY | {"variant": "-v"},
+        TRY | {"value": "1"},
+        TRY | {"seed": -1},
+        TRY | {"seed": 2**70},
+        TRY | {"seed": True},
+        TRY | {"reading": "other"},
+        TRY | {"target": "../toycar"},
+        TRY | {"trigger": "__import__('os').system('id')"},
+        TRY | {"trigger": "unknown > 1"},
+        TRY | {"trigger": "nan"},
+        TRY | {"trigger": "-5"},
+        TRY | {"trigger": "always\n--out=/tmp/x"},
+        TRY | {"trigger": "t > 1" + " and t > 1" * 1000},
+        TRY | {"out": "/tmp/x"},
+        CAMPAIGN | {"campaign": "../campaigns/small"},
+        CAMPAIGN | {"campaign": "small.yaml"},
+        CAMPAIGN | {"name": ".."},
+        CAMPAIGN | {"name": "../new"},
+        CAMPAIGN | {"name": "/tmp/new"},
+        CAMPAIGN | {"name": ".hidden"},
+        CAMPAIGN | {"name": "-n"},
+        CAMPAIGN | {"name": "a\n"},
+        CAMPAIGN | {"name": "a" * 65},
+        CAMPAIGN | {"limit": 0},
+        CAMPAIGN | {"limit": 100_000},
+        CAMPAIGN | {"workers": 0},
+        CAMPAIGN | {"only": "__import__('os')"},
+        CAMPAIGN | {"only": "--cluster=tcp://evil"},
+        CAMPAIGN | {"cluster": "tcp://evil"},
+        b"",
+        b"[]",
+        b"{",
+        b'{"kind": "try", "value": NaN}',
+        b"[" * 100_000,
+        b"\xff\xfe",
+    ],
+)
+def test_a_hostile_order_starts_nothing(client: Client, order: Any) -> None:
+    """It is refused as wrong input, and there is no job of it."""
+    answer = client.ask("POST", "/api/jobs", body=order)
+    assert answer.status in (400, 404), answer.text
+    assert answer.json["error"]["got"]
+    assert client.get("/api/jobs").json == {"jobs": []}
+
+
+@pytest.mark.parametrize(
+    "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", ""]
+)
+def test_an_order_is_json(client: Client, kind: str) -> None:
+    """What a form of another site could send is not taken for JSON."""
+    assert client.ask("POST", "/api/jobs", {"Content-Type": kind}, TRY).status == 415
+    assert client.get("/api/jobs").json == {"jobs": []}
+
+
+@pytest.fixture
+def desk(toycar: Workspace, tmp_path: Path) -> Desk:
+    (tmp_path / "runs").mkdir()
+    freeze(make_plan(toycar, "small"), tmp_path / "runs" / "first", toycar)
+    return Desk(toycar, Runs((tmp_path / "runs",)))
+
+
+def work(desk: Desk, **order: Any) -> Work:
+    import json
+
+    return desk.work(json.dumps(order).encode())
+
+
+def test_orders_are_command_lines(desk: Desk) -> None:
+    """Each is a verb of the command line, on this very library, with its values in words of their own."""
+    run = desk.runs.folder("first")
+    experiment = next(plan_file.ids(run))
+    place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
+    about = {"run": "first", "experiment": experiment}
+    of_run = (f"--run={run}", *place)
+    assert work(desk, kind="rerun", **about).words == ("rerun", experiment, *of_run)
+    assert work(desk, kind="plot", **about).words == ("rerun", experiment, "--trace", *of_run)
+    film = f"--video={run}/plots/{experiment}.mp4"
+    assert work(desk, kind="film", **about).words == ("show", experiment, "--no-plot", film, *of_run)
+    still = work(desk, kind="still", t=3, **about)
+    assert still.words == ("show", experiment, "--no-plot", "--still=3.00", *of_run)
+    assert still.result == f"/runs/first/report/index.html#e={experiment}"
+    assert work(desk, kind="report", run="first").words == ("report", str(run), *place)
+    given = {"value": -2.5, "seed": 3, "variant": "shifted", "trigger": "v_ego > 3"}
+    options = ("--scenario=A", "--trigger=v_ego > 3", "--variant=shifted", "--value=-2.5", "--seed=3")
+    assert work(desk, **TRY, **given).words == (
+        "try",
+        "sensor/lane",
+        *options,
+        f"--out={run.parent}/try",
+        *place,
+    )
+    words = work(desk, **CAMPAIGN, only="scenario == 'A'", workers=1).words
+    options = (f"--out={run.parent}/new", "--limit=20", "--only=scenario == 'A'", "--workers=1")
+    assert words == ("run", "small", *options, *place)
+
+
+@pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
+def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
+    """A context, with its table or without, a time, always, a condition."""
+    assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
+
+
+def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
+    """A link in the folder of runs is not where a campaign goes, nor one in a folder that is there."""
+    (tmp_path / "runs" / "new").symlink_to(tmp_path)
+    with pytest.raises(MutatorError, match="a link"):
+        work(desk, **CAMPAIGN)
+    (tmp_path / "runs" / "try").symlink_to(tmp_path)
+    with pytest.raises(MutatorError, match="a link"):
+        work(desk, **TRY)
+
+
+def test_numbers_are_finite(desk: Desk) -> None:
+    """No value of a fault is infinite by way of JSON."""
+    with pytest.raises(ValueError):
+        work(desk, **TRY, value=math.inf)

@@ -1,0 +1,140 @@
+"""Reviews for the page's script: decisions are in the library's file as soon as they are answered."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.review.catalogue import of_library
+from mutator.review.decisions import Change, Kind, load_review, record
+from mutator.workspace import Workspace
+
+from .conftest import Client
+from .test_files import HOSTILE
+
+API = "/api/review/toycar"
+
+
+@pytest.fixture
+def reviewed(
+    toycar: Workspace, tmp_path: Path, served_at: Callable[[Workspace, Path], Any]
+) -> Iterator[tuple[Client, list[str]]]:
+    """A server of a library that a test may write to, and the ids of its groups, specs of the lane alone."""
+    (tmp_path / "runs").mkdir()
+    with served_at(toycar, tmp_path / "runs") as client:
+        yield client, list(client.get(f"{API}?spec=sensor/*").json["groups"])
+
+
+def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more: Any) -> Any:
+    """The answer to changes (group, kind), made by somebody who sees all as it is now."""
+    groups = client.get(f"{API}?spec=sensor/*").json["groups"]
+    body = {
+        "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],
+        "by": by,
+        "seen": {group: groups[group]["revision"] for group, _ in changes if group in groups},
+    }
+    return client.post(f"{API}?spec=sensor/*", body | {k: v for k, v in more.items() if k != "text"})
+
+
+def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+    """An approval, a remark and a flag are in the file, and a page that is loaded again has them."""
+    client, (first, second, *_) = reviewed
+    answer = decided(client, (first, "approve"), (second, "flag"))
+    assert answer.status == 200
+    assert answer.json["groups"][first]["state"] == "approved"
+    assert decided(client, (first, "remark"), text="limits?").status == 200
+    groups = client.get(f"{API}?spec=sensor/*").json["groups"]
+    assert groups[first]["decision"]["by"] == "Jane"
+    assert [remark["text"] for remark in groups[first]["remarks"]] == ["limits?"]
+    assert groups[second]["flag"]["by"] == "Jane" and groups[second]["state"] == "new"
+    review = load_review(toycar, "toycar")
+    assert review.decision(first) and review.flag(second)
+    assert client.get("/review/toycar?spec=sensor/*").status == 200
+
+
+def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+    """What somebody else has said since is told, nothing is written, and who has then seen it may decide."""
+    client, (first, second, *_) = reviewed
+    group = next(
+        one for one in of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",)) if one.id == first
+    )
+    record(toycar, "toycar", [Change(group=group, kind=Kind.REJECT, by="John")], {first: ""})
+    answer = decided(client, (first, "approve"), (second, "approve"), seen={first: "", second: ""})
+    assert answer.status == 409
+    assert "John" in answer.json["conflict"]
+    assert list(answer.json["groups"]) == [first]
+    assert answer.json["groups"][first]["state"] == "rejected"
+    assert client.get(f"{API}?spec=sensor/*").json["groups"][second]["state"] == "new"
+    assert decided(client, (first, "approve")).status == 200
+
+
+def test_another_diff_than_the_page_shows_is_not_approved(
+    reviewed: tuple[Client, list[str]], toycar: Workspace
+) -> None:
+    """A page that was made before the target changed cannot decide about what it does not show."""
+    client, [*names] = reviewed
+    before = client.get(f"{API}?spec=sensor/*").json["groups"]
+    sensing = toycar.library.parent / "tree/toycar/sensing.py"
+    sensing.write_text(sensing.read_text().replace("offset = ", "offset = 0.0 + "))
+    now = client.get(f"{API}?spec=sensor/*").json["groups"]
+    changed = next(name for name in names if now[name]["digest"] != before[name]["digest"])
+    digests = {changed: before[changed]["digest"]}
+    answer = decided(client, (changed, "approve"), digests=digests)
+    assert answer.status == 409
+    assert "another diff" in answer.json["conflict"]
+    assert decided(client, (changed, "approve"), digests={changed: now[changed]["digest"]}).status == 200
+    assert client.get(f"{API}/{changed}/changes?spec=sensor/*").json == {"changes": ""}
+
+
+@pytest.mark.parametrize(
+    ("body", "status"),
+    [
+        ({}, 400),
+        ({"changes": [], "by": "Jane", "seen": {}}, 400),
+        ({"changes": [{"group": "ID", "kind": "approve"}], "by": "Jane", "seen": {}}, 400),
+        ({"changes": [{"group": "ID", "kind": "approve"}], "by": " ", "seen": {"ID": ""}}, 400),
+        ({"changes": [{"group": "ID", "kind": "approve"}], "by": "a\u0000b", "seen": {"ID": ""}}, 400),
+        (
+            {"changes": [{"group": "ID", "kind": "remark", "text": " "}], "by": "Jane", "seen": {"ID": ""}},
+            400,
+        ),
+        ({"changes": [{"group": "ID", "kind": "delete"}], "by": "Jane", "seen": {"ID": ""}}, 400),
+        ({"changes": [{"group": "../ID", "kind": "approve"}], "by": "Jane", "seen": {"ID": ""}}, 400),
+        ({"changes": [{"group": "0" * 12, "kind": "flag"}], "by": "Jane", "seen": {"0" * 12: ""}}, 404),
+        ({"changes": [{"group": "ID", "kind": "flag", "by": "me"}], "by": "Jane", "seen": {"ID": ""}}, 400),
+        ({"changes": [{"group": "ID", "kind": "flag"}] * 5001, "by": "Jane", "seen": {"ID": ""}}, 400),
+    ],
+)
+def test_what_is_no_decision_is_refused(
+    reviewed: tuple[Client, list[str]], toycar: Workspace, body: Any, status: int
+) -> None:
+    """Nothing is written for it."""
+    import json
+
+    client, (first, *_) = reviewed
+    sent = json.dumps(body).replace("ID", first)
+    assert client.ask("POST", f"{API}?spec=sensor/*", body=sent.encode()).status == status
+    assert not (toycar.library / "reviews").exists()
+
+
+def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
+    """A script in a name, a remark or an address is in no page as markup; the page's data are packed."""
+    client, (first, *_) = reviewed
+    assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
+    answer = client.get(f"{API}?spec=sensor/*")
+    assert answer.headers["content-type"] == "application/json"
+    assert answer.json["groups"][first]["decision"]["by"] == HOSTILE
+    page = client.get("/review/toycar?spec=sensor/*")
+    assert page.status == 200 and HOSTILE not in page.text
+    assert HOSTILE not in client.get(f"/review/toycar?spec={HOSTILE.replace(' ', '%20')}").text
+    assert HOSTILE not in client.get(f"/review/toycar?{HOSTILE.replace(' ', '%20')}=1").text
+
+
+def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[str]]) -> None:
+    """A group without pictures, a level and a run that are not there: no such thing."""
+    client, (first, *_) = reviewed
+    assert client.get(f"/review/toycar/{first}/picture/most-after.jpg?spec=sensor/*").status == 404
+    assert client.get(f"{API}/{first}/typical?spec=sensor/*&run=none").status == 404
+    assert client.get(f"{API}?other=1").status == 400
+    assert client.get(f"{API}?campaign=small&spec=sensor/*").status == 400

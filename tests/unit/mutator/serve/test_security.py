@@ -1,0 +1,143 @@
+"""Who is answered: requests from elsewhere are refused, whatever they ask for."""
+
+import base64
+import hashlib
+import re
+
+import pytest
+
+from mutator.serve.security import MOST_BYTES
+
+from .conftest import TOKEN, Client
+
+ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", "/nowhere")
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["evil.example", "127.0.0.1", "127.0.0.1:1", "localhost", "localhost.evil.example:{port}", "", None],
+)
+@pytest.mark.parametrize("path", ASKED)
+def test_another_host_is_refused(client: Client, path: str, host: str | None) -> None:
+    """A page whose name leads to this machine reads nothing, although the browser sends it here."""
+    answer = client.get(path, Host=host and host.format(port=client.port))
+    assert answer.status in (400, 403)
+    assert "<" not in answer.text
+
+
+def test_both_names_of_this_machine_will_do(client: Client) -> None:
+    """The address may be typed as localhost, too."""
+    assert client.get("/", Host=f"localhost:{client.port}").status == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://{own}", ""])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_another_origin_is_refused(client: Client, method: str, origin: str) -> None:
+    """Whatever a browser sends along for a page of another origin, nothing is read or done."""
+    own = origin.format(own=f"127.0.0.1:{client.port}")
+    answer = client.ask(method, "/api/jobs", {"Origin": own}, b"{}" if method == "POST" else None)
+    assert answer.status == 403
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+def test_what_changes_anything_says_where_it_comes_from(client: Client) -> None:
+    """A POST without an origin is refused, and so is a request that a browser says is from another site."""
+    assert client.ask("POST", "/api/jobs", {"Origin": None}, b"{}").status == 403
+    for site in ("cross-site", "same-site", "anything"):
+        assert client.get("/api/jobs", Sec_Fetch_Site=site).status == 403
+    assert client.get("/api/jobs", Sec_Fetch_Site="same-origin").status == 200
+
+
+@pytest.mark.parametrize(
+    "cookie", [None, "", "mutator-{port}=", "mutator-{port}=wrong", "mutator-1=" + TOKEN, TOKEN]
+)
+@pytest.mark.parametrize("path", ASKED)
+def test_without_the_token_nothing_is_answered(client: Client, path: str, cookie: str | None) -> None:
+    """No page, no file and no error of one without the right cookie; another server's is not it."""
+    answer = client.get(path, Cookie=cookie and cookie.format(port=client.port))
+    assert answer.status == 403
+    assert "the server printed" in answer.text
+
+
+def test_the_token_becomes_a_cookie(client: Client) -> None:
+    """The first address sets a cookie that scripts cannot read and other sites do not send, and leads to an
+    address without the token."""
+    answer = client.get(f"/?token={TOKEN}", Cookie=None)
+    assert (answer.status, answer.headers["location"]) == (303, "/")
+    cookie = answer.headers["set-cookie"].lower()
+    assert f"mutator-{client.port}={TOKEN}" in cookie
+    assert "httponly" in cookie and "samesite=strict" in cookie
+
+
+@pytest.mark.parametrize(
+    "query", ["token=wrong", "token=", f"token={TOKEN}&token=wrong", f"token={TOKEN[:-1]}", "token=%ff"]
+)
+def test_a_wrong_token_is_refused(client: Client, query: str) -> None:
+    """A token that is not the server's opens nothing, even to who has a cookie."""
+    answer = client.get(f"/?{query}")
+    assert answer.status == 403
+    assert "set-cookie" not in answer.headers
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "PROPFIND"])
+def test_other_methods_are_refused(client: Client, method: str) -> None:
+    """Pages use GET and POST; a question for what is allowed across origins gets no answer."""
+    answer = client.ask(method, "/api/jobs")
+    assert answer.status == 405
+    assert not [name for name in answer.headers if name.startswith("access-control")]
+
+
+@pytest.mark.parametrize("chunked", [False, True])
+def test_a_long_body_is_refused(client: Client, chunked: bool) -> None:
+    """A body beyond the limit is not taken in, whether its length is told or not."""
+    body = b'{"kind": "' + b"x" * (MOST_BYTES + 10) + b'"}'
+    assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 413
+
+
+@pytest.mark.parametrize("length", ["99999999999999999999999", "1000001"])
+def test_a_length_that_is_told_is_believed(client: Client, length: str) -> None:
+    """Who says that much will come is refused before it does."""
+    answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
+    assert answer.status in (400, 413)
+
+
+def test_a_body_within_the_limit_is_read(client: Client) -> None:
+    """In one piece or in several: what is wrong with it is told then."""
+    body = b'{"kind": "' + b"x" * (MOST_BYTES - 100) + b'"}'
+    for chunked in (False, True):
+        assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 400
+
+
+@pytest.mark.parametrize("path", [*ASKED, "/runs/night/results.csv", "/?token=wrong"])
+def test_every_answer_has_the_policy(client: Client, path: str) -> None:
+    """Pages, files, refusals and errors alike: no scripts but ours, nobody's frame, no guess at types."""
+    headers = client.get(path).headers
+    policy = headers["content-security-policy"]
+    assert policy.startswith("default-src 'none'; script-src 'self' 'sha256-")
+    assert "'unsafe-inline'" not in policy.replace("style-src-attr 'unsafe-inline'", "")
+    for part in ("frame-ancestors 'none'", "base-uri 'none'", "form-action 'none'", "connect-src 'self'"):
+        assert part in policy
+    assert headers["x-content-type-options"] == "nosniff"
+    assert headers["referrer-policy"] == "no-referrer"
+    assert headers["cache-control"] == "no-store"
+    assert headers["cross-origin-resource-policy"] == "same-origin"
+    assert "server" not in headers
+
+
+def blocks(page: str, tag: str) -> list[str]:
+    """What stands in the page's elements of that kind that a browser would run or apply."""
+    found = re.findall(rf"<{tag}( type=[^>]*)?>(.*?)</{tag}>", page, re.DOTALL)
+    return [text for kind, text in found if not kind]
+
+
+@pytest.mark.parametrize("path", ["/runs/night/report/index.html", "/review/toycar"])
+def test_pages_run_by_the_policy(client: Client, path: str) -> None:
+    """Every script and style sheet that a page of ours carries is one that the policy knows."""
+    answer = client.get(path)
+    assert answer.status == 200, answer.text
+    carried = blocks(answer.text, "script") + blocks(answer.text, "style")
+    assert carried
+    for text in carried:
+        digest = base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in answer.headers["content-security-policy"], text[:200]
+    assert not re.search(r"<[a-z][^>]* on[a-z]+=", answer.text)
