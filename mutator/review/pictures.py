@@ -158,9 +158,10 @@ def _lines(models: FaultModels, fault: Fault) -> tuple[str, ...]:
 
 
 def _label(fault: Fault) -> str:
-    """Its value in words: as the spec states it, else the amounts."""
+    """Its value in words: with the unit that the spec has, else as an amount."""
     if fault.value is not None:
-        return f"{fault.value}" + (f" {fault.unit}" if fault.unit not in ("", "-", "1") else "")
+        plain = fault.unit in ("", "-", "1")
+        return f"amount {fault.value}" if plain else f"{fault.value} {fault.unit}"
     return ", ".join(
         f"{name} {value}" for name, value in parameter_values(fault).items() if name.endswith("amount")
     )

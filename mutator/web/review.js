@@ -215,7 +215,7 @@ const Review = (() => {
       }
       const isFiltered = this.shown.length < groups.length, none = this.shown.length === 0;
       for (const kind of DECISIONS) {
-        find(`${kind}-shown`).textContent = `${Card.VERBS[kind][0]} ${isFiltered ? `these ${this.shown.length}` : `all ${groups.length}`}`;
+        find(`${kind}-shown`).textContent = `${Card.VERBS[kind][0]} ${!isFiltered ? `all ${groups.length}` : this.shown.length === 1 ? "this one" : `these ${this.shown.length}`}`;
         find(`${kind}-shown`).disabled = none || !states.length;
       }
     }

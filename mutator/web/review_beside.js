@@ -29,9 +29,10 @@ const Beside = (() => {
   async function pictures(place, id, served) {
     const address = (name) => `/review/${encodeURIComponent(served.target)}/${id}/picture/${name}.jpg${served.query}`;
     const figure = (name, title, about) => {
-      const image = el("img", { src: address(name), alt: `Picture ${title}` });
-      const shown = el("figure", {}, image, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
-      image.addEventListener("error", () => image.replaceWith(el("p.quiet.none", {}, "no picture")));
+      const image = el("img", { src: address(name), alt: `Picture ${title} ${about}`.trim() });
+      const whole = el("a", { href: address(name), target: "_blank", rel: "noopener", title: "In full size" }, image);
+      const shown = el("figure", {}, whole, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
+      image.addEventListener("error", () => whole.replaceWith(el("p.quiet.none", {}, "no picture")));
       return shown;
     };
     const found = await get(`${served.api}/${id}/pictures${served.query}`).catch((error) => error);

@@ -57,7 +57,8 @@ class Card {
 
   #facts() {
     const { trigger, hold, faults, runs } = this.group;
-    const when = trigger ? `${trigger}, ${hold}` : "in every mutant";
+    const kinds = trigger.split(" or "), last = kinds.pop();
+    const when = trigger ? `${[kinds.join(", "), last].filter(Boolean).join(" or ")}; ${hold}` : "in every mutant";
     return `${when}${faults ? `; ${Card.plural(faults, "fault")}` : ""}${runs === null ? "" : `, ${Card.plural(runs, "experiment")}`}`;
   }
 

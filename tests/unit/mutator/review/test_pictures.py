@@ -64,9 +64,9 @@ def test_three_levels_of_an_effect(lit: Lit) -> None:
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
     assert [(one.name, one.label) for one in found.levels] == [
-        ("least", "10"),
-        ("middle", "40"),
-        ("most", "160"),
+        ("least", "amount 10"),
+        ("middle", "amount 40"),
+        ("most", "amount 160"),
     ]
     assert [grey(one.after) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
 
@@ -107,8 +107,8 @@ def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -
     ]
     found = pictures.of_groups(workspace, workspace.manifest("toycar"), halves)
     assert {name: [one.label for one in made.levels] for name, made in found.items()} == {
-        "a": ["10", "20"],
-        "b": ["40", "80", "160"],
+        "a": ["amount 10", "amount 20"],
+        "b": ["amount 40", "amount 80", "amount 160"],
     }
     assert len(runs) == 1
 
