@@ -16,7 +16,8 @@ from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_OPTIMIZED
 from types import CodeType
 
 from mutator.mutants.imported_names import module_name
-from mutator.mutants.probe import parts_of, probe_path, sets_values, tag_of
+from mutator.mutants.injected_lines import sets_values, tag_of
+from mutator.mutants.probe import parts_of, probe_path
 from mutator.mutants.splicing import unsplice
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches

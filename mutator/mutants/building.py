@@ -11,10 +11,11 @@ from mutator.faults.fault_models import PROBE_TEMPLATE, FaultModels
 from mutator.model import FIXED_ANCHORS, Fault, Hold, Injection, Trigger
 from mutator.mutants.anchors import ParsedFile, parsed
 from mutator.mutants.changed_functions import compile_changed
+from mutator.mutants.injected_lines import OBSERVE_TAG, observe_call
 from mutator.mutants.injection_edits import injection_edit
 from mutator.mutants.normalized_source import compiles, normalized
 from mutator.mutants.patches import changed_file, new_file
-from mutator.mutants.probe import OBSERVE_TAG, injection_id, observe_call, probe_path, template_values
+from mutator.mutants.probe import injection_id, probe_path, template_values
 from mutator.mutants.rendering import render
 from mutator.mutants.reusable_changes import (
     Change,

@@ -10,8 +10,8 @@ from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, AnchorKind, Injection
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
 from mutator.mutants.imported_names import importers
+from mutator.mutants.injected_lines import ORIGINAL, asks_for, set_constant, set_default
 from mutator.mutants.limiting import check_instance, limited
-from mutator.mutants.probe import ORIGINAL, asks_for, set_constant, set_default
 from mutator.mutants.rendering import changed_value, snippet
 from mutator.mutants.reusable_changes import reuse_key
 from mutator.mutants.scopes import as_compiled, moved_names

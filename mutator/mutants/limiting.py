@@ -5,7 +5,7 @@ from mutator.errors import MutatorError
 from mutator.faults.fault_models import FaultModel
 from mutator.model import Injection
 from mutator.mutants.anchors import ParsedFile
-from mutator.mutants.probe import asks, asks_for
+from mutator.mutants.injected_lines import asks, asks_for
 
 
 def check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:

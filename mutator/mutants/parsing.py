@@ -11,8 +11,8 @@ import libcst as cst
 from libcst.metadata import MetadataWrapper, PositionProvider
 
 from mutator.errors import MutatorError
+from mutator.mutants.injected_lines import instrumented_line
 from mutator.mutants.places import Positions, line_after
-from mutator.mutants.probe import instrumented_line
 
 _LONE_CR = re.compile(rb"\r(?!\n)")
 

@@ -12,8 +12,8 @@ from itertools import chain
 from pathlib import Path
 
 from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.normalized_source import compiles, normalized
-from mutator.mutants.probe import tag_of
 from mutator.mutants.splicing import Edit, in_order
 from mutator.targets.source_tree import SourceTree
 

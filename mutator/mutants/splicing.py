@@ -16,7 +16,7 @@ from mutator.errors import MutatorError
 from mutator.mutants.anchors import ParsedFile, Site
 from mutator.mutants.expressions import Expression
 from mutator.mutants.fixed_values import FixedValue
-from mutator.mutants.probe import asks, changed_value, import_statement, tag_instead, tag_of, tagged
+from mutator.mutants.injected_lines import asks, changed_value, import_statement, tag_instead, tag_of, tagged
 
 
 class Rank(IntEnum):

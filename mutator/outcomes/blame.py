@@ -11,7 +11,8 @@ from itertools import dropwhile
 
 from mutator.engines.jobs import Execution, Raised, Stack
 from mutator.model import RunError, Status
-from mutator.mutants.probe import Tag, changed_parts, is_probe, tag_of
+from mutator.mutants.injected_lines import Tag, changed_parts, tag_of
+from mutator.mutants.probe import is_probe
 
 _At = tuple[str, int, int]  # file, line, column
 

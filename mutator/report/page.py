@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mutator._common.text import counted
 from mutator.model import Outcome
-from mutator.mutants.probe import tag_words
+from mutator.mutants.injected_lines import tag_words
 from mutator.report.browse import Browse
 from mutator.report.panel import Panel, rendered
 from mutator.report.words import Words

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from mutator.config.locations import PROBE_NAME
-from mutator.mutants.probe import changed_parts, tag_of
+from mutator.mutants.injected_lines import changed_parts, tag_of
 from mutator.review import source_names
 from mutator.review.source_names import Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree

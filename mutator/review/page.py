@@ -14,7 +14,7 @@ from markupsafe import Markup
 from mutator._common.files import write_atomic
 from mutator._common.hashing import content_id, plain
 from mutator.errors import MutatorError
-from mutator.mutants.probe import tag_words
+from mutator.mutants.injected_lines import tag_words
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Review, State
 from mutator.review.pictures import has_pictures

@@ -24,7 +24,8 @@ from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.engines.threads import too_many, turned_off
 from mutator.model import Experiment, Limits
 from mutator.mutants.building import build
-from mutator.mutants.probe import is_probe, tag_of
+from mutator.mutants.injected_lines import tag_of
+from mutator.mutants.probe import is_probe
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always
 from mutator.verification import canary, causes, fast_engines

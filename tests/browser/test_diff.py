@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from mutator.mutants.probe import tag_words
+from mutator.mutants.injected_lines import tag_words
 from mutator.web import asset
 
 CHANGED = 'x = (1 if _fi.active("a0") else "a\u2028b")  '

@@ -12,8 +12,8 @@ from mutator.config.instances import instance_condition
 from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation, Injection
 from mutator.mutants.anchors import ParsedFile
+from mutator.mutants.injected_lines import tag_of
 from mutator.mutants.injection_edits import injection_edit
-from mutator.mutants.probe import tag_of
 from mutator.mutants.splicing import apply_edits, in_lines, joined, unsplice
 
 from .test_value_anchors import FEW, MANY, anchors, models, module

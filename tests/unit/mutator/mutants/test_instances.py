@@ -11,6 +11,7 @@ from mutator.config.yaml_files import Source
 from mutator.errors import MutatorError
 from mutator.faults.injections import InjectionModel, InjectionSpec
 from mutator.model import Anchor, AnchorKind, FaultLocation, Hold, Injection, Trigger
+from mutator.mutants import injected_lines
 from mutator.mutants import probe as contract
 from mutator.mutants.anchors import parse_file
 from mutator.mutants.injection_edits import injection_edit
@@ -116,12 +117,12 @@ def test_tags_know_what_asks(clone: Workspace) -> None:
     """A line that asks for an instance asks the probe, and what chooses the instance is the injection's."""
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
-        tags = [tag for line in data.splitlines() if (tag := contract.tag_of(line)) and tag.id == "a"]
+        tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
         assert tags[0].asks_probe
     data = mutant(clone, VALUE, where="lane['gap'] == 2", every=3)
-    (tag,) = [t for line in data.splitlines() if (t := contract.tag_of(line)) and t.was is not None]
+    (tag,) = [t for line in data.splitlines() if (t := injected_lines.tag_of(line)) and t.was is not None]
     assert tag.asked_for == ["a"]
-    ((name, line, first, end),) = contract.changed_parts(data)
+    ((name, line, first, end),) = injected_lines.changed_parts(data)
     assert name == "a"
     assert data.splitlines()[line - 1][first:end].endswith(
         b"""lane["gap"] + 10 if _fi.on() and (lane['gap'] == 2) and """

@@ -3,7 +3,6 @@
 import json
 import math
 import random
-import re
 import types
 from typing import Any
 
@@ -12,8 +11,8 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.model import Activation, Hold, Trigger
 from mutator.mutants import probe as contract
+from mutator.mutants.injected_lines import settings
 from mutator.mutants.rendering import render
-from mutator.web import asset
 from mutator.workspace import Workspace
 
 TRIGGER = Trigger(name="near", condition="hwt < 2.0 and rs > 0.0", armed_after_s=0.25)
@@ -56,52 +55,13 @@ def test_the_decision_is_the_probes(clone: Workspace) -> None:
         assert module["_run"].active == (values[0] >= armed_t and holds(*values))
 
 
-def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
-    """What the contract writes it recognizes: import, observation, guards, and the ids in them."""
-    lines = {
-        contract.import_statement("car"): ("probe", 0, False),
-        contract.tagged(contract.observe_call([("t", "now.time")]), contract.OBSERVE_TAG): (
-            "observe",
-            0,
-            False,
-        ),
-        contract.tagged('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
-        contract.tagged('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
-        contract.tagged("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
-    }
-    for line, (name, guarded, of_fault) in lines.items():
-        for end in ("", "\n", "\r\n"):
-            tag = contract.tag_of((line + end).encode())
-            assert tag is not None
-            assert (tag.id, tag.guarded, tag.of_fault) == (name, guarded, of_fault)
-            assert tag.asks_probe == ("if " in line)
-            assert tag.code.decode() == line.partition("  #")[0]
-        assert contract.instrumented_line(f"x = 1\n{line}\n".encode()) == 1
-        assert contract.adds_fault(f"+{line}") is of_fault
-        assert list(contract.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
-
-
-def test_what_is_no_tag(clone: Workspace) -> None:
-    """A tag ends its line, in lower case; a comment that only resembles one is the target's own."""
-    for line in (
-        b"x = 1",
-        b"x = 1  # fi",
-        b"x = 1  # fi:",
-        b"x  # fi:ABC",
-        b"x  # fi:abc, say",
-        b"y  # fi:a guard:",
-    ):
-        assert contract.tag_of(line) is None
-    assert contract.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
-
-
 def test_settings_are_all_that_differs(clone: Workspace) -> None:
     """Probes of two triggers are equal but for their settings, and these are found by their names."""
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):
         patch = "".join(f"+{line}\n" for line in source(clone, trigger).splitlines())
-        spans = list(contract.settings(patch, 0, len(patch)))
+        spans = list(settings(patch, 0, len(patch)))
         found.append({name: patch[begin:end] for begin, end, name in spans})
         for begin, end, _ in reversed(spans):
             patch = patch[:begin] + patch[end:]
@@ -205,13 +165,3 @@ def test_damaged_reports(change: Any, said: str) -> None:
     """Whatever is not as a probe reports it is told: keys, types, numbers, what contradicts itself."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))
-
-
-def test_pages_are_told_the_tags() -> None:
-    """The script that shows diffs spells no tag: the page carries the mark and the probe's own tags."""
-    words = contract.tag_words()
-    for tag in words["probe"]:
-        assert contract.tagged("x", tag) == f"x  {words['mark']}{tag}"
-    assert words["probe"] == [contract.IMPORT_TAG, contract.OBSERVE_TAG]
-    assert "fi:" not in asset("diff.js")
-    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("diff.js"))

@@ -1,0 +1,220 @@
+"""Injected lines: how their tags and their calls of the probe look in source, and how they are found again.
+
+Whoever writes, finds or reads injected lines, in files or in patches, asks this module; the probe that they
+call is that of `mutants.probe`. Code inside a target's process cannot import it, so engines pass on what that
+code needs.
+"""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mutator.config.locations import PROBE_NAME
+from mutator.model import Injection
+
+IMPORT_TAG = "probe"  # on the line that imports the probe
+OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
+ORIGINAL = "original"  # what a line that sets a value calls it as the program has it
+# in quotes, in a name or in a tag, which may have several: a number of eight digits is none
+INJECTION_ID = (
+    r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
+    r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"
+)
+
+_MARK = "# fi:"
+_MARK_BYTES = _MARK.encode()
+_TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
+_TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
+_NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
+_ASKING = (  # what chooses an instance or an execution comes first
+    rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
+    rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
+    rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
+)
+_GUARD = re.compile(rf"\s*if (?:not )?\(?{_ASKING}\)?(?: or {PROBE_NAME}\.steps\(\))?:\Z".encode())
+_ASKED = re.compile(rf" if {_ASKING} else ".encode())
+_OF_EXECUTION = [f"{PROBE_NAME}.{name}" for name in ("call", "every", "active")]
+_SETS = re.compile(rf'\s*{PROBE_NAME}\.(?:constant|default)\("[0-9a-z]+", '.encode())
+_TAGGED_ADDITION = re.compile(rf"^\+.*{_TAG}\r?$", re.MULTILINE)
+_FAULT_ADDITION = re.compile(rf"^\+.*{_MARK}(?!{IMPORT_TAG}\b|{OBSERVE_TAG}\b)", re.MULTILINE)
+_SETTING = re.compile(
+    r"(?P<mutant>(?<![0-9A-Za-z])[0-9a-f]{16}(?![0-9A-Za-z]))"
+    rf"|(?P<id>{INJECTION_ID})"
+    r'|^\+HOLD = "(?P<hold>\w+)"$'
+    r"|^\+HOLD_S = (?P<hold_s>.+)$"
+    r"|^\+ARMED_AFTER_S = (?P<armed_after_s>.+)$"
+    r"|^\+def _condition\(.*\n(?:\+    \w+ = .*\n)*\+    return (?P<condition>.+)$",
+    re.MULTILINE,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tag:
+    """The tag at the end of an injected line: the injection's id, or IMPORT_TAG, OBSERVE_TAG. A line in which
+    several injections change values has their ids, with `+` between.
+
+    `guarded` is the number of lines that a guard indents, 0 in other lines; `code` the line without its tag.
+    `was` is the target's line in whose place this one stands; None for one that was inserted.
+    """
+
+    id: str
+    guarded: int
+    code: bytes
+    was: bytes | None = None
+
+    @property
+    def of_fault(self) -> bool:
+        """Whether the line belongs to a fault; the others are in every mutant."""
+        return self.id not in (IMPORT_TAG, OBSERVE_TAG)
+
+    @property
+    def asks_probe(self) -> bool:
+        """Whether the line opens a block that runs only if the probe says so."""
+        return _GUARD.match(self.code) is not None
+
+    @property
+    def ids(self) -> list[str]:
+        """The ids of its injections."""
+        return self.id.split("+")
+
+    @property
+    def opens_original(self) -> bool:
+        """Whether it is the `else:` beneath which a guard keeps the target's statements."""
+        return self.guarded > 0 and self.code.strip() == b"else:"
+
+    @property
+    def asked_for(self) -> list[str]:
+        """The injections whose values a changed line takes only if the probe says so."""
+        return [found["id"].decode() for found in _ASKED.finditer(self.code)]
+
+    @property
+    def sets(self) -> bool:
+        """Whether the line tells the probe of a value that it is to set while the fault is active."""
+        return _SETS.match(self.code) is not None
+
+
+def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
+    """What a changed file has in place of values, and what chooses an instance: the injection, the line, the
+    column and that of the end. Lines count from 1, columns in bytes of UTF-8, as in tracebacks."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.IfExp):
+            asked = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
+            own = [
+                one for one in asked if isinstance(one, ast.Call) and ast.unparse(one.func) in _OF_EXECUTION
+            ]
+            if own and isinstance(name := own[0].args[0], ast.Constant):
+                yield str(name.value), node.body.lineno, node.body.col_offset, own[0].col_offset
+
+
+def tag_of(line: bytes) -> Tag | None:
+    """The tag of a line, with or without its line end; None for a line of the target."""
+    if _MARK_BYTES not in line:
+        return None
+    match = _TAG_OF_LINE.search(line)
+    if match is None:
+        return None
+    code = line[: match.start()]
+    return Tag(id=match[1].decode(), guarded=int(match[2] or 0), code=code, was=match[3])
+
+
+def tagged(code: str, tag: str, guarded: int = 0) -> str:
+    """`code` with its tag; every line of a guard carries the number of lines that it guards."""
+    return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
+
+
+def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
+    """The tag of a line that stands in the place of the target's line `was`."""
+    return f"  {_MARK}{'+'.join(ids)} was:".encode() + was
+
+
+def asks(tag: str) -> str:
+    """How an injected line asks the probe whether to act."""
+    return f'{PROBE_NAME}.active("{tag}")'
+
+
+def asks_for(tag: str, injection: Injection) -> str:
+    """The same of an injection that may be limited to an instance or to some executions: for these it asks
+    only while the fault is active."""
+    asked = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
+    for name in ("call", "every"):
+        if (number := getattr(injection, name)) is not None:
+            asked.append(f'{PROBE_NAME}.{name}("{tag}", {number})')
+    return " and ".join([*asked, asks(tag)])
+
+
+def changed_value(asked: str, changed: str) -> str:
+    """What goes before an expression so that it is worth `changed` when the probe, `asked`, says so."""
+    return f"({changed} if {asked} else "
+
+
+def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
+    """The line that has the probe set a constant: the one at `path` in its module, `Class.NAME` for one of a
+    class, and what other modules imported of it. `changed` is its value then, of the `original` one."""
+    more = "".join(f', "{name}"' for name in imported)
+    return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
+
+
+def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
+    """The same for the default of a parameter."""
+    where = f'globals(), "{function}", "{parameter}"'
+    return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL}: {changed})'
+
+
+def sets_values(data: bytes) -> bool:
+    """Whether a file may have lines that tell the probe what to set: most have none."""
+    return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
+
+
+def tag_words() -> dict[str, Any]:
+    """What a page needs to find injected lines: the mark before a tag, the tags of the probe's own lines."""
+    return {"mark": _MARK, "probe": [IMPORT_TAG, OBSERVE_TAG]}
+
+
+def import_statement(package: str | None) -> str:
+    """The tagged line that imports the probe."""
+    return tagged(f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", IMPORT_TAG)
+
+
+def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
+    """The call that passes on the ground truth: the name of each observed value and its expression."""
+    return f"{PROBE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
+
+
+def instrumented_line(data: bytes) -> int | None:
+    """Index of a line with a tag, or else with the probe's name; None if the file has neither."""
+    if _MARK.encode() in data:
+        for index, line in enumerate(data.splitlines(keepends=True)):
+            if tag_of(line):
+                return index
+    match = _NAME_IN_USE.search(data)
+    return data[: match.start()].count(b"\n") if match else None
+
+
+# Injected lines in patches
+
+
+def tagged_additions(patch: str, begin: int, end: int) -> Iterator[tuple[int, int]]:
+    """Begin and end of each tagged line that the patch adds between `begin` and `end`, without its `+`."""
+    for line in _TAGGED_ADDITION.finditer(patch, begin, end):
+        yield line.start() + 1, line.end()
+
+
+def adds_fault(hunk: str) -> bool:
+    """Whether a hunk adds a line that belongs to a fault."""
+    return _FAULT_ADDITION.search(hunk) is not None
+
+
+def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
+    """Begin, end and name of everything that differs from probe to probe, in the patch that adds one."""
+    for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
+        name = match.lastgroup or ""
+        yield *match.span(name), name
+
+
+def _end_of_settings(patch: str, begin: int, end: int) -> int:
+    """The end of the trigger's condition: the rest is long, and the same in every probe."""
+    condition = patch.find("\n+def _condition(", begin, end)
+    line = patch.find("\n+    return ", condition, end) if condition >= 0 else -1
+    return end if line < 0 else patch.find("\n", line + 1, end) + 1 or end

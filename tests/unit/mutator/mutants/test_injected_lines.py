@@ -1,0 +1,56 @@
+"""Injected lines: what is written is found again."""
+
+import re
+
+from mutator.mutants import injected_lines
+from mutator.web import asset
+from mutator.workspace import Workspace
+
+
+def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
+    """What is written is recognized: import, observation, guards, and the ids in them."""
+    lines = {
+        injected_lines.import_statement("car"): ("probe", 0, False),
+        injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
+            "observe",
+            0,
+            False,
+        ),
+        injected_lines.tagged('if _fi.active("0a1b2c3d"):', "0a1b2c3d"): ("0a1b2c3d", 0, True),
+        injected_lines.tagged('if not _fi.active("0a1b2c3d"):', "0a1b2c3d", 12): ("0a1b2c3d", 12, True),
+        injected_lines.tagged("    x = 1", "0a1b2c3d"): ("0a1b2c3d", 0, True),
+    }
+    for line, (name, guarded, of_fault) in lines.items():
+        for end in ("", "\n", "\r\n"):
+            tag = injected_lines.tag_of((line + end).encode())
+            assert tag is not None
+            assert (tag.id, tag.guarded, tag.of_fault) == (name, guarded, of_fault)
+            assert tag.asks_probe == ("if " in line)
+            assert tag.code.decode() == line.partition("  #")[0]
+        assert injected_lines.instrumented_line(f"x = 1\n{line}\n".encode()) == 1
+        assert injected_lines.adds_fault(f"+{line}") is of_fault
+        assert list(injected_lines.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
+
+
+def test_what_is_no_tag(clone: Workspace) -> None:
+    """A tag ends its line, in lower case; a comment that only resembles one is the target's own."""
+    for line in (
+        b"x = 1",
+        b"x = 1  # fi",
+        b"x = 1  # fi:",
+        b"x  # fi:ABC",
+        b"x  # fi:abc, say",
+        b"y  # fi:a guard:",
+    ):
+        assert injected_lines.tag_of(line) is None
+    assert injected_lines.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
+
+
+def test_pages_are_told_the_tags() -> None:
+    """The script that shows diffs spells no tag: the page carries the mark and the probe's own tags."""
+    words = injected_lines.tag_words()
+    for tag in words["probe"]:
+        assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"
+    assert words["probe"] == [injected_lines.IMPORT_TAG, injected_lines.OBSERVE_TAG]
+    assert "fi:" not in asset("diff.js")
+    assert not re.search("|".join(rf"{tag}\W*\|" for tag in words["probe"]), asset("diff.js"))
