@@ -5,7 +5,10 @@ Nothing is driven: what is tested is the page. Every test fails on an error in t
 
 import os
 import shutil
+import threading
+import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -158,6 +161,64 @@ class Page:
         self.page.click(f'[data-facet="{facet}"] > summary')
         self.page.click(f'[data-facet="{facet}"] .option:has-text("{value}")')
         self.page.keyboard.press("Escape")
+
+
+Serve = Callable[..., AbstractContextManager[str]]
+
+
+@pytest.fixture(scope="session")
+def serve() -> Serve:
+    """Serves a library and runs in a thread of this process; the address is given, token included."""
+    pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
+    from mutator.serve.app import Site
+    from mutator.serve.runs import Runs
+    from mutator.serve.security import HOST
+    from mutator.serve.server import listening, server_of
+
+    @contextmanager
+    def served(
+        workspace: Workspace, runs: tuple[Path, ...] = (), *, port: int = 0, token: str = "t"
+    ) -> Iterator[str]:
+        site = Site(workspace=workspace, runs=Runs(runs))
+        with listening(port) as listener:
+            own = listener.getsockname()[1]
+            server = server_of(site, port=own, token=token)
+            thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]}, daemon=True)
+            thread.start()
+            while not server.started:
+                time.sleep(0.01)
+            try:
+                yield f"http://{HOST}:{own}/?token={token}"
+            finally:
+                server.should_exit = True
+                thread.join(30)
+                site.jobs.close()
+
+    return served
+
+
+@pytest.fixture
+def visit(browser: Any) -> Iterator[Callable[..., Any]]:
+    """Opens an address as a visitor of its own; an error in the console fails the test, but for those that
+    a browser logs when a request fails."""
+    errors: list[str] = []
+    contexts = []
+
+    def opened(address: str, page: str = "", **options: Any) -> Any:
+        contexts.append(browser.new_context(reduced_motion="reduce", **options))
+        contexts[-1].set_default_timeout(20_000)
+        shown = contexts[-1].new_page()
+        shown.on("console", lambda m: errors.append(m.text) if m.type in ("error", "warning") else None)
+        shown.on("pageerror", lambda error: errors.append(str(error)))
+        shown.goto(address)
+        if page:
+            shown.goto(address.partition("/?")[0] + page)
+        return shown
+
+    yield opened
+    for context in contexts:
+        context.close()
+    assert [text for text in errors if "Failed to load resource" not in text] == []
 
 
 SERIOUS = """async () => {

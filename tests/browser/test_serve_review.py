@@ -1,0 +1,243 @@
+"""The review page of a server: what is marked there is kept, whoever else is at work, whatever becomes of the
+server."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+import pytest
+
+from mutator.review.decisions import load_review
+from mutator.workspace import Workspace
+
+Visit = Callable[..., Any]
+ADDRESS = "/review/toycar?spec=sensor/*"
+
+
+@pytest.fixture(scope="module")
+def library(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    give_eyes: Callable[..., None],
+) -> Workspace:
+    """The toy's library with an image effect: six groups."""
+    toy = copy_toycar(tmp_path_factory.mktemp("served"))
+    give_eyes(toy)
+    return toy
+
+
+@pytest.fixture(scope="module")
+def address(library: Workspace, serve: Callable[..., Any]) -> Iterator[str]:
+    """Where that library is served."""
+    with serve(library) as found:
+        yield found
+
+
+@pytest.fixture
+def review(address: str, library: Workspace, visit: Visit) -> Callable[..., Any]:
+    """Opens the page as a reviewer; nothing was said of any group before."""
+    rmtree(library.library / "reviews", ignore_errors=True)
+
+    def opened(by: str, fragment: str = "", **options: Any) -> Any:
+        page = visit(address, f"{ADDRESS}#{fragment}", **options)
+        ready(page)
+        page.fill("#by", by)
+        page.keyboard.press("Escape")
+        return page
+
+    return opened
+
+
+def ready(page: Any) -> None:
+    page.wait_for_selector("html[data-ready]", state="attached")
+
+
+def saved(page: Any, group: str) -> None:
+    """Wait until the marks of a group are confirmed."""
+    page.wait_for_selector(f"#group-{group} .kept:text('saved')")
+
+
+def current(page: Any) -> str:
+    return str(page.get_attribute(".group[aria-current]", "id")).removeprefix("group-")
+
+
+def words(page: Any, group: str) -> str:
+    return str(page.inner_text(f"#group-{group}"))
+
+
+def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], library: Workspace) -> None:
+    """A decision, a flag and a remark, made by keys, are in the library and on the page loaded anew."""
+    page = review("Jane <b>Doe</b>")
+    for key in "jjaf":
+        page.keyboard.press(key)
+    group = current(page)
+    page.keyboard.press("c")
+    page.keyboard.type("<i>limits</i> are right")
+    page.keyboard.press("Enter")
+    saved(page, group)
+    page.reload()
+    ready(page)
+    text = words(page, group)
+    assert "approved by Jane <b>Doe</b>" in text
+    assert "<i>limits</i> are right" in text
+    assert "flagged" in text
+    assert page.inner_text("[data-state=approved]") == "approved 1"
+    kept = load_review(library, "toycar")
+    decision, flag = kept.decision(group), kept.flag(group)
+    assert decision is not None
+    assert (decision.verdict, decision.by) == ("approved", "Jane <b>Doe</b>")
+    assert flag is not None
+    assert [remark.text for remark in kept.remarks(group)] == ["<i>limits</i> are right"]
+
+
+def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], library: Workspace) -> None:
+    """The same key again, or `u`, leaves nothing said of the group."""
+    page = review("Jane")
+    page.keyboard.press("j")
+    for key in "rffu":
+        page.keyboard.press(key)
+        page.wait_for_timeout(50)
+    page.wait_for_selector("[data-state=new]:text('new 6')")
+    saved(page, current(page))
+    assert not load_review(library, "toycar").entries
+
+
+def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Workspace) -> None:
+    """The name is asked for first."""
+    page = review("")
+    page.keyboard.press("j")
+    page.keyboard.press("a")
+    assert page.evaluate("document.activeElement.id") == "by"
+    assert not load_review(library, "toycar").entries
+
+
+def test_two_reviewers_do_not_overwrite_each_other_unseen(
+    review: Callable[..., Any], library: Workspace
+) -> None:
+    """Who comes second sees what the first one did, and decides again; the first one comes to see it."""
+    first, second = review("Jane"), review("Jim")
+    for page in (first, second):
+        page.keyboard.press("j")
+    group = current(first)
+    first.keyboard.press("a")
+    saved(first, group)
+    second.keyboard.press("r")
+    second.wait_for_selector(f"#group-{group} .conflict:visible")
+    assert "approved by Jane" in second.inner_text(f"#group-{group} .conflict")
+    assert load_review(library, "toycar").decision(group).by == "Jane"  # type: ignore[union-attr]
+    second.click("text=Reject all the same")
+    saved(second, group)
+    first.wait_for_selector(f"#group-{group} .decision:text('rejected by Jim')")
+
+
+def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], library: Workspace) -> None:
+    """A remark overwrites nothing, so it needs no second look."""
+    pages = [review(name) for name in ("Jane", "Jim")]
+    for page in pages:
+        page.keyboard.press("j")
+        page.keyboard.press("c")
+        page.keyboard.type("seen")
+        page.keyboard.press("Enter")
+        saved(page, current(page))
+    assert [one.by for one in load_review(library, "toycar").remarks(current(pages[0]))] == ["Jane", "Jim"]
+
+
+def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
+    """One question, with how many there are and in which states; then they are approved, and no others."""
+    page = review("Jane", "q=gap")
+    page.keyboard.press("Shift+A")
+    assert page.inner_text("#ask-title") == "Approve 2 groups?"
+    assert "2 new" in page.inner_text("#ask-about")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("[data-state=approved]:text('approved 2')")
+    assert len(load_review(library, "toycar").entries) == 2
+
+
+def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
+    """Before the effect, and after it at three levels, each with its value; they are loaded."""
+    page = review("Jane", "q=light")
+    page.wait_for_selector(".pictures figure:nth-child(4)")
+    pictures = page.locator(".pictures img")
+    for picture in pictures.all():
+        picture.evaluate("image => image.decode()")  # fails for one that cannot be shown
+    assert pictures.count() == 4
+    captions = page.locator(".pictures figcaption").all_inner_texts()
+    assert captions[0] == "before"
+    assert [text.partition(":")[0] for text in captions[1:]] == [
+        "after, least",
+        "after, middle",
+        "after, most severe",
+    ]
+
+
+def test_what_changed_since_an_approval_is_shown_as_a_diff(
+    review: Callable[..., Any], library: Workspace
+) -> None:
+    """A changed line of an effect makes its approval stale, in an open page, too; the card shows the line as
+    it was and as it is."""
+    page = review("Jane", "q=light")
+    page.keyboard.press("j")
+    page.keyboard.press("a")
+    group = current(page)
+    saved(page, group)
+    lens = library.library.parent / "tree/toycar/lens.py"
+    text = lens.read_text()
+    lens.write_text(text.replace("picture + self.amount", "picture + 2 * self.amount"))
+    try:
+        page.wait_for_selector(f"#group-{group} .state.changed")
+        page.keyboard.press("a")
+        page.wait_for_selector(f"#group-{group} .kept:text('load this page again')")
+        page.reload()
+        ready(page)
+        page.keyboard.press("j")
+        page.keyboard.press("d")
+        page.wait_for_selector(".since .changes")
+        assert "picture + self.amount" in page.inner_text(".since td.removed")
+        assert "picture + 2 * self.amount" in page.inner_text(".since td.added")
+    finally:
+        lens.write_text(text)
+
+
+def test_marks_outlive_a_server_that_is_gone(
+    library: Workspace, serve: Callable[..., Any], visit: Visit
+) -> None:
+    """They wait in the tab, through a reload if the page is still there, and are sent to the next server."""
+    rmtree(library.library / "reviews", ignore_errors=True)
+    with serve(library, token="first") as address:
+        page = visit(address, ADDRESS)
+        ready(page)
+        page.fill("#by", "Jane")
+        page.keyboard.press("Escape")
+        page.keyboard.press("j")
+    port = int(address.partition("127.0.0.1:")[2].partition("/")[0])
+    page.keyboard.press("a")
+    page.wait_for_selector("#banner:visible")
+    assert "1 mark waits" in page.inner_text("#banner")
+    assert not load_review(library, "toycar").entries
+    with serve(library, port=port, token="second") as address:
+        page.wait_for_selector("#banner:text('does not know this page')")
+        page.context.new_page().goto(address)
+        page.bring_to_front()
+        saved(page, current(page))
+        assert not page.is_visible("#banner")
+    assert len(load_review(library, "toycar").entries) == 1
+
+
+def test_everyone_can_use_it_on_any_screen(
+    review: Callable[..., Any], serious_faults: Callable[[Any], list[str]]
+) -> None:
+    """With decisions, a flag, a remark and pictures: axe finds nothing serious in light and dark, and a
+    narrow screen needs no scrolling sideways."""
+    page = review("Jane")
+    for key in "jajrjf":
+        page.keyboard.press(key)
+    page.keyboard.press("c")
+    page.keyboard.type("seen")
+    page.keyboard.press("Enter")
+    saved(page, current(page))
+    assert serious_faults(page) == []
+    page.emulate_media(color_scheme="dark")
+    assert serious_faults(page) == []
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
