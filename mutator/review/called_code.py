@@ -146,12 +146,12 @@ class CalledCode:
         )
 
 
-def _injected(data: bytes) -> Callable[[ast.expr | ast.stmt], bool]:
+def _injected(data: bytes) -> Callable[[ast.expr], bool]:
     """Whether a node of a mutated file was injected: an inserted line, the new value in a changed one."""
     tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
     changed = [(line, first, end) for _, line, first, end in changed_parts(data)]
 
-    def is_injected(node: ast.expr | ast.stmt) -> bool:
+    def is_injected(node: ast.expr) -> bool:
         tag = tags.get(node.lineno)
         if tag is None or not tag.of_fault:
             return False

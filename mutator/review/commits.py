@@ -70,8 +70,8 @@ def _last_changes(group: Group) -> dict[Path, _Commit]:
 
 def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
     names = [str(path.resolve()) for path in paths]
-    changes = git(top, "status", "--porcelain", "--", *names)
-    told = git(top, "log", "-1", "--format=%H%x00%aN%x00%aE", "--", *names) or ""
+    changes = git(top, "--literal-pathspecs", "status", "--porcelain", "--", *names)
+    told = git(top, "--literal-pathspecs", "log", "-1", "--format=%H%x00%aN%x00%aE", "--", *names) or ""
     if changes is None or changes.strip() or not told.strip():
         first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
         raise _refusal(

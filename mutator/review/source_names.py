@@ -2,12 +2,12 @@
 
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 _Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-_Wanted = Callable[[ast.expr | ast.stmt], bool]
+_Wanted = Callable[[ast.expr], bool]
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
@@ -135,39 +135,30 @@ class _Scope:
 
 
 def _uses(node: ast.AST, scope: _Scope, wanted: _Wanted) -> Iterator[Use]:
-    if isinstance(node, ast.ClassDef):
-        inner = _Scope(scope.local, scope.imports, f"{scope.owner}.{node.name}".strip("."))
-        for one in (*node.bases, *node.keywords, *node.decorator_list):
-            yield from _uses(one, scope, wanted)
-        for one in node.body:
-            yield from _uses(one, inner, wanted)
-        return
-    words = _dotted(node) if isinstance(node, ast.Name | ast.Attribute) else ()
-    if words:
-        assert isinstance(node, ast.Name | ast.Attribute)
-        if wanted(node) and (use := scope.use(words)):
+    if isinstance(node, ast.Name | ast.Attribute) and (words := _dotted(node)):
+        if isinstance(node.ctx, ast.Load) and wanted(node) and (use := scope.use(words)):
             yield use
         return
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        if wanted(node):
-            yield from (Use(("import",), imported=one) for _, one in _imports([node]))
-        return
-    if isinstance(node, _SCOPES):
-        outer = [*node.args.defaults, *filter(None, node.args.kw_defaults)]
-        for one in (*outer, *getattr(node, "decorator_list", [])):
-            yield from _uses(one, scope, wanted)
-        body = node.body if isinstance(node.body, list) else [node.body]
+    for part, inner in _parts(node, scope):
+        yield from _uses(part, inner, wanted)
+
+
+def _parts(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.AST, _Scope]]:
+    """The parts of a node, each with the scope that it is in; no annotations, which call nothing."""
+    if isinstance(node, ast.ClassDef):
+        inner = replace(scope, owner=f"{scope.owner}.{node.name}".strip("."), me="")
+        yield from ((one, scope) for one in (*node.bases, *node.keywords, *node.decorator_list))
+        yield from ((one, inner) for one in node.body)
+    elif isinstance(node, _SCOPES):
+        defaults = (*node.args.defaults, *filter(None, node.args.kw_defaults))
+        yield from ((one, scope) for one in (*defaults, *getattr(node, "decorator_list", ())))
         inner = scope.inside(node)
-        for one in body:
-            yield from _uses(one, inner, wanted)
-        return
-    if isinstance(node, _COMPREHENSIONS):
-        names = frozenset(
-            n.id for g in node.generators for n in ast.walk(g.target) if isinstance(n, ast.Name)
-        )
-        scope = _Scope(scope.local | names, scope.imports, scope.owner, scope.me)
-    for one in _called_children(node):
-        yield from _uses(one, scope, wanted)
+        yield from ((one, inner) for one in (node.body if isinstance(node.body, list) else [node.body]))
+    else:
+        if isinstance(node, _COMPREHENSIONS):
+            names = (n for one in node.generators for n in ast.walk(one.target) if isinstance(n, ast.Name))
+            scope = replace(scope, local=scope.local | {name.id for name in names})
+        yield from ((one, scope) for one in _called_children(node))
 
 
 def _called_children(node: ast.AST) -> Iterator[ast.AST]:

@@ -1,0 +1,168 @@
+"""The code that injected lines call is found by its names, as far as names lead, and no further."""
+
+from pathlib import Path
+
+import pytest
+
+from mutator.review.called_code import CalledCode
+from mutator.targets.source_tree import SourceTree
+
+TAG = "  # fi:01234567"
+EYE = """\
+import car.tools
+import car.tools as kit
+from car import numbers, weather
+from .tools import clip as cut
+from car.everything import *
+from math import sqrt
+
+LEVEL = 3
+
+class Eye(Sense):
+    GAIN = 2.0
+
+    def look(self, picture, clip):
+        from car.weather import Fog as Mist
+        {line}
+        return picture
+
+    def lid(self):
+        return cut(self.GAIN)
+
+def helper():
+    return LEVEL
+
+class Sense:
+    def feel(self):
+        return helper()
+"""
+TREE = {
+    "car/__init__.py": "from car.weather import Rain\n",
+    "car/weather.py": """\
+from car.base import Effect
+from car.tools import clip as bounded
+from numpy import ndarray
+
+MOST: int = 9
+TABLE = "drops.npz"
+
+class Rain(Effect):
+    WIDTH = MOST
+
+    def __init__(self, amount: Fog):
+        self.amount = self.limited(amount)
+
+    def limited(self, amount):
+        return bounded(amount)
+
+class Fog:
+    def apply(self, picture):
+        bounded = [clip for clip in picture]
+        return bounded, TABLE
+
+class Never:
+    pass
+""",
+    "car/base.py": "class Effect:\n    def apply(self):\n        return 1\n",
+    "car/tools.py": """\
+def clip(value):
+    from car import numbers
+    return numbers.one(value)
+
+@cached
+def never():
+    return clip
+""",
+    "car/numbers.py": "one = two = lambda x: x\none = sorted\n",
+    "car/everything.py": "from car.numbers import *\nfrom car.everything import *\n",
+    "car/drops.npz": "\0",
+}
+RAIN = {
+    "car/base.py Effect",
+    "car/numbers.py one",
+    "car/tools.py clip",
+    "car/weather.py MOST",
+    "car/weather.py Rain",
+}
+
+
+def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
+    pristine = EYE.format(line="picture = picture")
+    files = {**TREE, "car/eye.py": pristine, **changed}
+    tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
+    return CalledCode(tree).of_lines("car/eye.py", EYE.format(line=line + tag).encode())
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("picture = Storm(3); from car.weather import Rain as Storm", RAIN),
+        ("picture = weather.Rain(3).apply(picture)", RAIN),
+        ("picture = _fi.kept('x', lambda: car.weather.Rain(3))", RAIN),
+        ("picture = car.Rain(3)", RAIN),
+        ("from car import numbers, weather", set()),  # and use nothing of them
+        ("picture = str(numbers)", {"car/numbers.py"}),
+        ("picture = Mist().apply(picture)", {"car/weather.py Fog", "car/weather.py TABLE", "car/drops.npz"}),
+        ("picture = kit.clip(picture)", {"car/tools.py clip", "car/numbers.py one"}),
+        ("picture = cut(picture)", {"car/tools.py clip", "car/numbers.py one"}),
+        ("picture = two(picture)", {"car/numbers.py two"}),
+        ("picture = helper()", {"car/eye.py helper", "car/eye.py LEVEL"}),
+        ("picture = clip(picture)", set()),  # an argument
+        ("picture = [cut for cut in picture]", set()),
+        ("picture = sqrt(picture) + len(unknown.cut)", set()),
+        ("picture = picture.cut.helper()", set()),
+        ("picture: Sense = 1", set()),
+        (
+            "self.lid()",
+            {"car/eye.py Eye.lid", "car/eye.py Eye.GAIN", "car/tools.py clip", "car/numbers.py one"},
+        ),
+        ("self.feel()", {"car/eye.py Sense.feel", "car/eye.py helper", "car/eye.py LEVEL"}),
+        ("self.unknown()", set()),
+        ("picture = Sense()", {"car/eye.py Sense", "car/eye.py helper", "car/eye.py LEVEL"}),
+    ],
+)
+def test_names_lead_to_what_is_called(line: str, found: set[str]) -> None:
+    """Through imports, modules, bases, `self`, and on from there; not to variables or annotations."""
+    assert set(called(line)) == found
+
+
+def test_only_injected_lines_call() -> None:
+    """What the target's own lines call beside them is no part of it, nor what the probe's do."""
+    assert called("picture = weather.Rain(3)", tag="") == {}
+    assert called("picture = weather.Rain(3)", tag="  # fi:observe") == {}
+
+
+def test_of_a_changed_line_only_the_new_value_calls() -> None:
+    """The rest of the line is the target's."""
+    line = 'picture = cut(picture) + (helper() if _fi.active("01234567") else Mist())'
+    was = f"{TAG} was:        picture = cut(picture) + Mist()"
+    assert set(called(line, was)) == {"car/eye.py helper", "car/eye.py LEVEL"}
+
+
+def test_the_source_is_that_of_the_definition() -> None:
+    """All statements that set a name, decorators included; a file that is no Python is there whole."""
+    assert called("kit.never()")["car/tools.py never"] == "@cached\ndef never():\n    return clip\n"
+    assert called("numbers.one()")["car/numbers.py one"] == TREE["car/numbers.py"]
+    assert called("Mist()")["car/drops.npz"] == "\0"
+
+
+def test_what_is_broken_calls_nothing() -> None:
+    """A module that cannot be parsed has no names; one that imports itself is no endless way."""
+    assert called("picture = weather.Rain(3)", **{"car/weather.py": "class Rain(:\n"}) == {}
+    assert called("picture = four()") == {}
+
+
+@pytest.mark.parametrize(
+    ("texts", "found"),
+    [
+        (["picture - LEVEL", "helper()"], {"car/eye.py LEVEL", "car/eye.py helper"}),
+        (["Mist(clip)"], {"car/weather.py Fog", "car/weather.py TABLE", "car/drops.npz"}),
+        (["self.GAIN"], {"car/eye.py Eye.GAIN"}),
+        (["left out"], set()),
+    ],
+)
+def test_expressions_are_looked_at_where_they_are_to_stand(texts: list[str], found: set[str]) -> None:
+    """Names mean there what they mean in the function; words that are no expression call nothing."""
+    files = {**TREE, "car/eye.py": EYE.format(line="pass")}
+    tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
+    assert set(CalledCode(tree).of_expressions("car/eye.py", "Eye.look", texts)) == found

@@ -1,0 +1,119 @@
+"""With `four_eyes` nobody approves what they changed last, as git tells it."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.review.catalogue import Group, of_library
+from mutator.review.commits import library_commit, user_name
+from mutator.review.decisions import Change, Kind, Review, State, load_review, record
+from mutator.workspace import Workspace
+
+HEAD = 'schema: review/2\ntarget: "toycar"\nfour_eyes: true\ndecisions: []\n'
+LANE = "fault_library/faults/sensor/lane.yaml"
+OFFSET = "templates/offset.py.j2"
+
+
+def git(folder: Path, *words: str) -> str:
+    """What git says, as Git Smith."""
+    names = {"AUTHOR_NAME": "Git Smith", "AUTHOR_EMAIL": "smith@example.org"}
+    names |= {"COMMITTER_NAME": "A Robot", "COMMITTER_EMAIL": "robot@example.org"}
+    env = os.environ | {f"GIT_{name}": value for name, value in names.items()}
+    done = subprocess.run(["git", *words], cwd=folder, env=env, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def commit(root: Path, path: str, author: str) -> str:
+    """A change of a file, committed by its author; the commit."""
+    with (root / path).open("a") as file:
+        file.write("{# more #}\n" if path.endswith("j2") else "# more\n")
+    git(root, "commit", "-qam", "more", f"--author={author}")
+    return git(root, "rev-parse", "HEAD")
+
+
+@pytest.fixture
+def root(toycar: Workspace) -> Path:
+    """The toy in a clone, with `four_eyes`; all of it was written by Git Smith."""
+    root = toycar.library.parent
+    (root / "fault_library/reviews").mkdir()
+    (root / "fault_library/reviews/toycar.yaml").write_text(HEAD)
+    for words in (("init", "-q"), ("add", "."), ("commit", "-qm", "all of it")):
+        git(root, *words)
+    return root
+
+
+def lane(toy: Workspace) -> Group:
+    return of_library(toy, toy.manifest("toycar"), specs=["sensor/lane"])[0]
+
+
+def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
+    group, review = lane(toy), load_review(toy, "toycar")
+    return record(
+        toy,
+        "toycar",
+        [Change(group=group, kind=kind, by=by)],
+        {group.id: review.revision(group.id)},
+    )
+
+
+def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root: Path) -> None:
+    """Whatever they changed of a group (spec, template, its YAML) and however they sign; others do, and stay
+    under the rule."""
+    for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
+        with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
+            say(toycar, author)
+    assert git(root, "rev-parse", "HEAD")[:12] in str(caught.value)
+    assert load_review(toycar, "toycar").entries == {}
+    review = say(toycar, "Jane Doe")
+    assert review.state(lane(toycar)) is State.APPROVED
+    assert load_review(toycar, "toycar").four_eyes
+    assert say(toycar, "Git Smith", Kind.REJECT).state(lane(toycar)) is State.REJECTED
+
+
+@pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
+def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path, path: str) -> None:
+    """Who changed the spec or template last is refused, no longer who did before; no other file counts."""
+    sha = commit(root, path, "Jane Doe <jane@example.org>")
+    commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
+    with pytest.raises(MutatorError, match=sha[:12]):
+        say(toycar, "Jane Doe")
+    assert say(toycar, "Joe").decision(lane(toycar).id)
+    assert say(toycar, "Git Smith").decision(lane(toycar).id)
+
+
+def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> None:
+    """A change that is not committed, a file that never was, a library without git: the remedy says so."""
+    with (root / LANE).open("a") as file:
+        file.write("# more\n")
+    with pytest.raises(MutatorError, match=r"lane\.yaml: nobody can tell .* not committed.*commit first"):
+        say(toycar, "Jane Doe")
+    git(root, "rm", "-q", "--cached", LANE)
+    git(root, "commit", "-qm", "less")
+    with pytest.raises(MutatorError, match="not committed"):
+        say(toycar, "Jane Doe")
+    (root / ".git").rename(root / "git")
+    with pytest.raises(MutatorError, match=r"no git clone.*keep it in git"):
+        say(toycar, "Jane Doe")
+    assert say(toycar, "Jane Doe", Kind.REJECT).decision(lane(toycar).id)
+
+
+def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> None:
+    """With `-dirty` where more than reviews is not committed."""
+    sha = git(root, "rev-parse", "HEAD")
+    for _ in range(2):  # the second time the first decision is not committed
+        decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
+        assert decision is not None and decision.commit == sha
+    (root / "fault_library/faults/sensor/new.yaml").write_text("")
+    assert library_commit(toycar) == f"{sha}-dirty"
+
+
+def test_who_is_at_work(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clone's own `user.name`, or nobody."""
+    monkeypatch.setenv("HOME", str(root))
+    monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
+    assert user_name(toycar) is None
+    git(root, "config", "user.name", "Jane Doe")
+    assert user_name(toycar) == "Jane Doe"

@@ -1,0 +1,65 @@
+"""What the values of a group may be follows from its specs, not from what a seed has drawn."""
+
+from dataclasses import replace
+
+import pytest
+
+from mutator.faults.expansion import expand
+from mutator.model import Fault, Value
+from mutator.review.value_ranges import ranges_of
+from mutator.workspace import Workspace
+
+
+def faults(toy: Workspace, spec: str, seed: int = 0) -> list[Fault]:
+    return list(expand(toy.spec(spec), seed, models=toy.fault_models(), manifest=toy.manifest("toycar")))
+
+
+def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
+    """From the least end of the ranges to the greatest, in the variable's unit, whatever the seed."""
+    specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
+    for seed in (0, 1):
+        longer, nearer = (
+            [one for one in faults(toycar, "sensor/distance", seed) if one.spec.endswith(name)]
+            for name in ("longer", "nearer")
+        )
+        assert ranges_of(longer, specs, models) == {"by": (1.0, 65.0)}
+        assert ranges_of(nearer[:1], specs, models) == {"by": (-459.0, -400.0), "low": (0.0, 0.0)}
+        assert ranges_of(faults(toycar, "sensor/lane", seed)[:1], specs, models) == {"by": (0.0, 2.5)}
+
+
+def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
+    """A fault of a spec that is not known has the values that it has."""
+    fault = faults(toycar, "sensor/distance")[0]
+    assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
+
+
+@pytest.mark.parametrize(
+    ("values", "found"),
+    [
+        ([3.0, -1.0], (-1.0, 3.0)),
+        ([float("nan"), 3.0], (3.0, 3.0, "nan")),
+        ([float("inf"), float("-inf")], ("-inf", "inf")),
+        ([True, "word", None], None),  # the group's name tells these
+    ],
+)
+def test_what_is_no_number_is_a_word(
+    toycar: Workspace, values: list[Value], found: tuple[object, ...] | None
+) -> None:
+    """Values without an order stand beside the range."""
+    fault = faults(toycar, "sensor/distance")[0]
+    (injection,) = fault.injections
+    made = [replace(fault, injections=(replace(injection, params=(("by", one),)),)) for one in values]
+    assert ranges_of(made, {}, toycar.fault_models()).get("by") == found
+
+
+def test_several_injections_are_numbered_and_limits_are_values(toycar: Workspace) -> None:
+    """Which execution, and of which instance, is a value, too; a seed is drawn, and none."""
+    fault = faults(toycar, "sensor/distance")[0]
+    (injection,) = fault.injections
+    made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))
+    found = ranges_of([made], {}, toycar.fault_models())
+    assert set(found) == {"1.by", "2.by", "2.call", "2.where"}
+    assert (found["2.call"], found["2.where"]) == ((3.0, 3.0), ("index == 2",))
+    seeded = replace(injection, model="image_effect", params=(("amount", 2.0), ("seed", 9)))
+    found = ranges_of([replace(fault, injections=(seeded,))], {}, toycar.fault_models())
+    assert found == {"amount": (2.0, 2.0)}
