@@ -3,7 +3,8 @@
 A text begins with the digests it stands for, so one that does not belong to the decision explains nothing.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from difflib import unified_diff
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from mutator._common.files import make_folder, no_pipe, write_atomic
 from mutator.review.entries import Bound, Values, values_in_words
 
 _AROUND = 3  # unchanged lines around a change
+_HUNK = re.compile(r"@@ -\S+ \+(\d+)\S* @@")
 
 
 def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
@@ -38,7 +40,25 @@ def changes(path: Path, bound: Bound, text: str) -> str:
     if not before.startswith(f"{_head(bound)}\n"):
         return ""
     old, new = (one.partition("\n")[2].splitlines(keepends=True) for one in (before, text))
-    return "".join(unified_diff(old, new, "as decided", "now", n=_AROUND))
+    return "".join(_headed(unified_diff(old, new, "as decided", "now", n=_AROUND), new))
+
+
+def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
+    """The diff with what each hunk is part of behind its `@@`: `calls: car/lens.py Light`."""
+    for line in diff:
+        hunk = _HUNK.match(line)
+        yield f"{hunk[0]} {_section(new[: int(hunk[1]) - 1 + _AROUND])}\n" if hunk else line
+
+
+def _section(lines: Iterable[str]) -> str:
+    """The section, and the part of it, that these lines end in."""
+    section = part = ""
+    for line in lines:
+        if line.startswith("== "):
+            section, part = line.strip("= \n"), ""
+        elif line.startswith("-- ") and section != "diff":
+            part = line.removeprefix("-- ").strip()
+    return ": ".join(filter(None, (section, part)))
 
 
 def _head(bound: Bound) -> str:

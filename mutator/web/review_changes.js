@@ -17,9 +17,9 @@ const Changes = (() => {
     });
   }
 
-  /** A line in colours; a sign that it begins with is that of the diff inside. */
+  /** A line in colours; a sign that it begins with is that of the diff inside; `-- ` is a heading. */
   function inner(text) {
-    const sign = /^[-+](?![-+]{2} )/.exec(text);
+    const sign = /^[-+](?!-{1,2} |\+{2} )/.exec(text);
     return sign ? [el(`span.inner.${KINDS[sign[0]]}`, {}, sign[0]), ...Diff.coloured(text.slice(1))] : Diff.coloured(text);
   }
 

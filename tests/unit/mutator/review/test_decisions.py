@@ -14,7 +14,7 @@ from mutator.errors import MutatorError
 from mutator.review.catalogue import Group
 from mutator.review.decisions import Change, Conflict, Kind, Review, State, load_review, record
 from mutator.review.entries import Bound
-from mutator.review.seen_texts import text_of
+from mutator.review.seen_texts import changes, keep, text_of
 from mutator.workspace import Workspace
 
 BOUND = Bound(diff="d" * 16, function="f" * 16, template="0" * 16, calls="c" * 16)
@@ -178,6 +178,19 @@ def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
     assert {name[0]: found.entries[name].decision.by for name in found.entries} == {  # type: ignore[union-attr]
         name: by for by, names in shares.items() for name in names
     }
+
+
+def test_a_change_tells_what_it_is_part_of(tmp_path: Path) -> None:
+    """Each hunk names the section, and the function of it, in which it begins."""
+    path, body = tmp_path / "seen.txt", "".join(f"{i}\n" for i in range(9))
+
+    def text(value: int) -> str:
+        calls = f"-- car/a.py A\n{body}-- car/b.py B\n{body}y = {value}\n"
+        return text_of(BOUND, {}, {"diff": f"-- a\n{body}+x = {value}\n", "calls": calls})
+
+    keep(path, text(1))
+    hunks = [line for line in changes(path, BOUND, text(2)).splitlines() if line.startswith("@@")]
+    assert [line.rpartition("@@ ")[2] for line in hunks] == ["diff", "calls: car/b.py B"]
 
 
 def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
