@@ -102,12 +102,14 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
     """One group: what it is, what was said of it, diff with holes, values, triggers."""
-    from mutator.review.readable_groups import condition_lines, value_table
+    from mutator.review.readable_groups import condition_lines, ranges, value_table
 
     _print_head(terminal, review, group)
     for injection in group.injections:
         terminal.say(f"  {injection}", style="bold")
     runs = "" if group.runs is None else f", {counted(group.runs, 'experiment')}"
+    if group.values:
+        terminal.say(f"values: {ranges(group)}")
     terminal.say(f"when: {_when(group)}; {counted(len(group.faults), 'fault')}{runs}")
     conditions = condition_lines(group.triggers)
     for line in conditions[:CONDITIONS]:

@@ -83,7 +83,11 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(groups.group_label(e.fault) for e in plan.experiments)
-    specs = (*workspace.specs(), *(workspace.spec(one.file) for one in plan.campaign.faults if one.file))
+    files = [one.file for one in plan.campaign.faults if one.file]
+    named = [
+        workspace.spec(file) for file in files if file.is_file()
+    ]  # a run's copy of a campaign leads nowhere
+    specs = (*workspace.specs(), *named)
     return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 
 

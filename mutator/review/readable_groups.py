@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 from mutator.model import Trigger
 from mutator.review.catalogue import Group
+from mutator.review.entries import values_in_words
 from mutator.review.groups import Shape
 
 _TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
@@ -27,6 +28,11 @@ def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
 
 def _shown_holes(shape: Shape) -> list[str]:
     return [name for name in shape.holes if not _ID_HOLE.match(name)]
+
+
+def ranges(group: Group) -> str:
+    """What the values may be by the specs, which is what an approval covers: `by: -40 to 40`."""
+    return values_in_words(group.values)
 
 
 def condition_lines(triggers: Sequence[Trigger]) -> list[str]:

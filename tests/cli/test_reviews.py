@@ -72,6 +72,7 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
     assert "+            gap = gap ⟨by⟩  # fi:⟨id⟩" in answer.out
     assert re.search(r"^sensor/distance/longer \d m +as_described +\+ \d$", answer.out, re.MULTILINE)
     assert re.search(r"^  hwt .*\(near\)$", answer.out, re.MULTILINE)
+    assert "\nvalues: by: 1 to 65\n" in answer.out
     [group] = cli("review", "show", longer, "--json").json
     assert group["values"][0]["by"].startswith("+ ")
     assert len(group["values"]) == group["faults"] == 8  # four, in either reading

@@ -6,7 +6,7 @@ import pytest
 
 from mutator._common.version import VERSION
 from mutator.campaigns.freezing import freeze
-from mutator.campaigns.plans import Choices, Plan, make_plan
+from mutator.campaigns.plans import Choices, Plan, load_plan, make_plan
 from mutator.errors import CheckFailed
 from mutator.execution.running import run_campaign
 from mutator.review import gate
@@ -89,3 +89,22 @@ def test_nothing_is_planned_without_approval(toycar: Workspace, tmp_path: Path) 
     with pytest.raises(CheckFailed):
         run_campaign(toycar, "small", tmp_path / "run", reviewed=True)
     assert not (tmp_path / "run" / "run.json").exists()
+
+
+def test_a_run_goes_on_without_the_spec_file_of_its_campaign(toycar: Workspace, tmp_path: Path) -> None:
+    """A run's own copy of a campaign cannot find a file beside the original; what it drew is approved."""
+    mine = tmp_path / "mine"
+    mine.mkdir()
+    spec = (toycar.library / "faults/sensor/lane.yaml").read_text()
+    (mine / "lane.yaml").write_text(spec.replace("fault_type: lane", "fault_type: mine"))
+    campaign = toycar.campaign("small").read_text()
+    (mine / "mine.yaml").write_text(
+        campaign.replace("spec: sensor/lane/shifted, values", "spec: lane.yaml, values")
+    )
+    plan = make_plan(toycar, mine / "mine.yaml", Choices(only='fault_type == "mine"'))
+    lane = of_plan(toycar, plan)[0]
+    assert lane.values == {"by": (0.0, 2.5)} and mine / "lane.yaml" in lane.made_from
+    run = freeze(plan, tmp_path / "run", toycar)
+    decide(toycar, plan)
+    (mine / "lane.yaml").unlink()
+    assert gate.approvals(toycar, load_plan(run))["groups"]
