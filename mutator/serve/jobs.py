@@ -25,6 +25,7 @@ _LOG_BYTES = 100_000  # of a job, the last ones
 _MOST_JOBS = 200  # that are told of; of those that ended, the newest
 _MOST_WAITING = 50
 _NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
+_STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # of a terminal
 _COUNT = re.compile(r"^([a-z ]+) (\d+)/(\d+)(?:,|$)")
 _TRIED = re.compile(r"^experiment +([0-9a-f]{16})$", re.MULTILINE)
 _END_S = 30.0  # for jobs to end, once the server does
@@ -76,14 +77,13 @@ class Job:
     @property
     def text(self) -> str:
         """What it printed, without control characters and without places on the disk."""
-        text = without_places(self.log.decode("utf-8", "replace"))
-        return "".join(c for c in text if c.isprintable() or c in "\n\t")
+        return _plain(self.log)
 
     def hear(self, line: bytes) -> None:
         """Take a line that it printed."""
         self.log += line
         del self.log[:-_LOG_BYTES]
-        text = without_places(line.decode("utf-8", "replace")).strip()
+        text = _plain(line).strip()
         if not text:
             return
         found = _COUNT.match(text)
@@ -219,6 +219,12 @@ class Jobs:
             tried = _TRIED.search(job.text)
             return f"/{TRIES}/{tried[1]}/plot.svg" if tried and "\nplot: " in job.text else None
         return job.work.result or self._report_at(job.work)
+
+
+def _plain(data: bytes | bytearray) -> str:
+    """Printable text without places on the disk."""
+    text = without_places(_STYLES.sub("", data.decode("utf-8", "replace")))
+    return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 
 def _news(job: Job) -> str:

@@ -1,0 +1,205 @@
+"""A server that is killed: its jobs leave no process, no half of a file, and a run folder that verifies."""
+
+import http.client
+import json
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.files import is_half_written
+from mutator.serve.keeper import PATIENCE_S
+from mutator.workspace import Workspace
+
+CAMPAIGN = {"kind": "campaign", "campaign": "toy", "name": "new", "limit": 6, "workers": 2}
+
+
+@dataclass
+class Server:
+    """`mutator serve` as a process of its own."""
+
+    folder: Path
+    root: Path
+    process: subprocess.Popen[str]
+    address: str
+
+    @classmethod
+    def start(cls, folder: Path, root: Path) -> "Server":
+        return cls(folder, root, *started(folder, root))
+
+    def restart(self) -> None:
+        """Another server, once this one has ended."""
+        self.process, self.address = started(self.folder, self.root)
+
+    @property
+    def port(self) -> int:
+        return int(re.findall(r":(\d+)/", self.address)[0])
+
+    @property
+    def token(self) -> str:
+        return self.address.partition("token=")[2]
+
+    def ask(self, path: str, body: Any = None) -> Any:
+        """What it answers to a page of its own."""
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
+        headers = {"Cookie": f"mutator-{self.port}={self.token}", "Content-Type": "application/json"}
+        headers |= {"Origin": f"http://127.0.0.1:{self.port}"}
+        data = None if body is None else json.dumps(body)
+        connection.request("GET" if body is None else "POST", path, data, headers)
+        answer = connection.getresponse().read()
+        connection.close()
+        return json.loads(answer)
+
+    def wait_for(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+        """The newest job once this holds of it."""
+        deadline = time.monotonic() + 120
+        while time.monotonic() < deadline:
+            [job, *_] = self.ask("/api/jobs")["jobs"]
+            if what(job):
+                return dict(job)
+            time.sleep(0.02)
+        raise AssertionError(job)
+
+
+def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
+    """A new server, and the address that it prints."""
+    with (folder / "stderr").open("a") as errors:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "mutator", "serve", "runs", "--no-browser", "--root", str(root)],
+            cwd=folder,
+            stdout=subprocess.PIPE,
+            stderr=errors,
+            text=True,
+        )
+    assert process.stdout is not None
+    return process, process.stdout.readline().strip()
+
+
+def descendants(pid: int) -> set[int]:
+    """All processes that came of one, in whatever session."""
+    parents = {}
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            fields = path.read_text().rpartition(") ")[2].split()
+        except OSError:
+            continue
+        parents[int(path.parent.name)] = int(fields[1])
+    found: set[int] = {pid}
+    while more := {one for one, parent in parents.items() if parent in found} - found:
+        found |= more
+    return found - {pid}
+
+
+def living(pids: set[int]) -> set[int]:
+    """Those that have not ended."""
+    return {pid for pid in pids if Path(f"/proc/{pid}").exists() and _state(pid) != "Z"}
+
+
+def _state(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0]
+    except OSError:
+        return "Z"
+
+
+def wait_until_gone(pids: set[int], within_s: float) -> None:
+    deadline = time.monotonic() + within_s
+    while left := living(pids):
+        assert time.monotonic() < deadline, [Path(f"/proc/{pid}/cmdline").read_bytes() for pid in left]
+        time.sleep(0.05)
+
+
+def mutator(server: Server, *words: str) -> subprocess.CompletedProcess[str]:
+    """A command on the server's library."""
+    command = [sys.executable, "-m", "mutator", *words, "--root", str(server.root)]
+    return subprocess.run(command, cwd=server.folder, capture_output=True, text=True, check=False)
+
+
+def check_left(server: Server, run: str) -> None:
+    """No file of the run folder is half written, and all that is there verifies."""
+    folder = server.folder / "runs" / run
+    assert not [path for path in folder.rglob("*") if is_half_written(path.name)]
+    if (folder / "digests.json").exists():
+        verified = mutator(server, "verify", f"runs/{run}")
+        assert verified.returncode == 0, verified.stdout + verified.stderr
+
+
+def kill(server: Server, number: int) -> None:
+    """End the server by a signal, and wait until nothing is left of its jobs."""
+    pids = descendants(server.process.pid)
+    assert pids
+    server.process.send_signal(number)
+    server.process.wait()
+    wait_until_gone(pids, PATIENCE_S + 10)
+    assert server.token not in (server.folder / "stderr").read_text()
+
+
+@pytest.fixture
+def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Server]:
+    """A server of the toy, without any run."""
+    shutil.rmtree(toycar.library / "faults" / "hostile")
+    (tmp_path / "runs").mkdir()
+    started = Server.start(tmp_path, toycar.library.parent)
+    yield started
+    started.process.kill()
+    started.process.wait()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("stage", ["planning", "golden runs", "experiments", "tables"])
+def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int) -> None:
+    """Whatever it is at, and however the server ends; the same campaign then goes on to its end."""
+    server.ask("/api/jobs", CAMPAIGN)
+    server.wait_for(lambda job: job["message"].startswith(stage) or bool(job["ended"]))
+    kill(server, number)
+    check_left(server, "new")
+    done = mutator(server, "run", "toy", "--out", "runs/new", "--limit", "6", "-n", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    check_left(server, "new")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["plot", "film", "still", "report", "rerun"])
+def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) -> None:
+    """A server that is killed at any moment of such a job leaves the run folder as it was, or all of it."""
+    done = mutator(server, "run", "toy", "--out", "runs/new", "--limit", "6", "-n", "2")
+    assert done.returncode == 0, done.stdout + done.stderr
+    ids = [line.split(",")[0] for line in (server.folder / "runs/new/plan.csv").read_text().splitlines()[1:]]
+    order = {"kind": kind, "run": "new"}
+    order |= {} if kind == "report" else {"experiment": ids[0]}
+    order |= {"t": 2.0} if kind == "still" else {}
+    began = time.monotonic()
+    server.ask("/api/jobs", order)
+    server.wait_for(lambda job: bool(job["ended"]))
+    whole = time.monotonic() - began
+    for share in (0.5, 0.7, 0.8, 0.9, 0.97):
+        server.ask("/api/jobs", order)
+        time.sleep(share * whole)
+        kill(server, signal.SIGKILL)
+        check_left(server, "new")
+        server.restart()
+
+
+@pytest.mark.slow
+def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
+    """All that it started is gone before it is told as ended, and the server goes on with the next one."""
+    server.ask("/api/jobs", CAMPAIGN)
+    server.wait_for(lambda job: job["message"].startswith("experiments"))
+    pids = descendants(server.process.pid)
+    assert len(pids) > 2
+    server.ask("/api/jobs/1/cancel", {})
+    server.wait_for(lambda job: bool(job["ended"]))
+    assert not living(pids)
+    check_left(server, "new")
+    server.ask("/api/jobs", CAMPAIGN)
+    assert server.wait_for(lambda job: bool(job["ended"]))["state"] == "done"
+    check_left(server, "new")

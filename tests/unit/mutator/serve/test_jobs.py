@@ -1,0 +1,152 @@
+"""Jobs, from an order to what lies in the run folder; one small campaign of the toy is driven for all."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.errors import MutatorError
+from mutator.report.panels import figures
+from mutator.serve.jobs import Job, Jobs, State
+from mutator.serve.orders import Rerun, Work
+from mutator.store import plan_file
+from mutator.store.run_folder import RunFolder
+from mutator.workspace import Workspace
+
+from .conftest import Client
+from .test_files import HOSTILE
+from .test_security import check_policy
+
+
+@pytest.fixture(scope="module")
+def busy(
+    tmp_path_factory: pytest.TempPathFactory,
+    copy_toycar: Callable[[Path], Workspace],
+    served_at: Callable[[Workspace, Path], Any],
+) -> Iterator[Client]:
+    """A server that has run a campaign."""
+    place = tmp_path_factory.mktemp("busy")
+    workspace = copy_toycar(place)
+    shutil.rmtree(workspace.library / "faults" / "hostile")
+    (place / "runs").mkdir()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "drawings", lambda frame: ())
+        with served_at(workspace, place / "runs") as client:
+            order = {"kind": "campaign", "campaign": "small", "name": "first", "limit": 2, "workers": 1}
+            answer = client.post("/api/jobs", order)
+            assert (answer.status, answer.json) == (201, {"id": "1"})
+            job = client.ended("1")
+            assert job["state"] == "done", client.get("/api/jobs/1/log").json["log"]
+            assert job["message"].startswith("outcomes: ")
+            assert job["result"] == "/runs/first/report/index.html"
+            yield client
+
+
+def experiment(client: Client) -> str:
+    return next(plan_file.ids(client.place / "runs/first"))
+
+
+def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
+    """Its run folder is whole, is served, and compares with itself."""
+    assert RunFolder.open(busy.place / "runs/first").finished
+    [run] = busy.get("/api/runs").json["runs"]
+    assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
+    report = busy.get(run["report"])
+    assert '<script src="/assets/served.js" defer></script>\n</body>' in report.text
+    compared = busy.get("/compare/first/first/")
+    check_policy(compared)
+    assert "Nothing: the same sources" in compared.text
+    assert busy.get("/compare/first/first/pairs.csv").text.startswith("experiment_a,")
+    assert busy.get("/compare/first/first/COMPARISON.md").status == 404
+    log = busy.get("/api/jobs/1/log").json["log"]
+    assert "2 of 2 experiments done" in log
+
+
+@pytest.mark.slow
+def test_an_exact_plot_is_kept_in_the_run(busy: Client) -> None:
+    """Trace, plot and series lie where `rerun --trace` puts them, and are served."""
+    about = {"run": "first", "experiment": experiment(busy)}
+    answer = busy.post("/api/jobs", {"kind": "plot", **about})
+    job = busy.ended(answer.json["id"])
+    assert (job["state"], job["message"]) == ("done", "the same as the campaign's record, byte for byte")
+    assert job["result"] == f"/runs/first/report/index.html#e={experiment(busy)}"
+    assert busy.get(f"/runs/first/plots/{experiment(busy)}.svg").headers["content-type"] == "image/svg+xml"
+    assert RunFolder.open(busy.place / "runs/first").finished
+
+
+@pytest.mark.slow
+def test_a_try_has_its_plot(busy: Client) -> None:
+    """It goes into try/ beside the runs, which is no run itself; the job leads to its plot."""
+    order = {"kind": "try", "spec": "sensor/lane", "scenario": "A", "trigger": "2", "value": 2.4}
+    job = busy.ended(busy.post("/api/jobs", order).json["id"])
+    assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json
+    assert job["message"].startswith("verdict: ")
+    assert busy.get(job["result"]).headers["content-type"] == "image/svg+xml"
+    assert [run["key"] for run in busy.get("/api/runs").json["runs"]] == ["first"]
+
+
+def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
+    """One at a time: the second waits, and both can be cancelled; then nothing of them goes on."""
+    order = {"kind": "campaign", "campaign": "toy", "name": "second", "limit": 20, "workers": 2}
+    first, second = (busy.post("/api/jobs", order).json["id"] for _ in range(2))
+    states = {job["id"]: job["state"] for job in busy.get("/api/jobs").json["jobs"]}
+    assert states[second] == "queued"
+    for name in (second, first):
+        assert busy.post(f"/api/jobs/{name}/cancel", {}).status == 200
+    for name in (first, second):
+        job = busy.ended(name)
+        assert (job["state"], job["result"]) == ("cancelled", None)
+        assert busy.post(f"/api/jobs/{name}/cancel", {}).status == 409
+    assert busy.post("/api/jobs/99/cancel", {}).status == 404
+    assert busy.get("/api/jobs/99/log").status == 404
+
+
+@pytest.mark.slow
+def test_a_job_that_fails_says_why(busy: Client) -> None:
+    """With the line that the command line complains with, without a place on the disk."""
+    target = busy.place / "toy/tree/toycar/sensing.py"
+    whole = target.read_text()
+    target.write_text(whole + "# changed\n")
+    answer = busy.post("/api/jobs", {"kind": "rerun", "run": "first", "experiment": experiment(busy)})
+    job = busy.ended(answer.json["id"])
+    target.write_text(whole)
+    assert job["state"] == "failed"
+    assert "run.json" in job["message"] or "target" in job["message"]
+
+
+def job(**given: Any) -> Job:
+    order = Rerun(kind="rerun", run="first", experiment="0" * 16)
+    return Job(id="1", work=Work(order=order, title="again", words=()), **given)
+
+
+def test_what_a_job_prints_is_text() -> None:
+    """Control characters and places are left out, markup stays text, a flood is cut at its beginning."""
+    made = job()
+    made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
+    made.hear(b"\xff\xfe\n")
+    assert made.text == f"{HOSTILE}\n\ufffd\ufffd\n"
+    for _ in range(30):
+        made.hear(b"x" * 9_999 + b"\n")
+    assert len(made.text) == 100_000
+    assert len(made.message) == 500
+
+
+def test_progress_is_that_of_the_stage() -> None:
+    """A stage that counts has a share, another one none."""
+    made = job()
+    made.hear(b"golden runs 1/4, 2.0 a second\n")
+    assert made.progress == 0.25
+    made.hear(b"report\n")
+    assert made.progress is None
+
+
+def test_only_so_many_jobs_wait() -> None:
+    """A page cannot fill the memory with orders."""
+    jobs = Jobs(0, lambda work: None)
+    for _ in range(50):
+        assert jobs.submit(job().work).state is State.QUEUED
+    with pytest.raises(MutatorError, match="50 jobs wait"):
+        jobs.submit(job().work)
+    jobs.close()

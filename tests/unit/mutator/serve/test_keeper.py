@@ -1,0 +1,102 @@
+"""The keeper of a job: nothing of a command outlives the server, which holds the other end of its pipe."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+# A keeper of another command than mutator, with less patience.
+KEEPER = """
+import os, sys
+from mutator.serve import keeper
+keeper.PATIENCE_S = float(sys.argv.pop())
+execv = os.execv
+keeper.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
+sys.exit(keeper.main())
+"""
+# Starts a process in another session, says so, and waits; `{}` says what it does when it is asked to end.
+COMMAND = """
+import pathlib, signal, subprocess, sys, time
+def end(number, frame):
+    {}
+signal.signal(signal.SIGTERM, end)
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(100)"], start_new_session=True)
+pathlib.Path("pids").write_text(f"{{child.pid}} ")
+pathlib.Path("pids").rename("started")
+time.sleep(100)
+"""
+IN_ORDER = "pathlib.Path('ended').touch(); sys.exit(0)"
+
+
+def eventually(holds: Callable[[], bool]) -> bool:
+    deadline = time.monotonic() + 20
+    while not holds() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    return holds()
+
+
+def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
+    """A keeper of a script, and the end of the pipe that its server holds."""
+    watched, hold = os.pipe()
+    words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
+    keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)
+    os.close(watched)
+    return keeper, hold
+
+
+def is_gone(pid: int) -> bool:
+    """Whether a process has ended."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].startswith("Z")
+    except OSError:
+        return True
+
+
+def child_of(folder: Path) -> int:
+    """The process that the command started."""
+    assert eventually((folder / "started").exists)
+    return int((folder / "started").read_text())
+
+
+def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
+    """It is asked to end as soon as the pipe is closed, and what it started is gone with it."""
+    keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
+    child = child_of(tmp_path)
+    os.close(hold)
+    assert keeper.wait(20) == 0
+    assert (tmp_path / "ended").exists()
+    assert is_gone(child)
+
+
+def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
+    """After a while, with all that it started."""
+    keeper, hold = kept(tmp_path, COMMAND.format("pass"), patience_s=0.2)
+    child = child_of(tmp_path)
+    os.close(hold)
+    assert keeper.wait(20) == 128 + signal.SIGKILL
+    assert is_gone(child)
+
+
+def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
+    """Should somebody kill the keeper, the kernel kills the command."""
+    keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
+    child = child_of(tmp_path)
+    [command] = Path(f"/proc/{keeper.pid}/task/{keeper.pid}/children").read_text().split()
+    keeper.kill()
+    keeper.wait()
+    assert eventually(lambda: is_gone(int(command)))
+    os.close(hold)
+    os.kill(child, signal.SIGKILL)  # the script's own: it does not look after its child
+
+
+@pytest.mark.parametrize("code", [0, 1, 3])
+def test_the_exit_code_is_the_commands(tmp_path: Path, code: int) -> None:
+    """So that the server tells a failed job from a good one."""
+    keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
+    assert keeper.wait(20) == code
+    os.close(hold)
