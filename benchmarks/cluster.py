@@ -9,6 +9,7 @@ Without a name all three.
 """
 
 import argparse
+import ctypes
 import heapq
 import json
 import os
@@ -20,7 +21,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from statistics import mean, median
 from types import SimpleNamespace
@@ -59,6 +60,7 @@ RECORD = {  # one as a campaign has most of
     "left": [[f"channel_{i}", 4.12 + i, 0.5] for i in range(12)],
 }
 PATCH_BYTES, SERIES_BYTES = 1_900, 5_900
+PR_SET_CHILD_SUBREAPER = 36  # of prctl: orphans become children of this process
 
 
 def overhead(campaign: str, rounds: int) -> None:
@@ -71,10 +73,7 @@ def overhead(campaign: str, rounds: int) -> None:
             for name in options if number % 2 == 0 else reversed(options):
                 command = [sys.executable, "-m", "mutator", "run", campaign, "--out", f"{place}/run"]
                 command += ["--no-stills", *options[name]]
-                before = resource.getrusage(resource.RUSAGE_CHILDREN)
-                subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
-                after = resource.getrusage(resource.RUSAGE_CHILDREN)
-                used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+                used = cpu_s(command, env)
                 shutil.rmtree(f"{place}/run")
                 if number:
                     took[name].append(used)
@@ -82,6 +81,18 @@ def overhead(campaign: str, rounds: int) -> None:
     local, cluster = median(took["local"]), median(took["cluster"])
     print(f"overhead, {campaign}: {local:.1f} s of CPU with local workers, {cluster:.1f} s with Dask's")
     print(f"ratio {cluster / local:.3f}")
+
+
+def cpu_s(command: list[str], env: dict[str, str]) -> float:
+    """s of CPU of a command and of all that it starts, also of what outlives the process that started it."""
+    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
+    with suppress(ChildProcessError):  # when none is left
+        while True:
+            os.wait()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 @contextmanager
