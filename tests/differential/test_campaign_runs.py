@@ -135,22 +135,20 @@ def test_killed_and_resumed(
     assert results(out) == undisturbed
 
 
-def test_killed_and_resumed_by_either_command(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """`mutator run` and pytest's campaign are the same thing: each resumes what the other was killed at, of
-    which no process lives on, and they come to the same bytes. The killed workers' registrations go, too."""
+def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """`mutator run` and pytest's campaign are the same thing: pytest resumes what the other was killed at, of
+    which no process lives on, and comes to the same bytes. The killed workers' registrations go, too.
+
+    That `mutator run` resumes what pytest left is shown by the killed worker below.
+    """
     out = tmp_path / "run"
-    by_pytest = pytest_words(out)
-    for count, words in (
-        (4, by_pytest),
-        (8, ["-m", "mutator", "run", "small", "--out", str(out), "-n", "2"]),
-    ):
-        command = Command(toy, out, *words)
-        command.wait_for_records(count)
-        assert len(command.workers()) == 2
-        command.process.kill()
-        command.end()
-        assert len(list((out / "workers").iterdir())) == 2
-    again = Command(toy, out, *by_pytest)
+    command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
+    command.wait_for_records(4)
+    assert len(command.workers()) == 2
+    command.process.kill()
+    command.end()
+    assert len(list((out / "workers").iterdir())) == 2
+    again = Command(toy, out, *pytest_words(out))
     printed = again.end()
     assert again.process.returncode == 0, printed
     assert "12 of 12 experiments done" in printed

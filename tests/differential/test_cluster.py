@@ -133,12 +133,18 @@ def test_a_worker_with_another_version_is_refused(
     ("number", "code"), [(KILL, -KILL), pytest.param(INT, 130, marks=pytest.mark.slow)], ids=["KILL", "INT"]
 )
 def test_a_dead_command_leaves_nothing_at_work(
-    toy: Workspace, tmp_path: Path, two: Machines, number: signal.Signals, code: int
+    toy: Workspace,
+    tmp_path: Path,
+    two: Machines,
+    undisturbed: tuple[Bytes, str],
+    number: signal.Signals,
+    code: int,
 ) -> None:
     """When the command is killed or interrupted, the work of the workers stops within 10 s, with all its
-    processes; the same command then comes to the end."""
+    processes; the rest is then run to the same bytes."""
     out = tmp_path / "run"
-    words = ["-m", "mutator", "run", "toy", "--out", str(out), "--engine", "fork", "--cluster", str(two.file)]
+    words = ["-m", "mutator", "run", "small", "--out", str(out)]
+    words += ["--engine", "fork", "--cluster", str(two.file)]
     command = Command(toy, out, *words)
     command.wait_for_records(1)
     assert two.children()
@@ -148,9 +154,10 @@ def test_a_dead_command_leaves_nothing_at_work(
     while two.children():
         assert time.monotonic() < deadline
         time.sleep(0.1)
-    done = Command(toy, out, *words)
-    said = done.process.communicate(timeout=180)[0]
-    assert done.process.returncode == 0, said
+    again = on(two, toy, out)
+    assert (again.exit_code, again.done) == (0, 12)
+    assert 0 < again.ran < 12
+    assert results(out) == undisturbed[0]
 
 
 KILLS = [(number, seed) for seed in range(5) for number in (INT, TERM, KILL, STOP)]

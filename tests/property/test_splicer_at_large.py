@@ -49,7 +49,7 @@ PARTS = 8  # of what takes long, for as many workers
 
 @pytest.mark.parametrize(
     ("first", "count"),
-    [(0, 12), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
+    [(0, 6), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
 )
 def test_generated_modules(first: int, count: int) -> None:
     """At every anchor of generated modules a mutant is right by `ast`, and does what the original does."""
