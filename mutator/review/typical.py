@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import TYPE_CHECKING
 
 from mutator.model import Outcome, Status
@@ -19,6 +20,7 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     import pandas as pd
 
+_reading = Lock()  # a page asks for many groups of a run at once: the table is read once
 _PLAIN = {
     Outcome.NOT_ACTIVATED.value: "not activated: the injected lines never ran while the trigger held",
     Outcome.MASKED.value: "masked: no actuator differed from the golden run",
@@ -54,7 +56,8 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
         written = table.path.stat().st_mtime_ns
     except OSError:
         written = 0  # which reading tells
-    return _of_run(run.path, written).get(group.what)
+    with _reading:
+        return _of_run(run.path, written).get(group.what)
 
 
 @lru_cache(maxsize=8)

@@ -2,7 +2,9 @@
 
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import pytest
@@ -11,6 +13,7 @@ from mutator.campaigns.plans import Choices, make_plan
 from mutator.errors import MutatorError
 from mutator.model import Outcome, Status
 from mutator.outcomes import results
+from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row
 from mutator.review.catalogue import of_plan
 from mutator.review.typical import of_group, verdict_of
@@ -62,6 +65,27 @@ def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_
     shutil.rmtree(tmp_path / "run")
     results.ensure(write_run(toycar, tmp_path / "run"))
     assert of_group(RunFolder.open(tmp_path / "run"), group)
+
+
+def test_many_who_ask_at_once_read_the_table_once(
+    toycar: Workspace, tmp_path: Path, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The table of a large run takes seconds, and more memory than there may be for each group on a page."""
+    run = RunFolder.open(write_run(toycar, tmp_path / "run"))
+    results.ensure(run.path)
+    groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
+    read: list[Results] = []
+    texts = Results.texts
+
+    def slowly(table: Results) -> Any:
+        read.append(table)
+        sleep(0.05)
+        return texts(table)
+
+    monkeypatch.setattr(Results, "texts", slowly)
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda group: of_group(run, group), groups))
+    assert len(read) == 1 < len([one for one in found if one])
 
 
 def row(**given: Any) -> Row:
