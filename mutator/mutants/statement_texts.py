@@ -57,6 +57,8 @@ def _one_line(file: ParsedFile, site: Site, statement: ast.stmt) -> str:
     text = ast.unparse(statement)
     if "\n" in text:
         raise _unfit(file, site, "the statement cannot be written on one line")
+    if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(statement)):
+        raise _unfit(file, site, "the statement yields: what it gives and gets has its place in a sequence")
     return text
 
 

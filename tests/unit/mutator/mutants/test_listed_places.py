@@ -132,3 +132,13 @@ def test_one_function(shipped: Workspace) -> None:
     assert {one.location.function for one in found} == {"other"}
     with pytest.raises(MutatorError, match=r"no function 'Sensor.mesure'.*did you mean 'Sensor.measure'"):
         places_of(file, shipped.fault_models(), "Sensor.mesure")
+
+
+def test_a_statement_that_yields_is_not_repeated(shipped: Workspace) -> None:
+    """What a generator gives and gets has its place in a sequence: no model that writes it again is listed."""
+    file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
+    models = {
+        one.line: one.models for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at
+    }
+    assert not {"repetition", "reordering"} & set(models[2])
+    assert "repetition" in models[3]
