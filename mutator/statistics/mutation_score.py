@@ -31,9 +31,11 @@ _NOTE = (
     "drive, *transient* ones while their trigger holds. Shares are of the *activated* ones; a mutant counts "
     "once, if any of its drives shows it. Intervals are 95 % Wilson intervals; where drives are counted, "
     "whole mutants are drawn anew (bootstrap). *New alert*: one of a name that the fault-free run of the "
-    "scenario does not raise. *No effect*: none of the four; mutants that are equivalent to the original are "
-    "among these."
+    "scenario does not raise. A drive that crashed or timed out is not judged: it counts there and in the "
+    "whole, and in no other share. *No effect*: none of the four; mutants that are equivalent to the original "
+    "are among these."
 )
+_SEVERAL = " These are counted together as they were drawn, without weights."
 _UNKNOWN_ALERTS = " The fault-free runs cannot be read here, so no alert is compared with theirs."
 
 
@@ -99,6 +101,7 @@ def score_sheet(
     missing = len(planned - set(drives["mutant"]))
     without = f" {missing} of {len(planned)} mutants have no result and are in no count." if missing else ""
     chosen = f" Chosen: {'; '.join(f'`{text}`' for text in told)}." if told else ""
+    chosen += _SEVERAL if len(told) > 1 and any(" draw" in text for text in told) else ""
     return Sheet(
         name="mutation_score",
         title="Mutation score",

@@ -102,6 +102,14 @@ def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
     assert "2 of 4 mutants have no result" in sheet.note
 
 
+def test_the_note_tells_of_several_draws(faults: dict[str, Fault]) -> None:
+    """Where selections were drawn from wholes of different sizes, a share of all is of no one whole."""
+    small, large = "a: 4 draws of 9 mutants of operators", "b: 4 draws of 900 mutants of operators"
+    frame = results(drive("a", HIT))
+    assert "without weights" in score_sheet(frame, faults, GOLDEN, [small, large]).note
+    assert "without weights" not in score_sheet(frame, faults, GOLDEN, [small]).note
+
+
 def test_by_operator(faults: dict[str, Fault]) -> None:
     """Each operator has its own line; faults of specs are none of them."""
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
