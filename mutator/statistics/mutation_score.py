@@ -32,8 +32,8 @@ _NOTE = (
     "once, if any of its drives shows it. Intervals are 95 % Wilson intervals; where drives are counted, "
     "whole mutants are drawn anew (bootstrap). *New alert*: one of a name that the fault-free run of the "
     "scenario does not raise. A drive that crashed or timed out is not judged: it counts there and in the "
-    "whole, and in no other share. *No effect*: none of the four; mutants that are equivalent to the original "
-    "are among these."
+    "whole, and in no other share. *No effect*: none of the four; mutants that are equivalent to the "
+    "original are among these."
 )
 _SEVERAL = " These are counted together as they were drawn, without weights."
 _UNKNOWN_ALERTS = " The fault-free runs cannot be read here, so no alert is compared with theirs."
