@@ -135,10 +135,9 @@ def test_one_function(shipped: Workspace) -> None:
 
 
 def test_a_statement_that_yields_is_not_repeated(shipped: Workspace) -> None:
-    """What a generator gives and gets has its place in a sequence: no model that writes it again is listed."""
+    """What a generator gives and gets has its place in a sequence: models that repeat it are not listed."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
-    models = {
-        one.line: one.models for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at
-    }
+    places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
+    models = {one.line: one.models for one in places}
     assert not {"repetition", "reordering"} & set(models[2])
     assert "repetition" in models[3]
