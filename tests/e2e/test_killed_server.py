@@ -155,7 +155,7 @@ def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Ser
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("stage", ["planning", "golden runs", "experiments", "tables"])
+@pytest.mark.parametrize("stage", ["planning", "experiments", "tables"])
 def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int) -> None:
     """Whatever it is at, and however the server ends; the same campaign then goes on to its end."""
     server.ask("/api/jobs", CAMPAIGN)
@@ -195,7 +195,7 @@ def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith("experiments"))
     pids = descendants(server.process.pid)
-    assert len(pids) > 2
+    assert pids
     server.ask("/api/jobs/1/cancel", {})
     server.wait_for(lambda job: bool(job["ended"]))
     assert not living(pids)

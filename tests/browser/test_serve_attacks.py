@@ -1,0 +1,153 @@
+"""What a hostile page can do to a server: nothing, be it of another origin or in a run folder."""
+
+import json
+import shutil
+import threading
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator._common.hashing import digest
+from mutator.workspace import Workspace
+
+HACKED = "globalThis.hacked = true"
+
+
+@pytest.fixture
+def address(
+    run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace], serve: Callable[..., Any]
+) -> Iterator[str]:
+    """A server of a copy of the made-up run, in runs/night."""
+    shutil.copytree(run, tmp_path / "runs" / "night")
+    with serve(copy_toycar(tmp_path), (tmp_path / "runs",)) as found:
+        yield found
+
+
+def test_a_served_report_is_the_page_that_the_file_is(
+    address: str, visit: Callable[..., Any], run: Path, tmp_path: Path
+) -> None:
+    """Its scripts, styles and series are let through: an experiment with series opens with its replay."""
+    series = json.loads((tmp_path / "runs/night/plan/experiments.jsonl").read_text().splitlines()[1])
+    page = visit(address, f"/runs/night/report/index.html#e={series['id']}")
+    page.wait_for_selector("html[data-ready]", state="attached")
+    page.wait_for_selector("#experiment canvas")
+    assert page.evaluate("getComputedStyle(document.querySelector('.tiles')).display") != "block"
+
+
+def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
+    """A report that was tampered with, stamp and all, is shown, and none of its scripts runs: inline, as a
+    handler, in a link, from a file of the run or from elsewhere."""
+    night = tmp_path / "runs" / "night"
+    (night / "series/kept").mkdir(parents=True, exist_ok=True)
+    (night / "series/kept/0123456789abcdef.js").write_text(f"{HACKED};")
+    (night / "plots").mkdir(exist_ok=True)
+    (night / "plots/a.svg").write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg"><script>{HACKED}</script></svg>'
+    )
+    made = address.partition("/?")[0]
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(address)
+    page.goto(f"{made}/runs/night/report/index.html")
+    index = night / "report/index.html"
+    index.write_text(
+        f"<title>shown</title><body onload='{HACKED}'><script>{HACKED}</script>"
+        f"<img src=x onerror='{HACKED}'><a id=link href='javascript:{HACKED}'>link</a>"
+        f"<script src='../series/kept/0123456789abcdef.js'></script><script src='../plots/a.svg'></script>"
+        f"<script src='data:text/javascript,{HACKED}'></script><base href='http://127.0.0.1:1/'>"
+        f"<iframe srcdoc='<script>parent.hacked = true</script>'></iframe>"
+        f"<object data='../plots/a.svg'></object>"
+    )
+    stamp = json.loads((night / "report/made_from.json").read_text())
+    files = {path.name: path for path in (night / "report").glob("*.*") if path.name != "made_from.json"}
+    stamp["files"] |= {name: digest(path.read_bytes()) for name, path in files.items()}
+    (night / "report/made_from.json").write_text(json.dumps(stamp))
+    page.goto(f"{made}/runs/night/report/index.html")
+    assert page.title() == "shown"
+    page.click("#link")
+    page.wait_for_timeout(200)
+    assert page.evaluate("globalThis.hacked") is None
+    context.close()
+
+
+def test_a_picture_of_a_run_is_no_page(address: str, browser: Any, tmp_path: Path) -> None:
+    """A plot that is opened by itself runs no script either."""
+    plots = tmp_path / "runs/night/plots"
+    plots.mkdir(exist_ok=True)
+    (plots / "a.svg").write_text(
+        f'<svg xmlns="http://www.w3.org/2000/svg" onload="{HACKED}"><script>{HACKED}</script></svg>'
+    )
+    context = browser.new_context()
+    page = context.new_page()
+    page.goto(address)
+    page.goto(f"{address.partition('/?')[0]}/runs/night/plots/a.svg")
+    assert page.evaluate("document.documentElement.localName") == "svg"
+    assert page.evaluate("globalThis.hacked") is None
+    context.close()
+
+
+ATTACK = """async (made) => {
+    const said = [];
+    const options = { credentials: "include" };
+    for (const more of [{}, { mode: "no-cors" }]) {
+        await fetch(`${made}/api/jobs`, { ...options, ...more })
+            .then(async (answer) => said.push(await answer.text()), () => said.push("refused"));
+        await fetch(`${made}/api/review/toycar`, { ...options, ...more, method: "POST", body: "{}" })
+            .then(async (answer) => said.push(await answer.text()), () => said.push("refused"));
+    }
+    const element = async (name, set) => new Promise((resolve) => {
+        const made = Object.assign(document.createElement(name), set);
+        made.onload = () => resolve("loaded");
+        made.onerror = () => resolve("refused");
+        document.body.append(made);
+    });
+    said.push(await element("script", { src: `${made}/assets/dom.js` }));
+    said.push(await element("img", { src: `${made}/runs/night/plots/picture.png` }));
+    return said;
+}"""
+PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c49444154789c63606060000000040001f61738550000000049454e44ae426082"
+)
+
+
+class _Foreign(BaseHTTPRequestHandler):
+    """Another server of this machine, with a page for who visits it."""
+
+    def do_GET(self) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", "text/html")
+        self.end_headers()
+        self.wfile.write(b"<title>foreign</title><body></body>")
+
+    def log_message(self, *words: object) -> None:
+        pass
+
+
+def test_a_page_of_another_origin_reads_nothing(address: str, browser: Any, tmp_path: Path) -> None:
+    """Another server of this machine, whose pages the browser sends the cookie for: it gets no answer, no
+    script and no picture, and shows no page of ours in a frame."""
+    picture = tmp_path / "runs/night/plots/picture.png"
+    picture.parent.mkdir(exist_ok=True)
+    picture.write_bytes(PIXEL)
+    made = address.partition("/?")[0]
+    foreign = HTTPServer(("127.0.0.1", 0), _Foreign)
+    threading.Thread(target=foreign.serve_forever, daemon=True).start()
+    context = browser.new_context()
+    try:
+        page = context.new_page()
+        page.goto(address)
+        assert "Runs" in page.content()
+        page.goto(f"http://127.0.0.1:{foreign.server_port}/")
+        said = page.evaluate(ATTACK, made)
+        assert set(said) <= {"refused", ""}, said
+        assert "loaded" not in said
+        page.set_content(f"<iframe src='{made}/'></iframe>")
+        page.wait_for_timeout(300)
+        assert not [frame for frame in page.frames[1:] if "Runs and reviews" in frame.content()]
+    finally:
+        context.close()
+        foreign.shutdown()
+        foreign.server_close()
