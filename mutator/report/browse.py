@@ -273,10 +273,10 @@ def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, 
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
-    """Pictures and films of experiments that are kept in plots/, by experiment.
+    """Pictures, films and exact plots of experiments that are kept in plots/, by experiment.
 
     Stills are put in as they are while `budget` bytes last, and are links from the folder `seen_from` then,
-    as films always are.
+    as films and plots always are.
     """
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):
@@ -285,6 +285,8 @@ def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str
         here = found.setdefault(name, {"stills": [], "films": []})
         if path.suffix in (".mp4", ".gif"):
             here["films"].append(link)
+        elif path.suffix == ".svg" and not time:
+            here["plot"] = link
         elif path.suffix in (".jpg", ".png") and time:
             size = path.stat().st_size
             if size <= budget:
@@ -292,4 +294,4 @@ def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str
                 kind = "jpeg" if path.suffix == ".jpg" else "png"
                 link = f"data:image/{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
             here["stills"].append([time.removesuffix("s"), link])
-    return {name: kept for name, kept in found.items() if kept["stills"] or kept["films"]}
+    return {name: kept for name, kept in found.items() if any(kept.values())}

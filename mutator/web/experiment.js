@@ -201,7 +201,7 @@ class Experiment {
     this.#change(details.patch(row));
     const spec = details.spec(row);
     this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
-    this.#pictures(id, media && media[id]);
+    this.#pictures(id, [media?.[id]].find((kept) => kept?.stills.length || kept?.films.length));
     const place = this.#content("replay");
     if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
     else this.#noSeries(id, series);

@@ -140,7 +140,7 @@ const Jobs = (() => {
     const count = el("span.quiet.jobs-count");
     place.classList.add("jobs");
     place.append(...(section ? [el("h2", {}, "Jobs ", count), ...list]
-      : [el("details", { open: true }, el("summary", {}, el("b", {}, "Jobs"), " ", count, " ", el("a", { href: "/" }, "All runs and reviews")), ...list)]),
+      : [el("details", { open: innerWidth > 700 }, el("summary", {}, el("b", {}, "Jobs"), " ", count, " ", el("a", { href: "/" }, "All runs and reviews")), ...list)]),
       el("p.jobs-said", { role: "status" }));
     if (!section) document.body.append(place);
     document.body.append(el("dialog", { id: "job-log", "aria-labelledby": "job-log-title" }, el("h2", { id: "job-log-title" }),

@@ -130,7 +130,7 @@ const Report = (() => {
       Home: () => grid.move(-Infinity), End: () => grid.move(Infinity), Enter: () => grid.open(grid.current), " ": () => grid.open(grid.current),
     };
     document.addEventListener("keydown", (event) => {
-      if (help.open || event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
+      if (document.querySelector("dialog[open]") || event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) return;
       const { target, key } = event;
       const isTyping = target.matches("input[type=search], select, textarea");
       const isRow = target.matches("#grid tr") || target === find("grid");

@@ -32,20 +32,20 @@
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
     const pictures = facts.filmed ? [button("Film", "Golden beside faulty, the whole drive", () => ({ kind: "film" })),
       el("span.still", {}, button("Still", "A picture of that film", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
-    return el("section.do", { "data-id": id }, el("h3", {}, "Do it here"),
+    const made = el("section.do", { "data-id": id }, el("h3", {}, "Do it here"),
       el("div.row", {}, button("Drive again", "Is the result the same?", () => ({ kind: "rerun" })),
         button("Exact plot", "Drive it again and keep every step of its channels", () => ({ kind: "plot" })), pictures),
-      said, jobs, plot(id));
+      said, jobs);
+    plot(id, made);
+    return made;
   }
 
   /** The exact plot, if it has been drawn. */
-  function plot(id) {
-    const image = el("img", { src: `../plots/${id}.svg`, alt: "Channels of golden and faulty over time", loading: "lazy" });
-    const figure = el("figure.drawing", { hidden: true }, image, el("figcaption.quiet", {}, "Exact plot: every step of golden and faulty"));
-    image.loading = "eager"; // a hidden one would wait for ever
-    image.addEventListener("load", () => (figure.hidden = false));
-    image.addEventListener("error", () => figure.remove());
-    return figure;
+  async function plot(id, place) {
+    const link = (await Packed.read("media"))?.[id]?.plot;
+    if (!link) return;
+    place.append(el("figure.drawing", {}, el("a", { href: link }, el("img", { src: link, alt: "Channels of golden and faulty over time" })),
+      el("figcaption.quiet", {}, "Exact plot: every step of golden and faulty")));
   }
 
   function fill({ id, experiment }) {

@@ -49,7 +49,7 @@
       labelled("Fault", el("span", {}, name, el("datalist", { id: "specs" }, specs.map((spec) => option(spec.name))))),
       labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map((s) => option(s)))),
       labelled("Trigger", el("span.two", {}, trigger, time)),
-      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[-+]?[0-9.]+([eE][-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: drawn"),
+      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[\\-+]?[0-9.]+([eE][\\-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: drawn"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: 0"),
       readings.length > 1 ? labelled("Reading", select("reading", readings.map((r) => option(r)))) : null,
       targets.length > 1 ? labelled("Target", select("target", targets.map((t) => option(t)))) : null,

@@ -96,7 +96,7 @@ def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., 
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    """The first ones, by time, are in the page; films are always links; a plot of another kind is neither."""
+    """The first ones, by time, are in the page; films and exact plots are always links."""
     write_json(tmp_path / "run.json", {"schema": "run/1"})
     plots = tmp_path / "plots"
     plots.mkdir()
@@ -107,7 +107,8 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
         "aa": {
             "stills": [["2.00", "data:image/jpeg;base64,MTIzNA=="], ["10.00", "../plots/aa-10.00s.jpg"]],
             "films": ["../plots/aa.mp4"],
-        }
+        },
+        "bb": {"stills": [], "films": [], "plot": "../plots/bb.svg"},
     }
 
 

@@ -1,0 +1,107 @@
+"""The first page and the report of a server: what would need a shell is asked for, and told of, there."""
+
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from mutator.report.panels import figures
+from mutator.workspace import Workspace
+
+Visit = Callable[..., Any]
+
+
+@pytest.fixture(scope="module")
+def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the made-up run in a folder of runs."""
+    runs = tmp_path_factory.mktemp("runs")
+    shutil.copytree(run, runs / "night")
+    return runs
+
+
+@pytest.fixture(scope="module")
+def address(
+    folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
+) -> Iterator[str]:
+    """Where it is served, with the library that it was made of, but for the faults that are no mutants."""
+    module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
+    root = run.parent / "toy"
+    with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def module_patch() -> Iterator[pytest.MonkeyPatch]:
+    """A monkeypatch that lasts as long as the server."""
+    with pytest.MonkeyPatch.context() as patch:
+        yield patch
+
+
+def test_the_first_page_leads_to_all_that_there_is(
+    address: str, visit: Visit, serious_faults: Callable[[Any], list[str]]
+) -> None:
+    """Runs with their outcomes, the reviews of targets, forms to start something; on any screen."""
+    page = visit(address)
+    page.wait_for_selector("form.order >> nth=1")
+    assert page.inner_text("#runs th a") == "night"
+    assert "hazard" in page.inner_text("#runs .outcomes")
+    assert page.get_attribute("#reviews a", "href") == "/review/toycar"
+    assert serious_faults(page) == []
+    page.emulate_media(color_scheme="dark")
+    assert serious_faults(page) == []
+    page.set_viewport_size({"width": 390, "height": 800})
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+
+
+def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
+    """The words of the server stand beside the button."""
+    page = visit(address)
+    page.fill("[name=spec]", "no/such")
+    page.click("text=Try it")
+    page.wait_for_selector("form.order .bad:text('no/such')")
+
+
+def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visit, folder: Path) -> None:
+    """The job is told of beside the experiment and at the foot of the page, with its log, and found by a
+    reload; the plot that it drew is in the report then."""
+    page = visit(address, "/runs/night/report/index.html")
+    page.wait_for_selector("html[data-ready]", state="attached")
+    page.click("#grid tr[data-at] >> nth=0")
+    page.click("section.do button:text('Exact plot')")
+    page.wait_for_selector(".own-jobs .failed, .own-jobs .done", timeout=60_000)
+    assert "DIFFERS" in page.inner_text(".own-jobs")  # the run's records are made up
+    page.click("aside.jobs button:text('Log')")
+    page.wait_for_selector("#job-log pre:text('DIFFERS')")
+    page.keyboard.press("Escape")
+    page.reload()
+    page.wait_for_selector(".own-jobs .failed")
+    assert page.locator("aside.jobs li").count() == 1
+    assert list((folder / "night/plots").glob("*.svg"))
+    page.wait_for_selector("section.do figure img")
+
+
+@pytest.mark.slow
+def test_a_try_a_campaign_and_a_cancelled_job(address: str, visit: Visit, folder: Path) -> None:
+    """A fault is tried and its plot shown; a small campaign becomes a run of the list; one that waits is
+    cancelled and leaves nothing."""
+    page = visit(address)
+    page.fill("[name=spec]", "sensor/distance")
+    page.select_option("[name=variant]", "longer")
+    page.select_option("[name=trigger]", "time")
+    page.fill("[name=time]", "2")
+    page.click("text=Try it")
+    page.select_option("[name=campaign]", "small")
+    for name in ("first", "second"):
+        page.fill("[name=name]", name)
+        page.click("text=Run it")
+        page.wait_for_selector(f"#jobs li:has-text('{name}')")
+    page.click("#jobs li:has-text('second') button:text('Cancel')")
+    page.wait_for_selector("#jobs li:has-text('second') .cancelled")
+    page.wait_for_selector("#jobs li:has-text('first') .done", timeout=120_000)
+    plot = page.locator("#jobs li:has-text('sensor/distance') a").evaluate("link => link.href")
+    assert page.request.get(plot).headers["content-type"].startswith("image/svg")
+    page.reload()
+    page.wait_for_selector("#runs th a:text('first')")
+    assert not (folder / "second").exists()
