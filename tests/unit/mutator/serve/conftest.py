@@ -97,7 +97,7 @@ class Client:
     def post(self, path: str, body: Any) -> Answer:
         return self.ask("POST", path, body=body)
 
-    def ended(self, job: str, within_s: float = 60.0) -> dict[str, Any]:
+    def ended(self, job: str, within_s: float = 300.0) -> dict[str, Any]:
         """The job once it has ended."""
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:

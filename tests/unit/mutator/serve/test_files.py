@@ -35,7 +35,6 @@ SECRETS = ("secret.csv", "runs/night/run.json")
         "/review/{}",
         "/api/review/{}",
         "/api/review/toycar?campaign={}",
-        "/api/review/toycar?spec={}",
         "/api/review/toycar/{}/changes",
         "/api/review/toycar/{}/typical?run=night",
         "/api/review/toycar/0123456789ab/typical?run={}",
@@ -54,6 +53,15 @@ def test_no_address_leads_out(client: Client, address: str) -> None:
             answer = client.get(path)
             assert answer.status in (307, 400, 404), path
             assert "root:" not in answer.text and '"schema"' not in answer.text
+
+
+@pytest.mark.parametrize("spec", ["../../secret.csv", "toy/fault_library/targets/toycar.yaml", "/etc/passwd"])
+def test_a_spec_is_no_path(client: Client, spec: str) -> None:
+    """On the command line it may be a file; in an address it is a name of the library's."""
+    for given in (spec, quote(spec, safe="")):
+        answer = client.get(f"/api/review/toycar?spec={given}")
+        assert answer.status in (400, 404)
+        assert "root:" not in answer.text and '"schema"' not in answer.text
 
 
 @pytest.mark.parametrize(
