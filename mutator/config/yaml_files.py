@@ -234,8 +234,9 @@ def read(
             expected="a mapping of keys to values",
             remedy="see docs",
         )
-    if older and source.data.get("schema") in older:
-        source = older[source.data["schema"]](source)
+    given = source.data.get("schema")
+    if older and isinstance(given, str) and given in older:
+        source = older[given](source)
     else:
         _check_schema(source, schema)
     body = {key: value for key, value in source.data.items() if key != "schema"}

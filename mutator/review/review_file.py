@@ -183,8 +183,10 @@ def _json(value: Any) -> str:
 def _from_first(source: Source) -> Source:
     """The content of a `review/1` file with its blocks as today's; what is wrong in it stays where it is."""
     blocks = source.data.get("decisions")
-    made = [_new_block(block) if isinstance(block, dict) else block for block in blocks or ()]
-    return replace(source, data={**source.data, **({"decisions": made} if isinstance(blocks, list) else {})})
+    if not isinstance(blocks, list):
+        return source
+    made = [_new_block(block) if isinstance(block, dict) else block for block in blocks]
+    return replace(source, data={**source.data, "decisions": made})
 
 
 def _new_block(block: dict[str, Any]) -> dict[str, Any]:

@@ -72,6 +72,7 @@ def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
         ("toycar", "other", 4, "other"),
         ("four_eyes: true", "four_eyes: 4", 5, "4"),
         ("review/2", "review/3", 3, "newer version"),
+        ("review/2", "[]", 3, "schema []"),
         ("decisions:", "decisions: [", 7, "YAML"),
         ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "second time"),
         ('    decision: "approved"\n', "", 9, "'by' without a decision"),
@@ -154,6 +155,9 @@ def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
     """What is wrong in an old file stands where it always stood."""
     with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
         edited(old, "08a4799889df", "approved", "aproved")
+    old.write_text('schema: review/1\ntarget: "toycar"\ndecisions: 1.5\n')
+    with pytest.raises(MutatorError, match=r"toycar\.yaml:3: 1\.5 for 'decisions'"):
+        review_file.load(old, "toycar")
 
 
 def test_writing_upgrades_the_file(old: Path) -> None:
