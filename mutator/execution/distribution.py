@@ -23,8 +23,8 @@ class Distributor(Protocol):
 
 
 def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
-    """The way to deal out work to a cluster, or without one to this machine; MutatorError for a cluster that
-    cannot be, or whose packages are not installed. Nothing is started or connected."""
+    """The way to deal out work to a cluster, or without one to this machine; MutatorError for an unusable
+    cluster, or one whose packages are not installed. Nothing is started or connected."""
     if cluster is None:
         if insecure:
             raise MutatorError(
@@ -32,6 +32,6 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
             )
         return LocalWorkers()
     where = parse(cluster)
-    with importing("cluster"):  # an extra, so that nobody imports it who does not ask for it
+    with importing("cluster"):  # an extra: imported only when it is asked for
         deals: Distributor = resolve_name(_DASK)(where, insecure=insecure)
     return deals

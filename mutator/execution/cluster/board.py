@@ -1,8 +1,8 @@
 """The board: which worker does which piece of work next. It knows no network and starts nothing.
 
-Pieces are cut when they are asked for, each so long that all workers come to the end at about the same time:
-a share of what is left, by the times that were measured so far. Work of the golden run that a worker has goes
-to that worker. Near the end, who has nothing else to do repeats what others are late with.
+Pieces are cut on demand, each a share of what is left by the times measured so far, so that all workers
+finish at about the same time. A worker stays with the golden run that it has already driven. Near the end,
+an idle worker repeats pieces that others are late with.
 """
 
 import time
@@ -19,7 +19,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Sample
 
 LEAST_S, MOST_S = 0.5, 8.0  # of a piece
-_SHARE = 4  # of what is left, a worker gets one part in so many times the workers
+_SHARE = 4  # a piece is what is left, divided by the number of workers and by this
 _FIRST = 4  # runs in a piece before anything was measured
 _GUESS_S = 0.5  # a run takes, before anything was measured
 _LATE = 3.0  # times the expected time after which a piece is repeated elsewhere
@@ -73,7 +73,7 @@ class Board:
         self._done: Counter[Kind] = Counter()
 
     def join(self, worker: str, slots: int) -> None:
-        """A worker is there that does so many pieces at once."""
+        """A worker joins that can run so many pieces at once."""
         self._slots[worker] = slots
 
     def leave(self, worker: str) -> None:
@@ -97,8 +97,8 @@ class Board:
         self._proof.clear()
 
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
-        """The next piece for a worker; None where there is none for now. What a worker takes `ahead` it has
-        while it does another: near the end there is nothing of that kind."""
+        """The next piece for a worker; None if there is none for now. A piece taken `ahead` waits at the
+        worker while it runs another; near the end none is given out that way."""
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
             return None
         piece = self._cut(worker)
@@ -116,7 +116,7 @@ class Board:
         return piece
 
     def done(self, piece: Piece, worker: str, seconds: float) -> bool:
-        """A piece came back done; False when it counts no more, as somebody else's did before."""
+        """A piece came back done; False if another worker has already done it."""
         if self._out.pop(piece.number, None) is None:
             return False
         self._seconds[piece.kind] += seconds
@@ -126,7 +126,7 @@ class Board:
         return True
 
     def give_back(self, piece: Piece, worker: str) -> None:
-        """A worker does not do a piece after all, for reasons that are not the piece's."""
+        """A worker returns a piece undone, for reasons that have nothing to do with the piece."""
         if (out := self._out.get(piece.number)) is None:
             return
         if not out.goes_on_without(worker):

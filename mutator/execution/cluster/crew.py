@@ -1,4 +1,4 @@
-"""The workers of a run: who was let in, who was not and why, how fast each is."""
+"""The workers of a run: which were let in, which were refused and why, and how fast each one is."""
 
 import time
 from collections import deque
@@ -22,7 +22,7 @@ class _Member:
 
 
 class Crew:
-    """Everybody who was there. `stretch` is the one that the run is in, `now` a clock, in seconds."""
+    """All workers seen so far. `stretch` is the run's current stretch of work, `now` a clock in seconds."""
 
     def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
         self._stretch, self._accept, self._now = stretch, accept, now
@@ -35,11 +35,11 @@ class Crew:
         return sorted(self._stretch.packages)
 
     def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
-        """A worker takes part; `facts` as of `dask_side.facts`."""
+        """A worker takes part; `facts` are those of `dask_side.facts`."""
         self._present[name] = _Member(str(facts["host"]))
 
     def leave(self, name: str) -> None:
-        """A worker takes no part any more."""
+        """A worker no longer takes part."""
         self._present.pop(name, None)
 
     def refuse(self, name: str, why: str) -> None:
@@ -47,7 +47,7 @@ class Crew:
         self.refused[name] = why
 
     def objection(self, facts: Mapping[str, Any]) -> str:
-        """Why a worker may not take part: what would keep its machine from resuming the run; empty if it
+        """Why a worker may not take part: whatever would keep its machine from resuming the run. Empty if it
         may."""
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"

@@ -1,7 +1,7 @@
 """Work dealt out by Dask, which carries the bytes and knows who is there.
 
-Which worker does what is the board's business: each task names its worker, so that a worker has at most two
-for each of its threads, and a task that is over is released at once.
+The board decides which worker does what: each task names its worker, a worker has at most two tasks for each
+of its threads, and a finished task is released at once.
 """
 
 import asyncio
@@ -26,11 +26,11 @@ from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import Session
 from mutator.verification import equivalence
 
-_LOOK_S = 0.5  # how often it is looked who is there
+_LOOK_S = 0.5  # between two looks at which workers are there
 _ALONE_S = 60.0  # without any worker, until the command gives up
 _AHEAD = 2  # pieces that a thread of a worker has at once: one waits while the other is done
-_FAILURES = 3  # of a worker's machine, until it gets no more work
-_PAUSE_S = 0.1  # of a worker for whom there is nothing to do
+_FAILURES = 3  # of a worker in a row, until it gets no more work
+_PAUSE_S = 0.1  # before an idle worker asks again
 _PART_S = 5.0  # for workers to drop the run
 _PATIENCE_S = 30.0  # with a scheduler that does not answer
 
@@ -41,7 +41,7 @@ class _Gone(Exception):
 
 @dataclass
 class _Tended:
-    """A worker that is there: what is done with it, and the pieces that it has, oldest first."""
+    """A worker that is present, and the pieces that it has, oldest first."""
 
     name: str
     address: str
@@ -49,9 +49,9 @@ class _Tended:
     lease: "Future[None] | None" = None  # the task that is its part in the run
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
-    is_cut: bool = False  # it is to be let in anew
-    failures: int = 0  # since it finished something
-    ailment: str = ""  # the last of them
+    is_cut: bool = False  # to be let in again
+    failures: int = 0  # since it last finished something
+    ailment: str = ""  # reason of the last failure
     facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted
 
 
@@ -77,7 +77,7 @@ class Deal:
         self._alone_since = time.monotonic()
 
     async def run(self) -> None:
-        """Until all is done, or nobody is left to do it."""
+        """Deal out the work until all is done, or no worker is left to do it."""
         try:
             while not (self._board.is_empty and not self._writes) and not self._session.problem:
                 await self._meet()
@@ -104,7 +104,7 @@ class Deal:
             self._intake.close()
 
     async def _part(self) -> None:
-        """Have the workers drop the run; who does not answer does so when the client is gone."""
+        """Have the workers drop the run; those that do not answer drop it once the client is gone."""
         present = [one for one in self._tended.values() if one.lease is not None]
         parting = [call(self._client, one.address, dask_side.leave, self._run) for one in present]
         with suppress(TimeoutError):
@@ -123,7 +123,7 @@ class Deal:
         return self._crew.told() + (f"; {link}" if link else "")
 
     async def _meet(self) -> None:
-        """See who is there; tend who is new, and take back the work of who is gone."""
+        """Look which workers are there: tend new ones, and take back the work of those that are gone."""
         try:
             async with asyncio.timeout(_PATIENCE_S):
                 scheduler = self._client.scheduler
@@ -148,7 +148,7 @@ class Deal:
         self._check_left()
 
     async def _mourn(self, one: _Tended) -> None:
-        """A worker is gone: what it was at may be why, what it had waiting is not."""
+        """A worker is gone. The pieces it was running may be why; those it had waiting are not."""
         assert one.task is not None
         one.task.cancel()
         await asyncio.gather(one.task, return_exceptions=True)
@@ -180,7 +180,7 @@ class Deal:
                 self._board.drop_proof()
 
     async def _tend(self, one: _Tended) -> None:
-        """Let a worker in, and have it work as long as it is there."""
+        """Let a worker in, and give it work for as long as it is there."""
         facts: Mapping[str, Any] = {}
         try:
             facts = await call(self._client, one.address, dask_side.facts, tuple(self._crew.packages))

@@ -1,7 +1,7 @@
 """A worker's side of a run: its bundle on the disk, and the processes that run its pieces.
 
-A host is attended by one thread from its beginning to its end. That thread starts the processes, and the
-kernel kills them when it ends, however it ends; then the host's folder goes. Other threads hand it pieces.
+One thread attends a host for as long as it lives. That thread starts the processes, and the kernel kills them
+when the thread ends, however it ends; the host's folder is then deleted. Other threads hand it pieces.
 """
 
 import os
@@ -140,7 +140,7 @@ class Host:
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted when nobody waits for it any more; MutatorError for a damaged one."""
+        """Run a piece. NotWanted once nobody is waiting for it; MutatorError for a damaged one."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()

@@ -22,7 +22,7 @@ from mutator.verification import equivalence
 class Intake:
     """Appends results to the run folder, as a worker of this machine would. `name` makes its files its own.
 
-    Results are believed: who may not be had no work.
+    Results are trusted: a worker that might compute otherwise was given no work.
     """
 
     def __init__(self, folder: RunFolder, manifest: TargetManifest, name: str) -> None:
@@ -36,7 +36,7 @@ class Intake:
         self._proofs: LineWriter | None = None
 
     def take(self, piece: Piece, result: Result) -> None:
-        """Append what came of a piece. MutatorError where it is of other experiments."""
+        """Append the result of a piece. MutatorError if it belongs to other experiments."""
         names = [json.loads(line)["experiment_id"] for line in result.records]
         if sorted(names) != sorted(piece.lines):
             raise MutatorError(
