@@ -157,7 +157,7 @@ async def _reason(address: str, error: BaseException) -> str:
         return f" ({error})"
     if found := _ADDRESS.fullmatch(address):
         try:
-            async with asyncio.timeout(1.0):
+            async with asyncio.timeout(5.0):
                 _, writer = await asyncio.open_connection(found["host"].strip("[]"), int(found["port"]))
                 writer.close()
         except OSError as tried:
