@@ -40,7 +40,7 @@ class Machines:
     def add(self, name: str, **environment: str) -> None:
         """Start a worker of that name, with one thread."""
         words = ["--scheduler-file", str(self.file), "--name", name, "--nthreads", "1", "--no-dashboard"]
-        words += ["--memory-limit", "0", "--nanny" if self.nanny else "--no-nanny"]
+        words += ["--host", "127.0.0.1", "--memory-limit", "0", "--nanny" if self.nanny else "--no-nanny"]
         words += ["--local-directory", str(self.folder / name / "dask"), "--death-timeout", "60"]
         self.workers[name] = self._started("worker", words, name, **environment)
 

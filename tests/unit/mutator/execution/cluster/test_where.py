@@ -2,6 +2,7 @@
 
 import json
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import AsyncIterator
@@ -138,8 +139,11 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch)
 def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a limited time, with an error that says why."""
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
-    with pytest.raises(MutatorError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1 \(.*refused"):
-        run(opened(parse("tcp://127.0.0.1:1")))
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))  # nobody else listens there
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(MutatorError, match=rf"no Dask scheduler answers at {address} \(.*refused"):
+            run(opened(parse(address)))
 
 
 def test_tls_needs_certificates() -> None:
