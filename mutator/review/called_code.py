@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from mutator.config.locations import PROBE_NAME
 from mutator.mutants.injected_lines import changed_parts, tag_of
 from mutator.review import source_names
-from mutator.review.source_names import Import, Module, Use, uses_in
+from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
 
 _FURTHEST = 20  # imports from one module to the next that a name is followed through
@@ -63,7 +63,8 @@ class CalledCode:
 
     def _beyond(self, place: _Place) -> Iterator[_Place]:
         """What the source of a place calls in its turn; a class has its methods already."""
-        for node in self._module(place.path).nodes_of(place.name):
+        module = self._module(place.path)
+        for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
             whole = isinstance(node, ast.ClassDef)
             yield from self._places(place.path, (use for use in uses if not (whole and use.owner)))
@@ -90,7 +91,8 @@ class CalledCode:
             if use.imported:
                 yield from self._imported(path, use.imported, use.words[1:], 0)
             elif use.owner:
-                yield from self._of_self(path, use.owner, use.words[1], 0)
+                found = self._of_bases if use.words[0] == SUPER else self._of_self
+                yield from found(path, use.owner, use.words[1], 0)
             else:
                 yield from self._named(path, use.words, 0)
 
@@ -111,10 +113,11 @@ class CalledCode:
         """What an import leads to, and the attributes after it."""
         name = one.absolute(path)
         if one.name is not None:
-            if (target := self._path(name)) and self._module(target).knows(one.name):
+            target, name = self._path(name), ".".join(filter(None, (name, one.name)))
+            own = target and target != path  # `from . import x` in a package: x is no name of its own
+            if target and own and (self._module(target).knows(one.name) or not self._path(name)):
                 yield from self._named(target, (one.name, *words), depth + 1)
                 return
-            name = ".".join(filter(None, (name, one.name)))
         while words and self._path(f"{name}.{words[0]}"):
             if (here := self._path(name)) and self._module(here).knows(words[0]):
                 break
@@ -130,8 +133,12 @@ class CalledCode:
         module = self._module(path)
         if module.nodes_of(f"{owner}.{name}"):
             yield _Place(path, f"{owner}.{name}")
-            return
-        for words in module.bases_of(owner) if depth < _FURTHEST else ():
+        else:
+            yield from self._of_bases(path, owner, name, depth)
+
+    def _of_bases(self, path: str, owner: str, name: str, depth: int) -> Iterator[_Place]:
+        """The same of the bases alone, for `super().name`."""
+        for words in self._module(path).bases_of(owner) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):
                 yield from self._of_self(base.path, base.name, name, depth + 1)
 

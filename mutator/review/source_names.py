@@ -8,6 +8,7 @@ from pathlib import Path
 _Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _SCOPES = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
 _Wanted = Callable[[ast.expr], bool]
+SUPER = "super"
 _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 
@@ -31,7 +32,8 @@ class Import:
 class Use:
     """A name that is no local variable, with the attributes after it: `("effects", "Rain")`.
 
-    `imported` is what it stands for where the function imports it itself; `owner` is the class of a `self`.
+    `imported` is what it stands for where the function imports it itself; `owner` is the class of a `self` or
+    a `super()`.
     """
 
     words: tuple[str, ...]
@@ -63,7 +65,10 @@ class Module:
     def bases_of(self, name: str) -> list[tuple[str, ...]]:
         """The base classes of a class, as names with attributes."""
         classes = [node for node in self.nodes_of(name) if isinstance(node, ast.ClassDef)]
-        return [words for node in classes for base in node.bases if (words := _dotted(base))]
+        bases = (
+            base.value if isinstance(base, ast.Subscript) else base for one in classes for base in one.bases
+        )
+        return [words for base in bases if (words := _dotted(base))]
 
     def source_of(self, name: str, data: bytes) -> bytes:
         """The lines of all statements that define a name, decorators included."""
@@ -139,6 +144,8 @@ def _uses(node: ast.AST, scope: _Scope, wanted: _Wanted) -> Iterator[Use]:
         if isinstance(node.ctx, ast.Load) and wanted(node) and (use := scope.use(words)):
             yield use
         return
+    if isinstance(node, ast.Attribute) and _is_super(node.value) and scope.owner and wanted(node):
+        yield Use((SUPER, node.attr), owner=scope.owner)
     for part, inner in _parts(node, scope):
         yield from _uses(part, inner, wanted)
 
@@ -180,6 +187,10 @@ def _dotted(node: ast.AST) -> tuple[str, ...]:
     return (node.id, *reversed(words)) if isinstance(node, ast.Name) else ()
 
 
+def _is_super(node: ast.expr) -> bool:
+    return isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == SUPER
+
+
 def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
     """The names that a function binds itself, and its imports."""
     arguments = node.args
@@ -206,7 +217,9 @@ def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
             names.add(one.id)
         elif isinstance(one, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and one.name:
             names.add(one.name)
-        if not isinstance(one, (*_SCOPES, ast.ClassDef)):
+        if isinstance(one, ast.comprehension):
+            waiting += (one.iter, *one.ifs)  # its variables are its own
+        elif not isinstance(one, (*_SCOPES, ast.ClassDef)):
             waiting += ast.iter_child_nodes(one)
     return frozenset(names - outside - {name for name, _ in imports}), imports
 

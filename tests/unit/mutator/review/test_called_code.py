@@ -152,6 +152,56 @@ def test_what_is_broken_calls_nothing() -> None:
     assert called("picture = four()") == {}
 
 
+PACKAGE = {
+    "car/__init__.py": "from .weather import *\n",
+    "car/sky/__init__.py": "from . import cloud\n",
+    "car/sky/cloud.py": "import car.tools\n\nclass Cloud:\n    FORM = car.tools.clip(1)\n",
+    "car/eye.py": """\
+import car.sky
+from car import Fog
+from car.base import Effect
+
+def part(picture):
+    return picture
+
+class Eye(Effect[int]):
+    def apply(self):
+        return super().apply()
+
+    def look(self, picture):
+        parts = [part for part in picture]
+        {line}
+""",
+}
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("picture = Fog()", {"car/weather.py Fog", "car/weather.py TABLE", "car/drops.npz"}),
+        (
+            "picture = car.sky.cloud.Cloud()",
+            {"car/sky/cloud.py Cloud", "car/tools.py clip", "car/numbers.py one"},
+        ),
+        (
+            "picture = str(car.sky.cloud)",
+            {"car/sky/cloud.py", "car/tools.py clip", "car/numbers.py one"},
+        ),
+        ("picture = super().apply()", {"car/base.py Effect.apply"}),
+        ("picture = self.apply()", {"car/eye.py Eye.apply", "car/base.py Effect.apply"}),
+        ("picture = part(picture)", {"car/eye.py part"}),
+    ],
+)
+def test_names_of_packages_and_bases_lead_on(line: str, found: set[str]) -> None:
+    """Through a star import or a module that a package offers, a module as a whole, `super()`, a base with
+    type arguments; a variable of a comprehension hides no name outside of it."""
+    pristine = PACKAGE["car/eye.py"].format(line="pass")
+    files = {**TREE, **PACKAGE, "car/eye.py": pristine}
+    tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
+    mutated = PACKAGE["car/eye.py"].format(line=line + TAG).encode()
+    assert set(CalledCode(tree).of_lines("car/eye.py", mutated)) == found
+
+
 @pytest.mark.parametrize(
     ("texts", "found"),
     [
