@@ -37,7 +37,8 @@ class Outbox {
   add(changes, by) {
     for (const change of changes) {
       const waiting = this.queue.find((item) => item.group === change.group);
-      this.queue.push({ ...change, by, seen: waiting ? waiting.seen : this.groups.get(change.group).revision });
+      const { revision, digest } = this.groups.get(change.group);
+      this.queue.push({ ...change, by, digest, seen: waiting ? waiting.seen : revision });
     }
     this.#keep();
     this.events.changed(changes.map((change) => change.group));
@@ -96,7 +97,7 @@ class Outbox {
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
       const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // the first mark's counts
-      const digests = Object.fromEntries(batch.map((item) => [item.group, this.groups.get(item.group).digest])); // of the diffs that are shown
+      const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the diffs that were shown
       const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {
         this.events.offline(this.#gone(answer));
@@ -131,7 +132,7 @@ class Outbox {
 
   /** Marks about groups that others have changed: told to the reviewer. The rest is sent again. */
   #conflicted(batch, { conflict, groups }) {
-    const isOther = (item) => groups[item.group] && groups[item.group].digest !== this.groups.get(item.group).digest;
+    const isOther = (item) => groups[item.group] && groups[item.group].digest !== item.digest;
     const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));
     const others = stale.filter(isOther), told = stale.length ? stale.filter((item) => !isOther(item)) : batch;
     const kept = told.filter((item) => groups[item.group] && Outbox.#isThere(item, groups[item.group]));

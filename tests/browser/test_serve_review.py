@@ -199,6 +199,33 @@ def test_what_changed_since_an_approval_is_shown_as_a_diff(
         lens.write_text(text)
 
 
+def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
+    library: Workspace, serve: Callable[..., Any], visit: Visit
+) -> None:
+    """An approval that a server never got does not become one of code that came later, by way of a reload."""
+    rmtree(library.library / "reviews", ignore_errors=True)
+    lens = library.library.parent / "tree/toycar/lens.py"
+    text = lens.read_text()
+    with serve(library) as address:
+        page = visit(address, f"{ADDRESS}#q=light")
+        ready(page)
+        page.fill("#by", "Jane")
+        page.keyboard.press("Escape")
+        page.keyboard.press("j")
+        page.route("**/api/review/**", lambda route: route.abort())
+        page.keyboard.press("a")
+        page.wait_for_selector("#banner:text('1 mark waits')")
+        lens.write_text(text.replace("picture + self.amount", "picture + 2 * self.amount"))
+        try:
+            page.unroute("**/api/review/**")
+            page.reload()
+            ready(page)
+            page.wait_for_selector(f"#group-{current(page)} .kept:text('load this page again')")
+        finally:
+            lens.write_text(text)
+    assert not load_review(library, "toycar").entries
+
+
 def test_marks_outlive_a_server_that_is_gone(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
