@@ -27,7 +27,6 @@ SERVED: Mapping[str, tuple[str, ...]] = {
     "series": (".js",),
     "series/kept": (".js",),
 }
-_WRITTEN = ("", "report", "plots", "series", "traces", "work")  # folders that commands write into
 _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 
 
@@ -120,17 +119,20 @@ def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
 
 
 def check_no_links(run: Path) -> None:
-    """MutatorError for a link among what commands write in a run folder: they would write where it leads."""
-    for folder in _WRITTEN:
-        with suppress(FileNotFoundError), os.scandir(run / folder) as entries:
+    """MutatorError for a link anywhere in a run folder: commands would write where it leads."""
+    folders = [str(run)]
+    while folders:
+        with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
             for entry in entries:
                 if entry.is_symlink():
                     raise MutatorError(
-                        f"a link, {Path(folder, entry.name)}",
+                        f"a link, {Path(entry.path).relative_to(run)}",
                         where=run.name,
                         expected="files and folders, as a run writes them",
                         remedy="delete the link",
                     )
+                if entry.is_dir():
+                    folders.append(entry.path)
 
 
 def open_in_run(run: Path, name: str) -> int:

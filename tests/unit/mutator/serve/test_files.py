@@ -132,6 +132,19 @@ def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: 
     assert not client.get("/api/jobs").json["jobs"]
 
 
+@pytest.mark.parametrize("name", ["report/figures/a.svg", "records/a.jsonl", "series/kept/.a.js.1"])
+def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linked: Path, name: str) -> None:
+    """However deep it lies: what the command would write there would go where the link leads."""
+    end = client.place / "secret.csv"
+    (linked / name).parent.mkdir(parents=True, exist_ok=True)
+    (linked / name).symlink_to(end)
+    refused = client.post("/api/jobs", {"kind": "report", "run": "linked"})
+    assert refused.status == 400
+    assert refused.json["error"]["got"] == f"a link, {name}"
+    assert client.get("/runs/linked/report/index.html").status == 400
+    assert end.read_text() == SECRET
+
+
 def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
     """A folder of runs holds runs; a link in it to one elsewhere is none."""
     elsewhere = client.place / "elsewhere"
