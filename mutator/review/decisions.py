@@ -141,8 +141,13 @@ class Review:
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
-    """What was said of a target's groups; nothing without a file. MutatorError at the line of a mistake."""
+    """What was said of a target's groups; nothing without a file. MutatorError at the line of a mistake, and
+    for a link: an error would tell what stands in the file it leads to, and a change would replace it."""
     path = workspace.library / "reviews" / f"{target}.yaml"
+    if path.is_symlink():
+        raise MutatorError(
+            "a link", where=path, expected="a file of its own", remedy="put the file in its place"
+        )
     if not path.exists():
         return Review(path=path, target=target, entries={})
     content = review_file.load(path, target)

@@ -12,6 +12,8 @@ from mutator.serve.orders import Desk
 from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
 from mutator.serve.runs import Runs
 
+_MOST_WORDS = 100  # of an address
+
 
 class ReviewApi:
     """Reviews for scripts."""
@@ -90,7 +92,9 @@ class JobApi:
 
 def asked(reviews: Reviews, request: Request) -> Selection:
     """Which groups an address asks for; MutatorError for words that it does not know."""
-    given = parse_qsl(request.url.query, keep_blank_values=True, max_num_fields=100)
+    given = parse_qsl(request.url.query, keep_blank_values=True)
+    if len(given) > _MOST_WORDS:
+        raise MutatorError(f"{len(given)} words in the address", expected=f"at most {_MOST_WORDS}")
     if strange := [name for name, _ in given if name not in ("campaign", "spec", "run")]:
         raise MutatorError(
             f"'{strange[0]}' in the address", expected="campaign, or spec, which may be repeated"

@@ -11,7 +11,7 @@ from mutator.review.catalogue import of_library
 from mutator.review.decisions import Change, Kind, load_review, record
 from mutator.workspace import Workspace
 
-from .conftest import Client
+from .conftest import SECRET, Client
 from .test_files import HOSTILE
 
 API = "/api/review/toycar"
@@ -136,3 +136,18 @@ def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[st
     assert client.get(f"{API}/{first}/typical?spec=sensor/*&run=none").status == 404
     assert client.get(f"{API}?other=1").status == 400
     assert client.get(f"{API}?campaign=small&spec=sensor/*").status == 400
+    assert client.get(f"{API}?{'spec=a&' * 101}").status == 400
+
+
+def test_a_review_file_is_no_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
+    """No page tells what stands in a file that the review file leads to, and no decision goes there."""
+    client, (first, *_) = reviewed
+    other = client.place / "secret.txt"
+    other.write_text(SECRET)
+    (toycar.library / "reviews").mkdir()
+    (toycar.library / "reviews" / "toycar.yaml").symlink_to(other)
+    for address in (f"{API}?spec=sensor/*", "/review/toycar?spec=sensor/*"):
+        assert client.get(address).status == 400
+    change = {"changes": [{"group": first, "kind": "approve"}], "by": "Jane", "seen": {first: ""}}
+    assert client.post(f"{API}?spec=sensor/*", change).status == 400
+    assert other.read_text() == SECRET
