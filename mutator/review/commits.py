@@ -9,22 +9,26 @@ from mutator.errors import MutatorError
 from mutator.review.catalogue import Group
 from mutator.workspace import Workspace
 
+_FORMAT = "--format=%H%x00%aN <%aE>%x00%(trailers:key=Co-authored-by,valueonly,separator=%x00)"
+
 
 @dataclass(frozen=True, slots=True)
 class _Commit:
-    """A commit, and its author as a `.mailmap` has it."""
+    """A commit, its author as a `.mailmap` has it, and its co-authors as its message names them."""
 
     id: str
-    name: str
-    email: str
+    author: str  # `Jane Doe <jane@x.org>`, as the others
+    others: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
-        """Whether somebody who signs so is its author: `Jane Doe`, `jane@x.org`, `Jane Doe <jane@x.org>`."""
-        given, _, rest = reviewer.partition("<")
-        return bool(
-            {text.strip().casefold() for text in (reviewer, given, rest.rstrip("> "))}
-            & {self.name.casefold(), self.email.casefold()} - {""}
-        )
+        """Whether somebody who signs so has written it: `Jane Doe`, `jane@x.org`, `Jane Doe <jane@x.org>`."""
+        return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
+
+
+def _names(person: str) -> set[str]:
+    """What somebody is known by: name, address, both."""
+    name, _, rest = person.partition("<")
+    return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 
 
 def user_name(workspace: Workspace) -> str | None:
@@ -48,8 +52,8 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
         for folder, commit in known[group.made_from].items():
             if commit.is_by(by):
                 raise _refusal(
-                    f"{by} changed group {group.id} last (commit {commit.id[:12]} by {commit.name} "
-                    f"<{commit.email}>): {group.what}",
+                    f"{by} changed group {group.id} last (commit {commit.id[:12]} by "
+                    f"{' and '.join((commit.author, *commit.others))}): {group.what}",
                     folder,
                     "have somebody else approve it",
                 )
@@ -71,7 +75,7 @@ def _last_changes(group: Group) -> dict[Path, _Commit]:
 def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
     names = [str(path.resolve()) for path in paths]
     changes = git(top, "--literal-pathspecs", "status", "--porcelain", "--", *names)
-    told = git(top, "--literal-pathspecs", "log", "-1", "--format=%H%x00%aN%x00%aE", "--", *names) or ""
+    told = git(top, "--literal-pathspecs", "log", "-1", "--no-merges", _FORMAT, "--", *names) or ""
     if changes is None or changes.strip() or not told.strip():
         first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
         raise _refusal(
@@ -79,7 +83,8 @@ def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
             Path(top, *first),
             "commit first",
         )
-    return _Commit(*told.strip("\n").split("\0"))
+    sha, author, *others = filter(None, told.strip("\n").split("\0"))
+    return _Commit(sha, author, tuple(others))
 
 
 def _refusal(got: str, where: Path, remedy: str) -> MutatorError:

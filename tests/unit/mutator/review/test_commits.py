@@ -84,6 +84,29 @@ def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path,
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
+def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> None:
+    """Whom the commit's message names as one has changed the group as well as its author has."""
+    commit(root, LANE, "Joe <joe@example.org>")
+    words = "more\n\nCo-authored-by: Jane  Doe <jane@example.org>\nCo-Authored-By: Jim <jim@example.org>"
+    git(root, "commit", "-q", "--amend", "-m", words)
+    for author in ("Joe", "jane doe", "JANE@example.org", "Jim"):
+        with pytest.raises(MutatorError, match=r"by Joe <joe@example\.org> and Jane"):
+            say(toycar, author)
+    assert say(toycar, "Git Smith").decision(lane(toycar).id)
+
+
+def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
+    """A merge of two people's changes does not let the later one approve theirs, nor is it the merger's."""
+    git(root, "checkout", "-qb", "side")
+    commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
+    git(root, "checkout", "-q", "-")
+    commit(root, LANE, "Joe <joe@example.org>")
+    git(root, "merge", "-q", "side", "-m", "merged")
+    with pytest.raises(MutatorError, match="Joe changed"):
+        say(toycar, "Joe")
+    assert say(toycar, "Git Smith").decision(lane(toycar).id)
+
+
 def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> None:
     """A change that is not committed, a file that never was, a library without git: the remedy says so."""
     with (root / LANE).open("a") as file:
