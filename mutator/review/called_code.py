@@ -17,15 +17,18 @@ from mutator.review import source_names
 from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
 
+_Class = tuple[str, str]  # its file, its name
 _FURTHEST = 20  # imports from one module to the next that a name is followed through
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
-    """Something in the tree that has source: `name` in the file at `path`, or all of it (no name)."""
+    """Something in the tree that has source: `name` in the file at `path`, or all of it (no name). Of a
+    method, `me` is the class of the object: it may have methods of its own for a base's."""
 
     path: str
     name: str
+    me: _Class | None = None
 
 
 class CalledCode:
@@ -67,7 +70,7 @@ class CalledCode:
         for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
             whole = isinstance(node, ast.ClassDef)
-            yield from self._places(place.path, (use for use in uses if not (whole and use.owner)))
+            yield from self._places(place.path, (use for use in uses if not (whole and use.owner)), place.me)
             yield from self._files(place.path, node)
 
     def _source(self, place: _Place) -> str:
@@ -84,15 +87,18 @@ class CalledCode:
                 if named in self._tree.files and not named.endswith(".py"):
                     yield _Place(named, "")
 
-    def _places(self, path: str, uses: Iterable[Use]) -> Iterator[_Place]:
+    def _places(self, path: str, uses: Iterable[Use], me: _Class | None = None) -> Iterator[_Place]:
         for use in uses:
             if use.words[0] == PROBE_NAME:
                 continue
             if use.imported:
                 yield from self._imported(path, use.imported, use.words[1:], 0)
             elif use.owner:
-                found = self._of_bases if use.words[0] == SUPER else self._of_self
-                yield from found(path, use.owner, use.words[1], 0)
+                here, name = (path, use.owner), use.words[1]
+                if use.words[0] == SUPER:
+                    yield from self._of_bases(here, name, me or here, 0)
+                else:
+                    yield from self._of_self(me or here, name, me or here, 0)
             else:
                 yield from self._named(path, use.words, 0)
 
@@ -128,19 +134,20 @@ class CalledCode:
             else:
                 yield _Place(target, "")
 
-    def _of_self(self, path: str, owner: str, name: str, depth: int) -> Iterator[_Place]:
-        """The method of a class, or else of its bases, that `self.name` names."""
-        module = self._module(path)
-        if module.nodes_of(f"{owner}.{name}"):
-            yield _Place(path, f"{owner}.{name}")
+    def _of_self(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
+        """The method of a class, or else of its bases, that `self.name` names in an object of `me`."""
+        path, inside = owner
+        if self._module(path).nodes_of(f"{inside}.{name}"):
+            yield _Place(path, f"{inside}.{name}", me)
         else:
-            yield from self._of_bases(path, owner, name, depth)
+            yield from self._of_bases(owner, name, me, depth)
 
-    def _of_bases(self, path: str, owner: str, name: str, depth: int) -> Iterator[_Place]:
+    def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
         """The same of the bases alone, for `super().name`."""
-        for words in self._module(path).bases_of(owner) if depth < _FURTHEST else ():
+        path, inside = owner
+        for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):
-                yield from self._of_self(base.path, base.name, name, depth + 1)
+                yield from self._of_self((base.path, base.name), name, me, depth + 1)
 
     def _module(self, path: str) -> Module:
         return self._tree.derived(path, source_names.read_module)

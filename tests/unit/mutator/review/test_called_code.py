@@ -156,6 +156,20 @@ PACKAGE = {
     "car/__init__.py": "from .weather import *\n",
     "car/sky/__init__.py": "from . import cloud\n",
     "car/sky/cloud.py": "import car.tools\n\nclass Cloud:\n    FORM = car.tools.clip(1)\n",
+    "car/base.py": """\
+class Effect:
+    def apply(self):
+        return 1
+
+    def area(self):
+        return self.width() * self.height()
+
+    def width(self):
+        return 1
+
+    def height(self):
+        return 1
+""",
     "car/eye.py": """\
 import car.sky
 from car import Fog
@@ -167,6 +181,9 @@ def part(picture):
 class Eye(Effect[int]):
     def apply(self):
         return super().apply()
+
+    def width(self):
+        return 2
 
     def look(self, picture):
         parts = [part for part in picture]
@@ -189,12 +206,17 @@ class Eye(Effect[int]):
         ),
         ("picture = super().apply()", {"car/base.py Effect.apply"}),
         ("picture = self.apply()", {"car/eye.py Eye.apply", "car/base.py Effect.apply"}),
+        (
+            "picture = self.area()",
+            {"car/base.py Effect.area", "car/eye.py Eye.width", "car/base.py Effect.height"},
+        ),
         ("picture = part(picture)", {"car/eye.py part"}),
     ],
 )
 def test_names_of_packages_and_bases_lead_on(line: str, found: set[str]) -> None:
     """Through a star import or a module that a package offers, a module as a whole, `super()`, a base with
-    type arguments; a variable of a comprehension hides no name outside of it."""
+    type arguments, and from a base's method back to one of the class itself; a variable of a comprehension
+    hides no name outside of it."""
     pristine = PACKAGE["car/eye.py"].format(line="pass")
     files = {**TREE, **PACKAGE, "car/eye.py": pristine}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
