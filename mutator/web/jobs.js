@@ -64,7 +64,7 @@ const Jobs = (() => {
   function show(jobs) {
     place.hidden = jobs.length === 0 && !place.dataset.always;
     const active = jobs.filter(isActive).length, failed = jobs.filter((job) => job.state === "failed").length;
-    const waiting = active ? `${active} to do` : "none to do";
+    const waiting = active ? `${active} unfinished` : "none unfinished";
     place.querySelector(".jobs-count").textContent = `${jobs.length} in all, ${waiting}${failed ? `, ${failed} failed` : ""}`;
     place.querySelector(".jobs-none").hidden = jobs.length > 0;
     const list = place.querySelector("ul"), shown = jobs.slice(0, SHOWN);
@@ -123,7 +123,7 @@ const Jobs = (() => {
     for (;;) {
       const answer = await ask(`/api/jobs/${id}/log`).catch((error) => ({ log: error.message }));
       const isAtEnd = text.scrollTop + text.clientHeight >= text.scrollHeight - 4;
-      if (text.textContent !== answer.log) text.textContent = answer.log || "Nothing was printed yet.";
+      if (text.textContent !== answer.log) text.textContent = answer.log || "Nothing has been printed yet.";
       if (isAtEnd) text.scrollTop = text.scrollHeight;
       const job = known.find((one) => one.id === id);
       await new Promise((done) => setTimeout(done, SOON_MS));
@@ -136,7 +136,7 @@ const Jobs = (() => {
     const section = document.getElementById("jobs");
     place = section || el("aside.jobs", { id: "jobs", "aria-label": "Jobs", hidden: true });
     if (section) section.dataset.always = "yes";
-    const list = [el("ul"), el("p.quiet.jobs-none", {}, "Nothing was asked for since the server was started.")];
+    const list = [el("ul"), el("p.quiet.jobs-none", {}, "No jobs since the server was started.")];
     const count = el("span.quiet.jobs-count");
     place.classList.add("jobs");
     place.append(...(section ? [el("h2", {}, "Jobs ", count), ...list]

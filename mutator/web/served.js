@@ -25,14 +25,14 @@
         await Jobs.start({ ...order, run, experiment: id });
         said.textContent = "";
       } catch (error) {
-        said.textContent = `It is not done: ${error.message}.`;
+        said.textContent = `Not started: ${error.message}.`;
       }
     };
     const button = (text, title, ask) => el("button", { type: "button", title, onclick: () => order(ask()) }, text);
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
     const pictures = facts.filmed ? [button("Film", "Golden beside faulty, the whole drive", () => ({ kind: "film" })),
       el("span.still", {}, button("Still", "A picture of that film", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
-    const made = el("section.do", { "data-id": id }, el("h3", {}, "Do it here"),
+    const made = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
       el("div.row", {}, button("Drive again", "Is the result the same?", () => ({ kind: "rerun" })),
         button("Exact plot", "Drive it again and keep every step of its channels", () => ({ kind: "plot" })), pictures),
       said, jobs);

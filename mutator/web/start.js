@@ -21,10 +21,10 @@
       said.textContent = "…";
       try {
         await Jobs.start(order(Object.fromEntries(new FormData(made))));
-        said.textContent = "It is among the jobs.";
+        said.textContent = "Added to the jobs.";
       } catch (error) {
         said.className = "bad";
-        said.textContent = `It is not done: ${error.message}.`;
+        said.textContent = `Not started: ${error.message}.`;
       }
       button.disabled = false;
     }
@@ -45,7 +45,7 @@
     const trigger = select("trigger", [option("always"), option("time", "from a time on (s)"), ...contexts.map((c) => option(c.name, `${c.name}: ${c.condition}`))],
       { onchange: () => (time.hidden = trigger.value !== "time") });
     fill();
-    return form("Try a fault", "Put one fault in and drive once: diff, verdict and plot.", [
+    return form("Try a fault", "Inject one fault and drive once: diff, verdict and plot.", [
       labelled("Fault", el("span", {}, name, el("datalist", { id: "specs" }, specs.map((spec) => option(spec.name))))),
       labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map((s) => option(s)))),
       labelled("Trigger", el("span.two", {}, trigger, time)),
