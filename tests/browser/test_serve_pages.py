@@ -63,6 +63,7 @@ def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
     page.wait_for_selector("form.order .bad:text('no/such')")
 
 
+@pytest.mark.slow
 def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visit, folder: Path) -> None:
     """The job is told of beside the experiment and at the foot of the page, with its log, and found by a
     reload; the plot that it drew is in the report then."""

@@ -226,6 +226,7 @@ def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
     assert not load_review(library, "toycar").entries
 
 
+@pytest.mark.slow
 def test_marks_outlive_a_server_that_is_gone(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:

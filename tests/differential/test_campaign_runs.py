@@ -135,6 +135,7 @@ def test_killed_and_resumed(
     assert results(out) == undisturbed
 
 
+@pytest.mark.slow
 def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """`mutator run` and pytest's campaign are the same thing: pytest resumes what the other was killed at, of
     which no process lives on, and comes to the same bytes. The killed workers' registrations go, too.

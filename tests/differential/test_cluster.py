@@ -83,6 +83,7 @@ def test_two_workers_give_the_same_bytes(
     assert not [*two.folder.glob("*/dask/**/mutator-*")]
 
 
+@pytest.mark.slow
 def test_pytest_deals_out_to_a_cluster(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
