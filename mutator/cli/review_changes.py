@@ -25,50 +25,39 @@ Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask whether all t
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Left as a remark on each group.")]
 
 
-@with_place
-def approve(
-    groups: SomeGroups = None,
-    by: By = None,
-    remark: Remark = "",
-    only: OnlyGroups = None,
-    yes: Yes = False,
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
-    *,
-    place: Place,
-) -> None:
-    """Approve groups as they are now: some by their ids, or all that a filter finds."""
-    terminal, name = Terminal(as_json), reviewer(place, by)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
-    if chosen := _chosen(found, "approve", groups, only, yes=yes):
-        _tell(terminal, found.approve(chosen, name, remark), chosen)
+def _deciding(kind: str, about: str) -> Callable[..., None]:
+    """The verb that approves, or the one that rejects."""
+
+    @with_place
+    def verb(
+        groups: SomeGroups = None,
+        by: By = None,
+        remark: Remark = "",
+        only: OnlyGroups = None,
+        yes: Yes = False,
+        campaign: Campaign = None,
+        specs: Specs = None,
+        reading: Reading = None,
+        seed: Seed = None,
+        manifest: Manifest = None,
+        as_json: Json = False,
+        *,
+        place: Place,
+    ) -> None:
+        terminal, name = Terminal(as_json), reviewer(place, by)
+        found = load(terminal, place, campaign, specs, reading, seed, manifest)
+        if chosen := _chosen(found, kind, groups, only, yes=yes):
+            decide = found.approve if kind == "approve" else found.reject
+            _tell(terminal, decide(chosen, name, remark), chosen)
+
+    verb.__doc__ = about
+    return verb
 
 
-@with_place
-def reject(
-    groups: SomeGroups = None,
-    by: By = None,
-    remark: Remark = "",
-    only: OnlyGroups = None,
-    yes: Yes = False,
-    campaign: Campaign = None,
-    specs: Specs = None,
-    reading: Reading = None,
-    seed: Seed = None,
-    manifest: Manifest = None,
-    as_json: Json = False,
-    *,
-    place: Place,
-) -> None:
-    """Reject groups as they are now: `run --require-reviewed` does not run them."""
-    terminal, name = Terminal(as_json), reviewer(place, by)
-    found = load(terminal, place, campaign, specs, reading, seed, manifest)
-    if chosen := _chosen(found, "reject", groups, only, yes=yes):
-        _tell(terminal, found.reject(chosen, name, remark), chosen)
+approve = _deciding(
+    "approve", "Approve groups as they are now: some by their ids, or all that a filter finds."
+)
+reject = _deciding("reject", "Reject groups as they are now: `run --require-reviewed` does not run them.")
 
 
 @with_place

@@ -48,7 +48,6 @@ def experiment(client: Client) -> str:
     return next(plan_file.ids(client.place / "runs/first"))
 
 
-@pytest.mark.slow
 def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
     """Its run folder is whole, is served, and compares with itself."""
     assert RunFolder.open(busy.place / "runs/first").finished
