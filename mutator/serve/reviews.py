@@ -51,7 +51,7 @@ class _ChangeModel(StrictModel):
 
 class Decisions(StrictModel):
     """What a page sends. `seen` has the revision of each group as the page has it; `digests` say which diffs
-    it shows, where it tells."""
+    it shows; nothing is approved or rejected without."""
 
     changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
     by: Short
@@ -138,6 +138,9 @@ class Reviews:
             raise Absent(f"no group '{strangers[0]}'", expected="the id of one that the page shows")
         if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
             raise MutatorError(f"group {unseen[0]} without what was seen", where="seen")
+        decided = [one.group for one in wanted.changes if one.kind in (Kind.APPROVE, Kind.REJECT)]
+        if blind := [name for name in decided if name not in wanted.digests]:
+            raise MutatorError(f"group {blind[0]} without the diff that was seen", where="digests")
         touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
         self._refuse_others(chosen, touched, wanted.digests)
         changes = [

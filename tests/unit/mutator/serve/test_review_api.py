@@ -34,6 +34,7 @@ def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more:
         "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],
         "by": by,
         "seen": {group: groups[group]["revision"] for group, _ in changes if group in groups},
+        "digests": {group: groups[group]["digest"] for group, _ in changes if group in groups},
     }
     return client.post(f"{API}?spec=sensor/*", body | {k: v for k, v in more.items() if k != "text"})
 
@@ -92,8 +93,9 @@ NO_DECISIONS: tuple[tuple[Any, int], ...] = (
     ({}, 400),
     ({"changes": [], "by": "Jane", "seen": {}}, 400),
     ({"changes": [{"group": "ID", "kind": "approve"}], "by": "Jane", "seen": {}}, 400),
-    ({"changes": [{"group": "ID", "kind": "approve"}], "by": " ", "seen": {"ID": ""}}, 400),
-    ({"changes": [{"group": "ID", "kind": "approve"}], "by": "a\u0000b", "seen": {"ID": ""}}, 400),
+    ({"changes": [{"group": "ID", "kind": "approve"}], "by": "Jane", "seen": {"ID": ""}}, 400),
+    ({"changes": [{"group": "ID", "kind": "flag"}], "by": " ", "seen": {"ID": ""}}, 400),
+    ({"changes": [{"group": "ID", "kind": "flag"}], "by": "a\u0000b", "seen": {"ID": ""}}, 400),
     (
         {"changes": [{"group": "ID", "kind": "remark", "text": " "}], "by": "Jane", "seen": {"ID": ""}},
         400,
