@@ -2,6 +2,7 @@
 
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
+      goldens/<digest>/    golden runs that a worker of a cluster drove
       runs/<digest>.json   finished runs that were verified: what was found
       lines/<digest>.json  the lines that a golden run executes
       pictures/<digest>.json  what image effects do to a picture, for their review
@@ -18,7 +19,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import quote
 
-CHECKS, RUNS, LINES, PICTURES, TARGETS = "checks", "runs", "lines", "pictures", "targets"
+CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
+LINES, PICTURES, TARGETS = "lines", "pictures", "targets"
 TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with many seeds
 
 
@@ -26,8 +28,8 @@ TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with m
 class Entry:
     """Something in the cache that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is what it
-    takes on the disk, in bytes, and `used` when it was last read or written, in seconds since the epoch.
+    `what` says whose it is: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is
+    its size on the disk in bytes, `used` when it was last read or written, in seconds since the epoch.
     """
 
     what: str
@@ -59,6 +61,11 @@ def of_checks() -> Path:
     return folder() / CHECKS
 
 
+def of_goldens() -> Path:
+    """Where a worker of a cluster keeps the golden runs that it drove."""
+    return folder() / GOLDENS
+
+
 def of_runs() -> Path:
     """Where it is kept which runs were verified."""
     return folder() / RUNS
@@ -82,6 +89,7 @@ def of_target(name: str) -> Path:
 def entries() -> list[Entry]:
     """All that is cached: each campaign's checks, each verified run, and each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
+    found += [_entry(GOLDENS, path) for path in _children(of_goldens())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
     found += [_entry(LINES, path) for path in _children(of_lines())]
     found += [_entry(PICTURES, path) for path in _children(of_pictures())]

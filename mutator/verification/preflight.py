@@ -6,6 +6,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from mutator._common import kept_folders
 from mutator._common.files import (
     DiskFull,
     json_bytes,
@@ -118,7 +119,7 @@ class _Checks:
         copy = self.kept
         try:
             with raising_disk_full(copy):
-                preflight_cache.fetch(preflight_cache.entry(self.digest), copy, FILE)
+                kept_folders.fetch(preflight_cache.entry(self.digest), copy)
             found = read_json(copy / FILE, SCHEMA)
             results = self._passed(found, copy)
         except DiskFull:

@@ -6,7 +6,7 @@ target/, overlay/   its tree, and what else its runs read in its root (`{root}/.
 templates/          the fault models
 scenarios/          the scenario files of the golden runs
 
-Golden runs do not travel: a worker has to drive them, so that their digests show whether it computes alike.
+Golden runs do not travel: each machine drives them, so that their digests show whether it computes alike.
 """
 
 import json

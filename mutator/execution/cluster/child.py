@@ -25,6 +25,7 @@ from mutator.engines.reference import ReferenceEngine, prepare_base
 from mutator.engines.registry import make_engine
 from mutator.errors import MutatorError
 from mutator.execution.cluster.bundle import Site
+from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.pieces import Ending, Kind, Piece, Result
 from mutator.execution.runner import Finished, Goldens, Runner
 from mutator.execution.worker import timing_of
@@ -53,7 +54,8 @@ class PieceRunner:
         self._work.mkdir()
         self._base = prepare_base(site.manifest, self._work / "base")
         self._goldens = self._work / "golden"
-        self._alike: set[str] = set()  # golden runs that were driven here
+        self._driven = DrivenGoldens(site)
+        self._alike: set[str] = set()  # golden runs that this machine drives to the campaign's bytes
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
@@ -63,7 +65,7 @@ class PieceRunner:
         experiments = piece.experiments()
         for same in runs(self._site.manifest, experiments):  # compared with the golden run of its first
             if (key := self._golden_of(same[0]).key) not in self._alike:
-                self._drive_golden(key)
+                self._have_golden(key)
         runner = self._runner(piece.kind)
         finished: list[Finished] = []
         for one in runner.run(experiments):
@@ -105,10 +107,20 @@ class PieceRunner:
             )
         return self._runners[kind]
 
-    def _drive_golden(self, key: str) -> None:
-        """Drive a golden run, and keep it; Unlike when it is not the campaign's to the byte."""
+    def _have_golden(self, key: str) -> None:
+        """Have a golden run that this machine drove, now or for another campaign; Unlike unless its bytes are
+        the campaign's."""
+        golden, known = self._site.goldens[key]
+        place = self._goldens / key
+        self._goldens.mkdir(exist_ok=True)
+        if not self._driven.fetch(golden, known, place):
+            self._drive_golden(golden, known, place)
+            self._driven.keep(golden, place)
+        self._alike.add(key)
+
+    def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
+        """Drive a golden run into the folder `place`; Unlike when it is not the campaign's to the byte."""
         site = self._site
-        golden, known = site.goldens[key]
         engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
         job = Job(
             name=f"golden-{len(self._alike)}",
@@ -120,12 +132,10 @@ class PieceRunner:
             found = look(site.manifest, execution)
             if found.problem or found.digest != known:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
-                raise Unlike(f"golden run {key} {came}")
-            self._goldens.mkdir(exist_ok=True)
-            execution.out.rename(self._goldens / key)
+                raise Unlike(f"golden run {golden.key} {came}")
+            execution.out.rename(place)
             if golden.seed is not None:  # the pictures of a hundred seeds would fill the disk
                 caches.make_room(site.manifest.name)
-        self._alike.add(key)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
         return GoldenRun.of(experiment, several_seeds=self._site.meta["several_seeds"])

@@ -12,10 +12,12 @@ import pytest
 
 from mutator.campaigns.plans import Choices
 from mutator.errors import MutatorError
+from mutator.execution.cluster import bundle
 from mutator.execution.cluster.board import Board
-from mutator.execution.cluster.bundle import Bundle
+from mutator.execution.cluster.bundle import Bundle, Site
+from mutator.execution.cluster.driven_goldens import DrivenGoldens
 from mutator.execution.cluster.host import Host, NotWanted
-from mutator.execution.cluster.pieces import Ending, Piece
+from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import open_session
 from mutator.workspace import Workspace
 
@@ -131,3 +133,50 @@ def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp
     assert not [*(tmp_path / "other").iterdir()]
     with pytest.raises(MutatorError, match="damaged parcel"):
         host.run(sent[1].packed()[:-1], lambda: True)
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Where a machine keeps golden runs; empty."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "mutator" / "goldens"
+
+
+def run_once(sent: tuple[Bundle, Piece], place: Path) -> Result:
+    """The result of the piece on a new host."""
+    host = Host.lay_out(sent[0].data, str(place), "alpha")
+    with attended(host):
+        return host.run(sent[1].packed(), lambda: True)
+
+
+def written(entry: Path) -> int:
+    return (entry / "log.npz").stat().st_mtime_ns
+
+
+def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path) -> None:
+    """A second host finds the golden run that the first one drove; a damaged one is driven again and
+    replaced. The records are the same each time."""
+    first = run_once(sent, tmp_path / "a")
+    (entry,) = cache.iterdir()
+    before = written(entry)
+    assert run_once(sent, tmp_path / "b").records == first.records
+    assert [*cache.iterdir()] == [entry] and written(entry) == before
+    (entry / "log.npz").write_bytes(b"damaged")
+    assert run_once(sent, tmp_path / "c").records == first.records
+    assert [*cache.iterdir()] == [entry] and (entry / "log.npz").read_bytes() != b"damaged"
+
+
+def test_a_kept_golden_run_must_be_the_campaigns(
+    sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
+) -> None:
+    """A kept golden run whose digest is not the campaign's is not used, nor is one of other sources."""
+    run_once(sent, tmp_path / "a")
+    bundle.lay_out(sent[0].data, tmp_path / "site")
+    site = Site(tmp_path / "site")
+    golden, known = site.goldens[sent[1].golden]
+    to = tmp_path / "golden"
+    assert DrivenGoldens(site).fetch(golden, known, to) and to.is_dir()
+    assert not DrivenGoldens(site).fetch(golden, "0" * 64, to) and not to.exists()
+    source = next((site.place / "target").rglob("*.py"))
+    source.write_text(source.read_text() + "# another\n")
+    assert not DrivenGoldens(site).fetch(golden, known, to)

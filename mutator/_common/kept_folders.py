@@ -1,0 +1,42 @@
+"""Folders kept in the cache: written whole or not at all, and verified before use."""
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from mutator._common.hashing import digest
+
+_SUM = "sum"  # the file with the digest of all others
+
+
+def fetch(place: Path, to: Path) -> None:
+    """Replace the folder `to` by a copy of the one kept at `place`. OSError if that is missing or damaged."""
+    shutil.rmtree(to, ignore_errors=True)
+    shutil.copytree(place, to)
+    kept = to / _SUM
+    said = kept.read_bytes()
+    kept.unlink()
+    if said != _sum(to):
+        raise OSError(f"{place}: damaged")
+
+
+def store(place: Path, fill: Callable[[Path], object]) -> None:
+    """Keep at `place` the folder that `fill` writes; an unwritable cache is ignored."""
+    try:
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:
+            made = Path(scratch) / "entry"
+            fill(made)
+            (made / _SUM).write_bytes(_sum(made))
+            shutil.rmtree(place, ignore_errors=True)  # missing or damaged
+            made.rename(place)
+    except OSError:
+        return
+
+
+def _sum(folder: Path) -> bytes:
+    """Digest of the names and contents of all files of a folder."""
+    files = sorted(path for path in folder.rglob("*") if path.is_file())
+    found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
+    return digest(found).encode()

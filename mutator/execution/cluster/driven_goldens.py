@@ -1,0 +1,54 @@
+"""Golden runs that this machine drove for earlier campaigns: a worker need not drive them again.
+
+An entry is found by everything that a golden run follows from: sources, scenario, seed, limits, and what the
+machine computes with. Its bytes are compared with the campaign's digest like those of a new run.
+"""
+
+import platform
+import shutil
+from contextlib import suppress
+from pathlib import Path
+
+from mutator._common import caches, kept_folders
+from mutator._common.hashing import digest
+from mutator._common.version import VERSION
+from mutator.campaigns import machine
+from mutator.execution.cluster.bundle import Site
+from mutator.store.run_folder import GoldenRun
+from mutator.verification.preflight_rules import digest_of
+
+_SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
+
+
+class DrivenGoldens:
+    """The golden runs kept for a site."""
+
+    def __init__(self, site: Site) -> None:
+        self._site = site
+        files = sorted(path for name in _SOURCES for path in (site.place / name).rglob("*") if path.is_file())
+        self._common = [
+            VERSION,
+            [[path.relative_to(site.place).as_posix(), digest(path.read_bytes())] for path in files],
+            site.meta["limits"],
+            machine.surroundings(),
+            platform.node(),
+        ]
+
+    def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
+        """Copy a golden run to `to`. False, and nothing there, unless one with the digest `known` is kept."""
+        with suppress(OSError):
+            kept_folders.fetch(self._entry(golden), to)
+            if digest_of(self._site.manifest, to) == known:
+                return True
+        shutil.rmtree(to, ignore_errors=True)
+        return False
+
+    def keep(self, golden: GoldenRun, out: Path) -> None:
+        """Keep the golden run in the folder `out`; an unwritable cache is ignored."""
+        kept_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
+
+    def _entry(self, golden: GoldenRun) -> Path:
+        scenario = digest(self._site.scenario(golden.scenario).read_bytes())
+        seed = self._site.meta["seed"] if golden.seed is None else golden.seed
+        content = [*self._common, scenario, seed, list(golden.changes)]
+        return caches.of_goldens() / digest(content)
