@@ -86,12 +86,15 @@ def importing(extra: str) -> Iterator[None]:
 
 @contextmanager
 def own_scheduler() -> Iterator[None]:
-    """Settings of Dask for a scheduler in this process: a frozen worker is noticed within a minute, and the
-    link to the dashboard is for this machine, the only one that it answers."""
+    """Settings of Dask for a scheduler in this process: a frozen worker is noticed within a minute, Dask does
+    not take CPU time from the runs to watch its own threads, and the dashboard's link is for this machine,
+    the only one that it answers."""
     import dask
 
     settings = {
         "distributed.scheduler.worker-ttl": "60s",
+        "distributed.worker.profile.enabled": False,
+        "distributed.admin.tick.interval": "500ms",
         "distributed.dashboard.link": "{scheme}://127.0.0.1:{port}/status",
     }
     with dask.config.set(settings):
