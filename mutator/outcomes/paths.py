@@ -200,7 +200,8 @@ class Ways:
         firsts: dict[str, float] = {}
         for channel, first, _ in record.left:
             component = self.component_of.get(channel, "")
-            firsts[component] = min(first, firsts.get(component, inf))
+            if first < firsts.get(component, inf):
+                firsts[component] = first
         place = {time: i for i, time in enumerate(sorted(set(firsts.values())))}
         order = tuple(sorted((name, place[time]) for name, time in firsts.items()))
         return Sight(self._injected(fault), order, record.outcome is Outcome.MASKED)

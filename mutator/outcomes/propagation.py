@@ -54,13 +54,14 @@ def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> 
     facts = {name: (component, role) for name, _, role, component, _ in channels}
     made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
     for record in records:
-        for name, first, largest in record.left:
-            made["channel"].append(name)
-            made["t_first"].append(round(first, 6))
-            made["max_dev"].append(largest)
-        made["experiment_id"] += [record.experiment_id] * len(record.left)
-    for name in made["channel"]:
-        component, role = facts.get(name, ("", ""))
-        made["component"].append(component)
-        made["role"].append(role)
+        if record.left:
+            names, firsts, largest = zip(*record.left, strict=True)
+            made["experiment_id"] += [record.experiment_id] * len(names)
+            made["channel"] += names
+            made["t_first"] += firsts
+            made["max_dev"] += largest
+    found = [facts.get(name, ("", "")) for name in made["channel"]]
+    made["component"] = [component for component, _ in found]
+    made["role"] = [role for _, role in found]
+    made["t_first"] = [round(first, 6) for first in made["t_first"]]
     return made
