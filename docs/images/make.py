@@ -1,11 +1,24 @@
-"""Make the pictures of README from a run folder: `python docs/images/make.py RUN`.
+"""Make the pictures of README and docs from two finished runs: a campaign, on two versions of the controller.
 
-It needs the extra `test` and Chromium. The experiment shown is the worst of the run.
+    mutator run quickstart --out runs/quickstart -n 2
+    cp -r target runs/distant-target
+    sed -i 's/^TIME_GAP = 1.8/TIME_GAP = 2.2/' runs/distant-target/selfdrive/controls/lib/long_ocp.py
+    mutator run quickstart --target runs/distant-target --out runs/distant -n 2
+    python docs/images/make.py runs/quickstart runs/distant
+
+Each picture is made wide and narrow, light and dark, such as `report-wide-dark.png`. The film shows the worst
+experiment of the first run. The script needs the extra `test` and Chromium; it takes about a minute.
 """
 
 import argparse
+import contextlib
 import io
+import re
 import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,57 +26,145 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 HERE = Path(__file__).parent
-WIDE = {"width": 1280, "height": 800}
-STEPS = 3  # of 1/20 s, that a picture of the film is later than the one before
-PICTURES, FRAME_MS, LAST_MS, COLOURS = 120, 80, 2000, 64
+WIDTHS = {"wide": {"width": 1280, "height": 800}, "narrow": {"width": 390, "height": 780}}
+SCHEMES = ("light", "dark")
+WORST = "[aria-labelledby=answer-dangerous] a[href^='#e=']"
+STEPS = 2  # of 1/20 s, from one frame of a film to the next
+FRAME_MS, LAST_MS, COLOURS = 100, 3000, 64
+INSTRUMENTS = ("v_ego", "d_rel", "gas", "brake")  # below the road in a film
+SHOWN = ", ".join(f".gauge[aria-label='Plot of {name}']" for name in INSTRUMENTS)
+# A film has no buttons to press, and nothing covers it.
+FILM_STYLE = f"""
+.replay-player .controls > :not(.legend), .gauge, .gauges .more {{ display: none !important }}
+{SHOWN} {{ display: grid !important }}
+.gauge {{ background: none !important; box-shadow: none !important }}
+.timebar:focus-visible {{ outline: none }}
+#experiment > header {{ position: static }}
+"""
 
 
 def main() -> None:
-    """Open the report of the run, and take its pictures."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("run", type=Path)
-    page_of = parser.parse_args().run.resolve() / "report" / "index.html"
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
-        )
-        page = browser.new_page(viewport=WIDE, color_scheme="light")
-        page.goto(page_of.as_uri())
-        page.wait_for_selector("html[data-ready]")
-        save(page.screenshot(), "report.png")
-        page.locator("[aria-labelledby=answer-dangerous] a[href^='#e=']").first.click()
-        page.wait_for_selector(".replay-player")
-        page.locator(".timebar").focus()
-        film(page)
-        page.locator(".jumps button").last.click()
-        save(page.screenshot(), "experiment.png")
-        browser.close()
+    """Take all pictures, at each width and in each colour scheme."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("run", type=Path, help="the run to show")
+    parser.add_argument("other", type=Path, help="the run to compare it with")
+    runs = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch, served(runs.run, runs.other) as address:
+        pages = Path(scratch)
+        mutator("review", "page", "--spec", "radar/*", "--out", str(pages / "review.html"))
+        mutator("compare", str(runs.run), str(runs.other), "--out", str(pages / "comparison"))
+        with sync_playwright() as playwright:
+            browser = playwright.chromium.launch(
+                executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
+            )
+            for width, size in WIDTHS.items():
+                for scheme in SCHEMES:
+                    page = browser.new_page(viewport=size, color_scheme=scheme, reduced_motion="reduce")
+                    name = f"-{width}-{scheme}"
+                    report(page, runs.run.resolve() / "report" / "index.html", name)
+                    static(page, (pages / "review.html").as_uri(), "review" + name)
+                    static(page, (pages / "comparison" / "index.html").as_uri(), "comparison" + name)
+                    static(page, address, "serve" + name)
+                    page.close()
+            browser.close()
 
 
-def film(page: Any) -> None:
-    """Step the replay from shortly before the activation to the drive's end; keep what is seen."""
-    stage = page.locator(".stage")
-    pictures = []
-    while len(pictures) < PICTURES and "after the end" not in stage.inner_text():
-        pictures.append(Image.open(io.BytesIO(stage.screenshot())).convert("RGB"))
+def mutator(*words: str) -> None:
+    """Run a command of the installed `mutator`."""
+    subprocess.run(command(*words), check=True, stdout=subprocess.DEVNULL)
+
+
+def command(*words: str) -> list[str]:
+    return [str(Path(sys.executable).parent / "mutator"), *words]
+
+
+@contextlib.contextmanager
+def served(*runs: Path) -> Iterator[str]:
+    """The address of a server of these runs, which ends with the block."""
+    words = command("serve", *map(str, runs), "--no-browser")
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as server:
+        try:
+            assert server.stdout
+            found = next(filter(None, (re.search(r"http://\S+", line) for line in server.stdout)))
+            yield found[0]
+        finally:
+            server.terminate()
+
+
+def report(page: Any, path: Path, name: str) -> None:
+    """The report's first screen, the worst experiment, and the film of its replay."""
+    page.goto(path.as_uri())
+    page.wait_for_selector("html[data-ready]")
+    save(page.screenshot(), "report" + name)
+    page.locator(WORST).first.click()
+    page.wait_for_selector(".replay-player")
+    page.locator(".jumps button").last.click()
+    show(page, ".replay-player", below="#experiment > header")
+    save(page.screenshot(), "experiment" + name)
+    page.add_style_tag(content=FILM_STYLE)
+    film(page, "replay" + name)
+
+
+def static(page: Any, address: str, name: str, begin: str = "body", below: str = "body") -> None:
+    """The first screen of a page; on a narrow one from `begin` on, below what stays at the top."""
+    page.goto(address)
+    page.wait_for_load_state("networkidle")
+    if page.viewport_size == WIDTHS["narrow"]:
+        show(page, begin, below=below)
+    save(page.screenshot(), name)
+
+
+def show(page: Any, what: str, *, below: str) -> None:
+    """Scroll until `what` begins right under a heading that stays in view."""
+    page.evaluate(
+        """([what, below]) => {
+            const found = document.querySelector(what), head = document.querySelector(below);
+            found.style.scrollMarginTop = `${head.offsetHeight + 8}px`;
+            found.scrollIntoView();
+        }""",
+        [what, below],
+    )
+
+
+def film(page: Any, name: str) -> None:
+    """Step the replay from one second before the activation to the last event; keep what is seen."""
+    end = time(page)
+    page.locator(".jumps button").first.click()
+    page.locator(".timebar").focus()
+    page.keyboard.press("Shift+ArrowLeft")
+    show(page, ".stage", below=".jumps")
+    top, bottom = page.locator(".stage").bounding_box(), page.locator(".gauges").bounding_box()
+    clip = {**top, "height": bottom["y"] + bottom["height"] - top["y"]}
+    frames = []
+    while (now := time(page)) < end:
+        frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
         for _ in range(STEPS):
             page.keyboard.press("ArrowRight")
-    width, height = 640, round(640 * pictures[0].height / pictures[0].width)
-    small = [one.resize((width, height), Image.Resampling.LANCZOS) for one in pictures]
-    all_of_them = Image.new("RGB", (width, height * len(small)))
-    for i, one in enumerate(small):
-        all_of_them.paste(one, (0, i * height))
-    palette = all_of_them.quantize(COLOURS, Image.Quantize.FASTOCTREE)
-    small = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in small]
-    path = HERE / "replay.gif"
-    times = [FRAME_MS] * (len(small) - 1) + [LAST_MS]
-    small[0].save(path, save_all=True, append_images=small[1:], duration=times, loop=0, optimize=True)
+        assert time(page) > now
+    page.locator(".jumps button").last.click()
+    frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
+    column = Image.new("RGB", (frames[0].width, frames[0].height * len(frames)))
+    for i, frame in enumerate(frames):
+        column.paste(frame, (0, i * frame.height))
+    palette = column.quantize(COLOURS, Image.Quantize.FASTOCTREE)
+    few = [f.quantize(palette=palette, dither=Image.Dither.NONE).convert("RGB") for f in frames]
+    times = [FRAME_MS] * (len(few) - 1) + [LAST_MS]
+    path = HERE / f"{name}.webp"
+    few[0].save(path, save_all=True, append_images=few[1:], duration=times, loop=0, lossless=True, method=6)
     print(path, path.stat().st_size)
 
 
+def time(page: Any) -> float:
+    """The time of the replay in s, once it is drawn."""
+    page.evaluate("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
+    return float(page.get_attribute(".replay-player", "data-t"))
+
+
 def save(data: bytes, name: str) -> None:
-    """Write a screenshot with few colours, which takes a quarter."""
-    path = HERE / name
+    """Write a screenshot with few colours, which takes a quarter of the space."""
+    path = HERE / f"{name}.png"
     Image.open(io.BytesIO(data)).convert("RGB").quantize(128).save(path, optimize=True)
     print(path, path.stat().st_size)
 

@@ -56,6 +56,7 @@ CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
 # Also `[text]: page.md`, and images; not what is on the web.
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
+IMAGE = re.compile(r"""<(?:img|source) [^>]*\bsrc(?:set)?="([^"#:\s]+)\"""")
 # What differs from machine to machine: how long it took, and the seal, in which are all versions.
 VARYING = re.compile(
     r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b|\d\.\d s each|(?<=^seal: )[0-9a-f]{64}$"
@@ -217,7 +218,7 @@ def links(page: Path) -> list[tuple[Path, str]]:
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     return [
         ((page.parent / target).resolve() if target else page, anchor)
-        for target, anchor in LINK.findall(text)
+        for target, anchor in [*LINK.findall(text), *((image, "") for image in IMAGE.findall(text))]
     ]
 
 
