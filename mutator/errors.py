@@ -19,7 +19,7 @@ class MutatorError(Exception):
     options that they stand for.
     """
 
-    exit_code = EXIT_WRONG_INPUT
+    exit_code = EXIT_WRONG_INPUT  #: exit code of a command that ends with this error
 
     def __init__(
         self,
@@ -31,12 +31,12 @@ class MutatorError(Exception):
         expected: str | None = None,
         remedy: str | None = None,
     ) -> None:
-        self.got = _short(got)
-        self.where = str(where) if where is not None else None
-        self.line = line
-        self.argument = argument
-        self.expected = _short(expected) if expected else None
-        self.remedy = _short(remedy) if remedy else None
+        self.got = _short(got)  #: what was found
+        self.where = str(where) if where is not None else None  #: the file at fault
+        self.line = line  #: its line
+        self.argument = argument  #: the argument at fault, where no file is
+        self.expected = _short(expected) if expected else None  #: what is valid
+        self.remedy = _short(remedy) if remedy else None  #: what to do
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -78,4 +78,4 @@ def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> Mutato
 class CheckFailed(MutatorError):
     """A check said no: the campaign does not start, or a comparison is beyond its bounds."""
 
-    exit_code = EXIT_CHECK_FAILED
+    exit_code = EXIT_CHECK_FAILED  #: exit code of a command that ends with this error

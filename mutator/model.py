@@ -72,20 +72,20 @@ class AfterHazard(StrEnum):
 class Status(StrEnum):
     """Whether the experiment itself worked; never mixed with its outcome."""
 
-    OK = "ok"
-    CRASHED = "crashed"
-    TIMEOUT = "timeout"
-    INVALID_MUTANT = "invalid_mutant"
-    HARNESS_ERROR = "harness_error"
+    OK = "ok"  #: the run ended as it should
+    CRASHED = "crashed"  #: the controller raised an error or died
+    TIMEOUT = "timeout"  #: the run reached its limit of time, steps or disk
+    INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile
+    HARNESS_ERROR = "harness_error"  #: the harness failed; `mutator.run` tries it again
 
 
 class Outcome(StrEnum):
     """What the fault did, for experiments that ran."""
 
-    NOT_ACTIVATED = "not_activated"
-    MASKED = "masked"
-    SDC = "sdc"
-    HAZARD = "hazard"
+    NOT_ACTIVATED = "not_activated"  #: no injected statement ran while triggered
+    MASKED = "masked"  #: activated; no compared channel left its tolerance, no hazard
+    SDC = "sdc"  #: a compared channel left its tolerance, no hazard
+    HAZARD = "hazard"  #: a hazard followed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -140,11 +140,11 @@ class Trigger:
     it can fire from `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
     """
 
-    name: str
-    condition: str
-    hold: Hold = Hold.WHILE
-    hold_s: float | None = None
-    armed_after_s: float = 0.0
+    name: str  #: name of the trigger: a context, `always`, a time
+    condition: str  #: expression over time `t` and what the target observes
+    hold: Hold = Hold.WHILE  #: how long the fault stays active: `while`, `for` or `to_end`
+    hold_s: float | None = None  #: how long in s, for the hold `for`
+    armed_after_s: float = 0.0  #: time in s from which the condition can fire
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
@@ -168,19 +168,21 @@ class Fault:
     of the scenario that belong to the fault (`alone`).
     """
 
-    spec: str
-    module: str
-    fault_type: str
-    reading: str
-    value: Value
-    unit: str
-    aim: str
+    spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
+    module: str  #: module of the controller, as the spec names it
+    fault_type: str  #: type of the fault, as the spec names it
+    reading: str  #: reading of the spec that it follows
+    value: Value  #: the drawn value, in `unit`; None: the fault has no value
+    unit: str  #: unit of `value`, as the spec states it
+    aim: str  #: the hazard that it aims at
+    #: where the source changes, and how; numbers in the unit of the changed variable
     injections: tuple[Injection, ...]
-    hold: Hold | None = None
-    changes: tuple[str, ...] = ()
+    hold: Hold | None = None  #: how long it stays active; None: as its trigger says
+    changes: tuple[str, ...] = ()  #: changes of the scenario that belong to the fault (`alone`)
 
     @cached_property
     def id(self) -> str:
+        """Digest of its content."""
         return content_id(self)
 
     @property
@@ -201,17 +203,19 @@ class Experiment:
     `setting` names the changes of the scenario that a campaign makes for all its experiments.
     """
 
-    fault: Fault
-    scenario: str
-    scenario_digest: str
-    method: Method
-    trigger: Trigger
-    seed: int
-    setting: tuple[str, ...] = ()
+    fault: Fault  #: what is injected
+    scenario: str  #: name of the scenario
+    scenario_digest: str  #: digest of the scenario file
+    method: Method  #: how the trigger was chosen: `guided` or `random`
+    trigger: Trigger  #: when the fault is active
+    seed: int  #: seed of the simulation
+    setting: tuple[str, ...] = ()  #: changes of the scenario that the campaign makes for all its experiments
+    #: whether the run goes on after a terminal hazard: `go_on` or `stop`
     after_hazard: AfterHazard = added(AfterHazard.GO_ON)
 
     @cached_property
     def id(self) -> str:
+        """Digest of its content."""
         # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
         trigger = self.plain_trigger
         parts = (self.scenario, self.scenario_digest, self.method, trigger, self.seed, self.setting)
@@ -286,20 +290,24 @@ class Record:
     up to that end.
     """
 
-    experiment_id: str
-    status: Status
-    outcome: Outcome | None
-    detail: str  # empty, or why the status is not ok
-    tree: str  # digest of the tree that ran
-    activation: Activation | None
-    t_manifest: float | None
-    max_dev: tuple[tuple[str, float], ...]
+    experiment_id: str  #: id of the experiment
+    status: Status  #: whether the experiment itself worked
+    outcome: Outcome | None  #: what the fault did; None unless the status is `ok`
+    detail: str  #: why the status is not `ok`; empty if it is
+    tree: str  #: digest of the source tree that ran
+    activation: Activation | None  #: when and how often injected statements ran; None: never
+    t_manifest: float | None  #: when a compared channel first left its tolerance, in s
+    max_dev: tuple[tuple[str, float], ...]  #: largest deviation from golden of each compared channel
+    #: (name, first time in s) of each hazard after the activation, sorted by time
     hazards: tuple[tuple[str, float], ...]
+    #: (name, first time in s) of each alert after the activation, sorted by time
     alerts: tuple[tuple[str, float], ...]
-    trace_digest: str
-    error: RunError | None = added(None)
-    patch: str = ""  # digest of the stored patch; empty without a mutant, and in old records
-    t_end: float | None = added(None)
-    dev: tuple[tuple[str, float], ...] = added(())
+    trace_digest: str  #: digest of the trace
+    error: RunError | None = added(None)  #: the exception that ended the run: `kind`, `message`, `place`
+    patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
+    t_end: float | None = added(None)  #: when a terminal hazard ended the drive, in s
+    dev: tuple[tuple[str, float], ...] = added(())  #: `max_dev` up to `t_end`; empty without such an end
+    #: metrics of the manifest and margins of its hazards, if they have a value
     metrics: tuple[tuple[str, float], ...] = added(())
+    #: (channel, first time in s, largest deviation) of each channel that left golden before the end
     left: tuple[tuple[str, float, float], ...] = added(())

@@ -30,9 +30,9 @@ from mutator.targets.severity import Scale, load_scale
 class Workspace:
     """A fault library, a templates folder, and optionally a target root that overrides the manifest's."""
 
-    library: Path
-    templates: Path
-    target: Path | None = None
+    library: Path  #: fault_library/
+    templates: Path  #: templates/
+    target: Path | None = None  #: root of the target's source; None: as the manifest says
 
     def __repr__(self) -> str:
         counts = ", ".join(counted(len(names), what) for what, names in self._contents())

@@ -31,11 +31,11 @@ class Audit:
     finished, or not verifiable), `repaired` says what was put aside.
     """
 
-    run: Path
-    facts: Mapping[str, str]
-    checks: tuple[Check, ...]
-    seal: str | None
-    repaired: tuple[str, ...] = ()
+    run: Path  #: the run folder
+    facts: Mapping[str, str]  #: what was audited, by name
+    checks: tuple[Check, ...]  #: what was checked: `what`, `count` and `differences` of each
+    seal: str | None  #: the seal computed from the content; None: not finished, or not verifiable
+    repaired: tuple[str, ...] = ()  #: what was put aside
 
     def __repr__(self) -> str:
         return f"<Audit of {self.run.name}: {self._outcome}>"

@@ -25,7 +25,7 @@ SHOWN = 3  # tables that a notebook shows: how they ended, what changed, rates
 class RunComparison:
     """Two runs, matched experiment by experiment; `comparison` has all that is known of the pairs."""
 
-    comparison: Comparison
+    comparison: Comparison  #: all that is known of the pairs
 
     def __repr__(self) -> str:
         names = self.comparison.names

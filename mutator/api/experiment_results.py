@@ -27,8 +27,8 @@ class TraceFrames:
     `attrs["units"]` of a frame has the units of the channels that the manifest names.
     """
 
-    golden: "pd.DataFrame"
-    faulty: "pd.DataFrame"
+    golden: "pd.DataFrame"  #: the golden run
+    faulty: "pd.DataFrame"  #: the faulty run
 
     def __repr__(self) -> str:
         rows, columns = self.golden.shape
@@ -45,8 +45,8 @@ class TraceFrames:
 class ExperimentResult(ABC):
     """An experiment and its record; `record` is None before it was run."""
 
-    experiment: Experiment
-    record: Record | None
+    experiment: Experiment  #: the experiment
+    record: Record | None  #: its record; None before it has run
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.id}: {self.experiment.label}: {self.ending}>"

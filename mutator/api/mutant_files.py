@@ -74,9 +74,9 @@ def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> 
 class MutantSet:
     """Faults under triggers for one target, chosen by specs or by a campaign; built when written."""
 
-    bench: Bench
-    pairs: tuple[Pair, ...]
-    told: str = ""  # of mutants of operators: how many there are, and what was left out
+    bench: Bench  #: workspace and target
+    pairs: tuple[Pair, ...]  #: each fault with its trigger
+    told: str = ""  #: for mutants of operators: how many there are, and what was left out
 
     def __repr__(self) -> str:
         return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"

@@ -17,10 +17,10 @@ from mutator.targets.manifest import TargetManifest
 class BuiltMutant:
     """A fault under a trigger, built into a target. The same of all three has the same `id` everywhere."""
 
-    fault: Fault
-    trigger: Trigger
-    mutant: Mutant
-    manifest: TargetManifest
+    fault: Fault  #: the fault that is built in
+    trigger: Trigger  #: when it is active
+    mutant: Mutant  #: the changed files, and the digest of the tree
+    manifest: TargetManifest  #: the target's manifest
 
     def __repr__(self) -> str:
         return f"<BuiltMutant {self.id}: {self.fault.label}, {self.trigger.name}>"

@@ -22,11 +22,12 @@ class OperatorChoice:
     `seed`, of each operator in each function in proportion; without it, all.
     """
 
-    operators: Sequence[str]
-    places: Sequence[str]
+    operators: Sequence[str]  #: names of mutation operators
+    places: Sequence[str]  #: `PATH::FUNCTION` or `PATH`, with `*` in a name and `**` for folders
+    #: count only lines that the golden run of this scenario executes; None: all lines
     scenario: str | None = None
-    sample: int | None = None
-    seed: int = 0
+    sample: int | None = None  #: number of mutants to draw; None: all
+    seed: int = 0  #: seed of the draw and of the golden run
 
 
 def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, ...], str]:

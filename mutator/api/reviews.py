@@ -25,10 +25,10 @@ class ReviewedGroups:
     `options` of `mutator review` mean the same groups; the commands on a written page have them.
     """
 
-    workspace: Workspace
-    review: Review
-    groups: tuple[Group, ...]
-    options: tuple[str, ...] = ()
+    workspace: Workspace  #: the workspace whose review file holds the decisions
+    review: Review  #: the decisions
+    groups: tuple[Group, ...]  #: groups of mutants that differ only in values; new and changed ones first
+    options: tuple[str, ...] = ()  #: options of `mutator review` that select the same groups
 
     @property
     def undecided(self) -> tuple[Group, ...]:

@@ -32,8 +32,8 @@ def from_here(path: Path) -> Path:
 class RunContents:
     """A run folder, and the workspace that it is looked at with (None: found when needed)."""
 
-    folder: RunFolder
-    given_workspace: Workspace | None = None
+    folder: RunFolder  #: reads the files of the run folder
+    given_workspace: Workspace | None = None  #: the workspace that was passed; None: found when needed
 
     @property
     def path(self) -> Path:

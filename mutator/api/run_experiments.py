@@ -26,7 +26,7 @@ from mutator.targets.severity import Scale
 class RunExperiment(ExperimentResult):
     """An experiment of a run."""
 
-    run: RunContents
+    run: RunContents  #: the run that it belongs to
 
     @cached_property
     def patch(self) -> str:

@@ -79,6 +79,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
 class Run(RunContents):
     """A run folder, read when asked. `summary` is what `mutator.run` came to; None for a loaded run."""
 
+    #: the result of the call of `mutator.run` that returned it; None for a loaded run
     summary: Summary | None = None
 
     def __repr__(self) -> str:

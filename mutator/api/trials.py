@@ -26,10 +26,11 @@ class Trial(ExperimentResult):
     there is none to compare with. The output is in `folder`; a temporary one lives as long as this object.
     """
 
-    record: Record
-    single: Single
-    manifest: TargetManifest
-    scale: Scale | None = None
+    record: Record  #: the record of the run
+    single: Single  #: the run and its files
+    manifest: TargetManifest  #: the target's manifest
+    scale: Scale | None = None  #: classes of severity of the target; None: it has none
+    #: whether the record equals the campaign's; None: there is none to compare with
     same_as_record: bool | None = None
     _temporary: ScratchFolder | None = field(default=None)
 

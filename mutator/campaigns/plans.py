@@ -52,13 +52,13 @@ class Choices:
     of its series, 0 for none.
     """
 
-    seed: int | None = None
-    reading: str | None = None
-    only: str | None = None
-    exclude: str | None = None
-    limit: int | None = None
-    shard: str | None = None
-    series_mb: int | None = None
+    seed: int | None = None  #: seed of the sample, of drawn values and of random triggers
+    reading: str | None = None  #: reading of the fault specs
+    only: str | None = None  #: filter: keep the experiments that fit
+    exclude: str | None = None  #: filter: drop the experiments that fit
+    limit: int | None = None  #: how many experiments to keep, spread as a sample is
+    shard: str | None = None  #: share of the plan to run, `k/n`
+    series_mb: int | None = None  #: budget of the series in MiB; 0: none
 
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
@@ -93,17 +93,17 @@ class Plan:
     `run_cpu_s` is the measured CPU time of one run, if there is one.
     """
 
-    campaign: Campaign
-    choices: Choices
-    seed: int
-    reading: str
-    experiments: Sequence[Experiment]
-    chunks: tuple[int, ...]
-    canary: Experiment
-    runs: int
-    digest: str  # same campaign, choices, library and scenarios: same digest on every machine
-    run_cpu_s: float | None = None
-    told: tuple[str, ...] = ()  # of mutants of operators: how many there were, and what was left out
+    campaign: Campaign  #: the campaign file, read
+    choices: Choices  #: what overrides the file
+    seed: int  #: seed of the plan
+    reading: str  #: reading of the fault specs
+    experiments: Sequence[Experiment]  #: the experiments, in the order they are run
+    chunks: tuple[int, ...]  #: how many experiments each chunk has, in order
+    canary: Experiment  #: a fault that must do harm; the checks before the campaign run it
+    runs: int  #: number of runs; one that several scenarios share counts once
+    digest: str  #: same campaign, choices, library and scenarios: same digest on every machine
+    run_cpu_s: float | None = None  #: measured CPU time of one run in s; None: not measured
+    told: tuple[str, ...] = ()  #: for mutants of operators: how many there were, and what was left out
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")

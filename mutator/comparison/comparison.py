@@ -35,20 +35,20 @@ from mutator.statistics.sheet import Sheet
 class Gate(StrEnum):
     """What a gate can fail on: changes for the worse, and experiments that have no partner."""
 
-    NEW_HAZARD = Change.NEW_HAZARD.value
+    NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard where there was none
+    #: a hazard that did not occur before, in addition to one that did
     OTHER_HAZARD = Change.OTHER_HAZARD.value
-    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value
-    EARLIER_HAZARD = Change.EARLIER_HAZARD.value
-    LOST_ALERT = Change.LOST_ALERT.value
-    WORSE = Change.WORSE.value
-    NEW_CRASH = Change.NEW_CRASH.value
-    HARNESS_ERROR = Change.HARNESS_ERROR.value
-    UNMATCHED = "unmatched"
-    # a contact of this class or a worse one, where it was a milder one or none before
-    SEVERITY_S0 = "severity:S0"
-    SEVERITY_S1 = "severity:S1"
-    SEVERITY_S2 = "severity:S2"
-    SEVERITY_S3 = "severity:S3"
+    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or where there was none
+    EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: the first hazard comes sooner after the activation
+    LOST_ALERT = Change.LOST_ALERT.value  #: an alert is missing
+    WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
+    NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
+    HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, the first has one
+    UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
+    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, where it was milder or none before
+    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, where it was milder or none before
+    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, where it was milder or none before
+    SEVERITY_S3 = "severity:S3"  #: a contact of class S3, where it was milder or none before
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -53,18 +53,18 @@ Notify = Callable[[Progress], None]
 class Summary:
     """What a run came to. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
 
-    planned: int
-    done: int  # have a record that counts
-    ran: int  # of these, in this session
-    outcomes: Counter[str]
-    harness_errors: tuple[tuple[str, str], ...]
-    problem: str  # empty, or why the session ended early (disk full, a worker died)
-    interrupted: bool
-    results: Path | None  # results.csv; None when there was no room for it
-    proof: equivalence.Proof | None  # None: nothing that the reference engine has not run
-    seal: str | None  # of a finished run
-    not_forked: str  # why nothing was forked, and nothing proved; empty where that was asked for, too
-    elapsed_s: float
+    planned: int  #: planned experiments of this folder
+    done: int  #: those with a record that counts
+    ran: int  #: of these, the ones that ran in this session
+    outcomes: Counter[str]  #: how many experiments ended how
+    harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
+    problem: str  #: why the session ended early (disk full, a worker died); empty if it did not
+    interrupted: bool  #: whether a signal ended it
+    results: Path | None  #: results.csv; None when there was no room for it
+    proof: equivalence.Proof | None  #: the equivalence check; None: the reference engine ran everything
+    seal: str | None  #: the seal of a finished run
+    not_forked: str  #: why nothing was forked or proved; empty also where you asked for that
+    elapsed_s: float  #: duration of the session in s
 
     @property
     def proof_note(self) -> str:

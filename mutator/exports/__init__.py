@@ -9,11 +9,11 @@ from enum import StrEnum
 class Format(StrEnum):
     """What a run can be written as."""
 
-    MUTATION_ELEMENTS = "mutation-elements"
-    JUNIT = "junit"
-    CSV = "csv"
-    PARQUET = "parquet"
-    MCAP = "mcap"
+    MUTATION_ELEMENTS = "mutation-elements"  #: JSON that viewers of mutation reports read
+    JUNIT = "junit"  #: JUnit XML, as CI servers read it
+    CSV = "csv"  #: a table as CSV
+    PARQUET = "parquet"  #: a table as Parquet
+    MCAP = "mcap"  #: a folder of traces, one MCAP file per experiment
 
 
 class Table(StrEnum):

@@ -5,13 +5,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mutator._common.shipped import refuse_shipped
-from mutator.reference import cli, formats, models, recorded
+from mutator.reference import api, cli, formats, models, recorded
 from mutator.reference.schemas import editor_schema, file_formats
 from mutator.workspace import Workspace
 
 FOLDER = Path("docs") / "reference"
 SCHEMAS = FOLDER / "schemas"
 PAGES: dict[str, Callable[[Workspace], str]] = {
+    "api.md": api.python_api,
     "campaign.md": formats.campaigns,
     "channels.md": recorded.channels,
     "cluster-file.md": formats.clusters,

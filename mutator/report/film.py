@@ -27,8 +27,8 @@ EVENTS_SCHEMA = "film-events/1"
 class Shot:
     """A file that is wanted: a still picture of time `t` (s), or a video. Its name says the format."""
 
-    out: Path
-    t: float | None = None
+    out: Path  #: file to write; its suffix is the format
+    t: float | None = None  #: time of a still in s; None: a video
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,10 +64,10 @@ class PastRun:
 class History:
     """Where it was written, how many runs it has, and why folders with a run.json are not among them."""
 
-    markdown: Path
-    page: Path
-    runs: int
-    left_out: tuple[str, ...]
+    markdown: Path  #: HISTORY.md
+    page: Path  #: history.html
+    runs: int  #: number of runs in it
+    left_out: tuple[str, ...]  #: why other folders with a run.json are not in it
 
 
 def _run_folders(folder: Path) -> list[Path]:

@@ -18,13 +18,13 @@ class Progress:
     Rate and remaining time are those of the stage; `total` is 0 where there is nothing to count.
     """
 
-    stage: str
-    detail: str = ""
-    done: int = 0
-    total: int = 0
-    outcomes: Counter[str] = field(default_factory=Counter)
-    per_s: float | None = None  # steps a second since the stage began
-    remaining_s: float | None = None
+    stage: str  #: `plan`, `checks`, `golden`, `experiments`, `proof`, `tables`, `pictures` or `report`
+    detail: str = ""  #: what the stage is working on
+    done: int = 0  #: finished steps of the stage
+    total: int = 0  #: steps of the stage; 0: nothing to count
+    outcomes: Counter[str] = field(default_factory=Counter)  #: how many experiments ended how
+    per_s: float | None = None  #: steps per second since the stage began
+    remaining_s: float | None = None  #: estimated time to the end of the stage in s
 
 
 class Pace:

@@ -1,0 +1,39 @@
+// A button on each code block. Of a console block it copies the commands alone.
+"use strict";
+
+function textOf(block) {
+  const text = block.querySelector("pre").textContent;
+  if (!block.closest(".highlight-console")) return text;
+  const commands = [];
+  let goesOn = false;
+  for (const line of text.split("\n")) {
+    if (line.startsWith("$ ") || goesOn) {
+      commands.push(goesOn ? line : line.slice(2));
+      goesOn = line.endsWith("\\");
+    }
+  }
+  return commands.join("\n") + "\n";
+}
+
+async function copy(text) {
+  if (navigator.clipboard) return navigator.clipboard.writeText(text);
+  const area = document.body.appendChild(document.createElement("textarea"));
+  area.value = text;
+  area.select();
+  document.execCommand("copy");
+  area.remove();
+}
+
+document.addEventListener("DOMContentLoaded", () => {
+  for (const block of document.querySelectorAll("div.highlight")) {
+    const button = block.appendChild(document.createElement("button"));
+    button.type = "button";
+    button.className = "copy";
+    button.textContent = "Copy";
+    button.addEventListener("click", async () => {
+      await copy(textOf(block));
+      button.textContent = "Copied";
+      setTimeout(() => (button.textContent = "Copy"), 1500);
+    });
+  }
+});

@@ -1,0 +1,64 @@
+"""The page of the Python API says something of every public name."""
+
+import re
+import sys
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+
+import pytest
+
+import mutator
+from mutator.reference.api import members, python_api, undocumented
+from mutator.workspace import Workspace
+
+CLONE = Path(__file__).parents[4]
+
+
+def test_every_public_name_is_documented() -> None:
+    """Functions, classes and methods have a docstring, attributes a `#:` comment."""
+    assert undocumented() == []
+
+
+def test_the_page_describes_every_public_name() -> None:
+    """Each name of `__all__` has a heading, and so has nothing else; only the version is no object."""
+    page = python_api(Workspace.find(CLONE))
+    headings = re.findall(r"^### (?:mutator\.)?(\w+)$", page, re.MULTILINE)
+    assert sorted(headings) == sorted(set(mutator.__all__) - {"__version__"})
+
+
+def test_a_missing_docstring_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A function, class, method, property or attribute that says nothing is listed by name."""
+    (tmp_path / "silent.py").write_text(
+        "class Silent:\n"
+        "    said: int = 0  #: said\n"
+        "    #: said on\n"
+        "    #: two lines\n"
+        "    above: int = 1\n"
+        "    unsaid: int = 2\n"
+        "    _private: int = 3\n"
+        "    def __init__(self, own: str):\n"
+        "        self.own = own\n"
+        "    def method(self, n: int = 3) -> 'Silent': ...\n"
+        "    @property\n"
+        "    def of_it(self) -> int: ...\n"
+        "def silent() -> None: ...\n"
+    )
+    spec = spec_from_file_location("mutator.silent", tmp_path / "silent.py")
+    assert spec and spec.loader
+    module = module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, spec.name, module)
+    spec.loader.exec_module(module)
+    monkeypatch.setattr(mutator, "__all__", ["Silent", "silent"])
+    for name in mutator.__all__:
+        monkeypatch.setattr(mutator, name, getattr(module, name), raising=False)
+    assert undocumented() == [
+        "silent",
+        "Silent",
+        "Silent.unsaid",
+        "Silent.own",
+        "Silent.method",
+        "Silent.of_it",
+    ]
+    found = {member.name: (member.written, member.type, member.meaning) for member in members(module.Silent)}
+    assert found["above"] == ("above", "int", "Said on two lines.")
+    assert found["method"] == ("method(n=3)", "Silent", "")
