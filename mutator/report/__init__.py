@@ -1,4 +1,1 @@
-"""The report of a run: page, sections, plots, series and films that people look at.
-
-Numbers come from `statistics`; nothing here counts or tests.
-"""
+"""The report of a run: its pages, panels, plots, series and films. Numbers come from `statistics`."""

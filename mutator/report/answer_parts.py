@@ -1,4 +1,4 @@
-"""What answers of a report are made of: sentences, small tables, links into the list of experiments."""
+"""The parts of a report's answers: sentences, small tables, links into the list of experiments."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ import pandas as pd
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A text that leads to a place of the page: `to` is what stands behind #."""
+    """A text that links to a place on the page; `to` is the fragment after #."""
 
     text: str
     to: str
@@ -37,43 +37,43 @@ class Listing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """A question's answer: a sentence or two, tables, and links to the experiments it speaks of. `wide`: its
-    tables have many columns."""
+    """The answer to a question: a sentence or two, tables, and links to its experiments. `wide`: the tables
+    have many columns."""
 
     name: str
     title: str
     says: str
-    listings: tuple[Listing, ...] = ()  # those without lines are not shown
+    listings: tuple[Listing, ...] = ()  # a listing without lines is not shown
     links: tuple[Link, ...] = ()
     wide: bool = False
 
 
 def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
-    """The fragment of the list with these filters."""
+    """The URL fragment that shows the list with these filters."""
     parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 
 
 def share(part: int, of: int, what: str) -> str:
-    """`20 of 96 activated faults (21 %)`; in the singular where there is but one."""
+    """`20 of 96 activated faults (21 %)`; singular for one."""
     noun = what.removesuffix("s") if of == 1 else what
     return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
 
 
 def were(count: int) -> str:
-    """The verb of so many."""
+    """The verb for a count: was or were."""
     return "was" if count == 1 else "were"
 
 
 def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
-    """Fault type, how many of `part`, how many of `of`; most first."""
+    """Fault type, its number in `part`, its number in `of`; largest first."""
     parts = part["kind"].value_counts()
     counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in of["kind"].value_counts().items()]
     return sorted(counts, key=lambda c: (-c[1], -c[2], c[0]))
 
 
 def kind_link(kind: str, **facets: Sequence[str]) -> Link:
-    """A fault type that leads to its experiments with these values."""
+    """A fault type, linked to its experiments with these values."""
     return Link(kind, to_list({"kind": [kind], **facets}))
 
 

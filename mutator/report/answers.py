@@ -1,6 +1,6 @@
-"""What a reader asks a report first, each answered in a few numbers with their denominators.
+"""Answers to a reader's first questions, each with a few numbers and their denominators.
 
-An answer links to the list of experiments, filtered to those it speaks of.
+Each answer links to its experiments in the list.
 """
 
 import pandas as pd
@@ -27,11 +27,11 @@ from mutator.report.seen import COURSE, PLACE
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 
-TYPES = 6  # fault types that an answer lists
+TYPES = 6  # fault types listed in an answer
 
 
 def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
-    """The answers that the results of a run can give."""
+    """All answers that a run's results support."""
     frame = _told(run)
     has_alerts = run.folder.has_alerts
     made = [dangerous(frame, run.folder.head.get("metrics", ()), has_alerts=has_alerts)]
@@ -46,8 +46,8 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with their place among the worst, their course and warning; the words for fault
-    and hazards of those alone that may be listed."""
+    """The usable experiments with rank, course and warning. Fault and hazard names are filled in only for
+    experiments that may be listed."""
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)
@@ -68,13 +68,13 @@ def _warned(row: Row) -> str:
 
 
 def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
-    """Hazards before which no alert came: none at all, or only one afterwards. The `note` says what was not
-    seen of them."""
+    """Hazards without an earlier alert: no alert at all, or an alert only afterwards. `note` says which
+    alerts were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
-    says = f"{share(len(silent), len(hazards), 'hazards')} {were(len(silent))} silent, that is, no alert "
-    says += "came before"
+    says = f"{share(len(silent), len(hazards), 'hazards')} {were(len(silent))} silent (no alert "
+    says += "came before)"
     says += (
         f": {never:,} with no alert at all, {late:,} with an alert only after the hazard."
         if never or late
@@ -109,12 +109,12 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
 
 
 def _more(count: int, what: str) -> str:
-    """What is said of a list that is cut."""
+    """A note that a list is cut; empty if it is complete."""
     return f" The table has the first {TYPES} of {count:,} {what}." if count > TYPES else ""
 
 
 def survived(frame: pd.DataFrame) -> Answer:
-    """Activated faults that no hazard followed, and the fault types that led to none."""
+    """Activated faults without a hazard, and fault types that never led to one."""
     active = frame[frame["is_activated"]]
     fine = active[active["outcome"].isin(["masked", "sdc"])]
     moved = int(fine["is_manifested"].sum())
@@ -147,7 +147,7 @@ def survived(frame: pd.DataFrame) -> Answer:
 
 
 def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
-    """CPU time of the experiments: in all, and by fault type; why some took none."""
+    """CPU time of the experiments in total and by fault type, and why some took none."""
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
@@ -155,7 +155,7 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
     says += f"{share(ran, len(frame), 'experiments')} {were(ran)} driven{_undriven(frame, cpu, timings)}."
     if ran:
         says += f" Median {cpu[cpu > 0].median():.2f} s, longest {cpu.max():.2f} s."
-    says += " No times are kept of checks, golden runs and proof."
+    says += " Checks, golden runs and the equivalence check are not timed."
     costs = cpu.groupby(frame["kind"]).sum().sort_values(ascending=False, kind="stable")
     lines = [
         (kind_link(str(kind)), Part(float(s), total, f"{duration(float(s))} ({100 * s / total:.0f} %)"))
@@ -171,12 +171,12 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
 
 
 def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
-    """Why the other experiments needed no run of their own, each with a count."""
+    """Why the other experiments needed no separate run, with counts."""
     rest = frame["experiment_id"][~(cpu > 0)]
     golden = timings[timings["engine"] == RunMode.GOLDEN.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())
     why = {
-        "whose trigger never held, so that the golden run's result stands": idle,
-        "with the result of another experiment that is the same run": len(rest) - idle,
+        "whose trigger never held, so the golden run's result was used": idle,
+        "with the result of an experiment that is the same run": len(rest) - idle,
     }
     return "".join(f", {count:,} {words}" for words, count in why.items() if count)

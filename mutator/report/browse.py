@@ -1,7 +1,6 @@
-"""What the report's page carries of every experiment: results as columns, fault, trigger, diff.
+"""The per-experiment data in the report's page: results as columns, fault, trigger, diff.
 
-Columns of words are dictionaries and codes, and a diff is its shape and what fills the holes of it, so that
-11,280 experiments take no more than a photograph or two.
+Text columns are stored as dictionaries with codes. A diff is stored as a shape plus values for its holes.
 """
 
 import base64
@@ -43,14 +42,14 @@ if TYPE_CHECKING:
 SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns
-STILLS_BYTES = 1_000_000  # of pictures in the page; more are links
-LISTED = 50_000  # experiments that the page lists: more would take it too long to open
+STILLS_BYTES = 1_000_000  # of stills embedded in the page; others become links
+LISTED = 50_000  # experiments listed in the page; more would make it slow to open
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
-    """What the page's scripts get: `facts` as JSON, the rest in script elements. `listed` says which of the
-    experiments these are and how to see others; it is empty where they are all."""
+    """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
+    experiments are listed and how to see the others; it is empty if all are listed."""
 
     facts: Markup
     scripts: tuple[Markup, ...]
@@ -58,7 +57,7 @@ class Browse:
 
 
 def browse_data(run: ReportedRun) -> Browse:
-    """What the page of a run gets; it will be in the folder of the report."""
+    """The page data of a run. The page is assumed to be in the report's folder."""
     folder, workspace = run.folder, run.workspace
     if workspace:
         sample_kept_traces(folder, workspace)
@@ -83,20 +82,20 @@ def browse_data(run: ReportedRun) -> Browse:
 
 
 def _which(run: ReportedRun) -> str:
-    """Which experiments are listed, and how to see others; empty where all are."""
+    """Which experiments are listed, and how to see the others; empty if all are."""
     count, path = len(run.texts), run.folder.path.name
     if count <= LISTED:
         return ""
     return (
-        f"The list has the {LISTED:,} worst of {count:,} experiments (by rank); everything above and below "
-        f"it counts all. To see another one: `mutator show ID --run {path}`; the worst of those that a "
-        f"filter leaves: `mutator show --run {path} --only 'FILTER'`; all of them: results.parquet."
+        f"The list has the {LISTED:,} worst of {count:,} experiments (by rank). All other parts of this page "
+        f"count all of them. To see another experiment: `mutator show ID --run {path}`. To list the worst "
+        f"that match a filter: `mutator show --run {path} --only 'FILTER'`. All are in results.parquet."
     )
 
 
 def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
-    """What the page needs of the target, as its manifest is now: whether pictures can be made of its runs
-    (true where there is no manifest), and how a drive looks from above."""
+    """Target facts that the page needs, from its current manifest: whether films can be made (true if there
+    is no manifest), and the scene seen from above."""
     try:
         manifest = workspace.manifest(folder.head["target"]) if workspace else None
     except MutatorError:
@@ -106,7 +105,7 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
 
 
 def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
-    """The rows that the page lists, in reading order, and their cells: of a large run the worst ones."""
+    """The rows that the page lists, in reading order, and their cells. A large run lists only the worst."""
     lines = lines_of(run.texts[run.seen.places < LISTED])
     rows = [row_from(line) for line in lines]
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
@@ -141,9 +140,9 @@ def table(
     alerts: bool = True,
     source: SourceLines | None = None,
 ) -> dict[str, Any]:
-    """The results, a column each, and those derived: `kind`, `fault` (its label), `ending`, `hazards`,
-    `warning`, `rank` (1: the worst), `t_hazard`, `through`. Those of alerts only for a target that has
-    `alerts`, `line` (of its fault) and `lasting` only with a `source`. `labels` are those of components."""
+    """The results by column, plus derived columns: `kind`, `fault` (its label), `ending`, `hazards`,
+    `warning`, `rank` (1: the worst), `t_hazard`, `through`. Alert columns need a target with `alerts`; `line`
+    (of the fault) and `lasting` need a `source`. `labels` are those of components."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -168,7 +167,7 @@ def table(
 
 
 def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
-    """`line` and `lasting` of each fault; where it is an operator's, the change stands as its value."""
+    """`line` and `lasting` of each fault. For an operator's fault, the change replaces the value."""
     changes = [source.changes.get(line["fault_id"], "") for line in lines]
     both = list(zip(lines, changes, strict=True))
     return {
@@ -180,14 +179,14 @@ def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> di
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """Numbers as they are (None: empty), ids as texts, anything else as codes of its distinct values in their
-    order. A name is never taken for a number, whatever it looks like: a variant may be called `nan`."""
+    """Numbers as they are (None: empty), ids as texts, everything else as codes of distinct values in order.
+    Names are never parsed as numbers: a variant may be called `nan`."""
     if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
         except ValueError:
             pass
-    if name == "experiment_id":  # codes of what is different in each row would say nothing
+    if name == "experiment_id":  # values are distinct, so codes would save nothing
         return {"texts": list(values)}
     words = sorted(set(values))
     code = {word: i for i, word in enumerate(words)}
@@ -195,7 +194,7 @@ def column(name: str, values: Sequence[str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> float | int | str | None:
-    """What JavaScript reads as the same number; an infinite one goes by its name there."""
+    """The value as JavaScript reads it; infinities become strings."""
     if not text:
         return None
     value = float(text)
@@ -209,8 +208,8 @@ def _number(text: str) -> float | int | str | None:
 def details(
     experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
 ) -> dict[str, Any]:
-    """Of each row: code of its spec and of its trigger's setting (-1: not in the plan), shape of its diff
-    (-1: none). A shape's members come in the order of the rows; it has a list of values for each hole."""
+    """For each row: codes of its spec and trigger setting (-1: not in the plan), and the shape of its diff
+    (-1: none). Members of a shape follow row order; each hole has a list of values."""
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
@@ -229,7 +228,7 @@ def details(
 
 
 class _Codes:
-    """Numbers for texts, in the order in which they are first seen."""
+    """Numbers for texts, in order of first appearance."""
 
     def __init__(self) -> None:
         self._codes: dict[str, int] = {}
@@ -243,7 +242,7 @@ class _Codes:
 
 
 def _spec(fault: Fault) -> str:
-    """The fault with its value drawn, in the words of a spec."""
+    """The fault with its drawn value, as a spec in YAML."""
     told = {name: value for name, value in plain(fault).items() if value not in (None, [], "")}
     told["injections"] = [
         {
@@ -265,7 +264,7 @@ def _setting(experiment: Experiment) -> str:
 
 
 def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
-    """(experiment, nothing more that a shape must have in common, its patch without the probe)."""
+    """(experiment, empty grouping key, patch without the probe)."""
     for row in rows:
         data = run.folder.read_patch(row.experiment_id, run.records.get(row.experiment_id))
         if data is not None:
@@ -273,10 +272,10 @@ def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, 
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
-    """Pictures, films and exact plots of experiments that are kept in plots/, by experiment.
+    """Stills, films and exact plots that plots/ has, by experiment.
 
-    Stills are put in as they are while `budget` bytes last, and are links from the folder `seen_from` then,
-    as films and plots always are.
+    Stills are embedded until `budget` bytes are used up. Later stills, films and plots are links from
+    `seen_from`.
     """
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):

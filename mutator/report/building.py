@@ -1,6 +1,6 @@
-"""The report of a run: REPORT.md, and one HTML page that needs no other file.
+"""Builds a run's report: REPORT.md and one self-contained HTML page.
 
-Written from results.csv and the run folder, so it can be made again at any time, the same each time.
+Its only inputs are results.csv and the run folder, so rebuilding gives the same bytes.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,8 +26,8 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """Where a report was written, and how many experiments it has; `summaries` are tables of it that fit a
-    terminal, if it was written now."""
+    """Where a report is, and how many experiments it has. `summaries` are its terminal tables, present only
+    if it was just written."""
 
     markdown: Path
     page: Path
@@ -35,12 +35,11 @@ class Report:
     summaries: tuple[Table, ...] = ()
 
 
-STUDY_FILES = ("STUDY.md", "study.html")  # of the report, where a study has something to say
+STUDY_FILES = ("STUDY.md", "study.html")  # written only if the study has something to say
 
 
 def ensure(run: Path, workspace: Workspace | None) -> Report:
-    """The report of a run folder: left alone when neither it nor what it is made from has changed, else
-    written."""
+    """Write the report of a run folder, unless the report and its inputs are unchanged."""
     folder, out = RunFolder.open(run), run / FOLDER
     if is_current(out, made_from(folder, workspace)):
         text, hypertext = _files(out)
@@ -51,7 +50,7 @@ def ensure(run: Path, workspace: Workspace | None) -> Report:
 def write(run: Path, workspace: Workspace | None) -> Report:
     """Write the report of a run folder whose results.csv is up to date.
 
-    Without a workspace no experiment is driven again for it, and nothing published stands beside the results.
+    Without a workspace no experiment is rerun, and no published numbers are shown.
     """
     folder = RunFolder.open(run)
     out = run / FOLDER
@@ -72,7 +71,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
 
 
 def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
-    """The page of the study; what an earlier report said of it is not of these results."""
+    """Write the study's page, and remove one that an earlier report left."""
     text, hypertext = (out / name for name in STUDY_FILES)
     if not panels:
         text.unlink(missing_ok=True)
@@ -102,14 +101,14 @@ def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
 
 
 def _planned(folder: RunFolder) -> str:
-    """How many experiments and how many runs there are to do, and why these differ."""
+    """How many experiments and runs are planned, and why the numbers differ."""
     experiments, runs = int(folder.head["experiments"]), folder.head.get("runs")
     text = f"{experiments} experiments are planned"
     if folder.shard:
-        text += f", {folder.planned} of them for this shard {folder.shard}"
+        text += f", {folder.planned} of them in shard {folder.shard}"
     if runs == experiments:
-        text += "; each is a run of its own"
-    elif runs is not None:  # not planned before runs were shared
-        text += f", as {runs} runs: where a fault makes several scenarios the same run, it is driven once "
-        text += "and counted in each"
+        text += "; each needs its own run"
+    elif runs is not None:  # older plans do not count runs
+        text += f", as {runs} runs: if a fault makes several scenarios the same run, it runs once "
+        text += "and counts in each"
     return " ".join(filter(None, (f"{text}.", folder.stop_note)))

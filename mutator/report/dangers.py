@@ -1,4 +1,4 @@
-"""What is dangerous: the worst experiments with and without contact, the fault types with most hazards."""
+"""The most dangerous results: the worst experiments with and without contact, and fault types by hazards."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,17 +7,17 @@ import pandas as pd
 
 from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
 
-WORST = 10  # experiments that are listed as the most dangerous, with and without contact
-CONTACTS = 6  # of these with contact, where both kinds came
-TYPES = 6  # fault types that are listed
-MARGIN = "margin_"  # how the columns of margins to a hazard begin
+WORST = 10  # experiments listed as most dangerous
+CONTACTS = 6  # of these with contact, if both kinds exist
+TYPES = 6  # fault types listed
+MARGIN = "margin_"  # prefix of the columns of hazard margins
 SEVERITY = "severity"  # column: S0 to S3, empty without contact
 HAZARD = {"outcome": ["hazard"]}  # a filter of the list
-NO_CONTACT = "no contact"  # what the page's filter calls an empty severity
+NO_CONTACT = "no contact"  # the page filter's name for an empty severity
 
 
 def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_alerts: bool) -> Answer:
-    """The worst experiments, and the fault types that end in a hazard most often."""
+    """The worst experiments, and the fault types that most often lead to a hazard."""
     active = frame[frame["is_activated"]]
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact = contact_measure(frame)
@@ -44,7 +44,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
 
 
 def worst_of(frame: pd.DataFrame) -> list[str]:
-    """The experiments that `dangerous` may list, by their `place`."""
+    """Ids of the experiments that `dangerous` may list, by `place`."""
     hazards = frame[frame["outcome"] == "hazard"]
     groups = [hazards]
     if SEVERITY in frame:
@@ -53,7 +53,7 @@ def worst_of(frame: pd.DataFrame) -> list[str]:
 
 
 def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
-    """To all hazards, and to those with and without contact where both came."""
+    """Links to all hazards, and to those with and without contact if both exist."""
     if ranked.empty:
         return ()
     made = [Link(f"All {len(ranked):,} hazards", to_list(HAZARD, "rank"))]
@@ -65,7 +65,7 @@ def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
 
 
 def contact_measure(frame: pd.DataFrame) -> str:
-    """The column that tells how hard a contact was, the better one first; '' if the target has none."""
+    """The column that measures a contact best: delta-v, else contact speed; '' if the target has neither."""
     return next((name for name in ("delta_v", "contact_speed") if name in frame), "")
 
 
@@ -77,8 +77,8 @@ def _classes(hazards: pd.DataFrame) -> str:
 
 
 def _worst_lists(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> tuple[Listing, ...]:
-    """One list, or two where some hazards came with a contact that has a class, and some without: these
-    rank by margin, so they would hardly ever be among the worst of all."""
+    """The worst hazards in one list, or in two if only some have a severity class. Hazards without a class
+    rank by margin and would rarely appear in a common list."""
     hit = ranked[ranked[SEVERITY] != ""] if SEVERITY in ranked else ranked
     missed = ranked.drop(hit.index)
     if hit.empty or missed.empty:
@@ -101,7 +101,7 @@ def _worst(
     *,
     has_alerts: bool,
 ) -> Listing:
-    """The experiments with what tells how bad they are; each opens in the list of all that are `shown`."""
+    """The experiments with their measures of danger; each link opens within the list filtered by `shown`."""
     contact = contact_measure(ranked)
     heads = [head, "scenario", "hazards"]
     columns = [ranked["scenario"], ranked["hazard_names"]]
@@ -126,7 +126,7 @@ def _worst(
 
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
-    """`delta-v 6.70 m/s` of a contact, else the least margin to the hazards that came; '-': not known."""
+    """`delta-v 6.70 m/s` for a contact, else the least margin to its hazards; '-': not known."""
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"
         return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"

@@ -1,4 +1,4 @@
-"""How the experiments of a run were run, and what their equivalence check found."""
+"""How the experiments of a run were executed, and the result of their equivalence check."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -16,11 +16,11 @@ from mutator.verification import equivalence
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-LISTED = 20  # reasons for the reference engine that a report lists, most frequent ones first
+LISTED = 20  # reasons for the reference engine that a report lists, most frequent first
 _WORDS = {
-    RunMode.FORK: "a fork of the golden run, taken right before the fault is first active",
+    RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
-    RunMode.WARM: "a fork of the loaded program, from the run's beginning",
+    RunMode.WARM: "a fork of the loaded program, from the start of the run",
     RunMode.REFERENCE: "a fresh interpreter (reference engine)",
     None: "no run: there is no mutant",
 }
@@ -28,9 +28,9 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineSummary:
-    """How many experiments were run how, and the equivalence check as a sentence and in few words.
+    """How many experiments each mode executed, and the equivalence check as a sentence and in brief.
 
-    `failed`: an experiment came out differently on the reference engine.
+    `failed`: an experiment had another result on the reference engine.
     """
 
     table: Table
@@ -42,8 +42,8 @@ class EngineSummary:
 def engine_summary(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
-    """What the `timings` (as `Seen` has them) and `proof/` of a run folder with these records say; None if
-    neither names an engine."""
+    """Summarize the `timings` (as in `Seen`) and `proof/` of a run folder with these records; None if neither
+    names an engine."""
     ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
@@ -53,8 +53,8 @@ def engine_summary(
 
 
 def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
-    """How many experiments were run how, and why not as was asked."""
-    told = timings[timings["engine"].astype(object) != ""]  # not where there was but one
+    """Experiments by mode, and by reason for not using the requested mode."""
+    told = timings[timings["engine"].astype(object) != ""]  # empty if there was only one engine
     engines = (None if name is None or name != name else str(name) for name in told["engine"])
     return Counter(zip(engines, map(str, told["why"]), strict=True))
 
@@ -66,25 +66,25 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
             yield [words, str(count)]
         by_count = sorted(reasons.items(), key=lambda item: (-item[1], item[0]))
         for why, count in by_count[:LISTED]:
-            yield [f"{words}, as it cannot be forked: {why}", str(count)]
+            yield [f"{words}, because it cannot be forked: {why}", str(count)]
         if rest := sum(count for _, count in by_count[LISTED:]):
-            yield [f"{words}, for other reasons, which are in timings/", str(rest)]
+            yield [f"{words}, for other reasons (see timings/)", str(rest)]
 
 
 def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
-    """What is said of the proof, the same in few words, and whether it failed."""
+    """The equivalence check as a sentence and in brief, and whether it failed."""
     try:
         found = equivalence.judge(folder, records)
     except CheckFailed as err:
-        said = f"The proof failed, so nothing here is to be trusted: {err.got}."
+        said = f"The equivalence check failed. Do not trust these results: {err.got}."
         return said, f"FAILED: {err.got}", True
     if found is None:
-        said = "All were run on the reference engine, so there is nothing to prove."
+        said = "All experiments ran on the reference engine, so no equivalence check is needed."
         if folder.head["experiments"] < WORTH_IT:
-            said += f" Forking pays off from {WORTH_IT} experiments on."
+            said += f" Forking pays off from {WORTH_IT} experiments."
         return said, "none needed", False
     same = f"{found.same} of {found.sampled} same"
     if not found.whole:
-        said = f"Proof, not whole yet: so far {found}, byte for byte. The rest is still to be run."
+        said = f"Equivalence check, not finished: so far {found}, byte for byte. The rest has not run."
         return said, f"not finished: {same}", False
-    return f"Proof: of a sample, run again from the beginning, {found}, byte for byte.", same, False
+    return f"Equivalence check: of a sample rerun from the start, {found}, byte for byte.", same, False

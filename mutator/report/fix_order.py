@@ -1,8 +1,8 @@
-"""What to fix first: fault types in the order of a plain rule, with the component that lets them through.
+"""What to fix first: fault types ordered by a simple rule, with the component that lets them through.
 
-The rule: the most silent hazards (no alert before) of the highest class of severity; where these are as many,
-of the next class, and so on down to hazards without contact; then the shortest time from fault to hazard.
-Without alerts all hazards count, without severity all are of one class.
+Fault types with the most silent hazards (no alert before) of the highest severity class come first. Ties go
+to the next class, down to hazards without contact, then to the shortest time from fault to hazard.
+Without alerts all hazards count; without severity all are in one class.
 """
 
 from collections import Counter
@@ -20,10 +20,10 @@ LISTED = 5  # fault types
 
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
-    """The fault types by the rule, each with its numbers; `frame` has at least one hazard."""
+    """The fault types in order, with their numbers; `frame` has at least one hazard."""
     hazards = frame[frame["outcome"] == "hazard"]
     counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
-    if counted.empty:  # each hazard had its warning
+    if counted.empty:  # every hazard had an alert before it
         counted, has_alerts = hazards, False
     classes = _classes(counted)
     order = _order(counted, classes)
@@ -45,7 +45,7 @@ def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: b
 
 
 def _classes(hazards: pd.DataFrame) -> list[str]:
-    """The classes of severity that came, the highest first, no contact ('') last."""
+    """The severity classes found, highest first, no contact ('') last."""
     return sorted(hazards[SEVERITY].unique(), reverse=True) if SEVERITY in hazards else [""]
 
 
@@ -59,7 +59,7 @@ def _after(hazards: pd.DataFrame) -> pd.Series:
 
 
 def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
-    """The fault types by the rule."""
+    """The fault types in order."""
     groups = {str(kind): group for kind, group in hazards.groupby("kind")}
     key = {
         kind: (*(-len(_of_class(group, name)) for name in classes), float(_after(group).min()), kind)
@@ -76,9 +76,9 @@ def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], w
         of_class = counted[SEVERITY] == classes[0]
         says += f", and {int((mine & of_class).sum())} of {int(of_class.sum())} of severity {classes[0]}"
         says += ", the highest that came"
-    says += f". The rule: fault types with most {what}"
+    says += f". The rule: fault types with the most {what}"
     if len(classes) > 1:
-        says += " of the highest severity come first; where these are as many, those of the next class count"
+        says += " of the highest severity come first; ties go to the next class"
     says += ", then the shortest time from fault to hazard."
     if len(order) > LISTED:
         says += f" The table has the first {LISTED} of {len(order)} fault types."
@@ -118,7 +118,7 @@ def _line(
 def _let_through(
     kind: str, hazards: pd.DataFrame, only: Mapping[str, Sequence[str]], paths: FoundPaths
 ) -> Cell:
-    """The component that most often let such a fault through to the actuator that changed first."""
+    """The component that most often let this fault type through to the first changed actuator."""
     passed: Counter[str] = Counter()
     links: dict[str, set[str]] = {}
     for course, count in _courses(hazards, paths):
@@ -133,14 +133,15 @@ def _let_through(
 
 
 def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, int]]:
-    """The courses of the faults of a frame, and how many have each."""
+    """The courses of a frame's faults, with counts."""
     for code, count in frame["course"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
             yield paths.courses[place], int(count)
 
 
 def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
-    """Where faults of the type were stopped, most first: there the others might be, too."""
+    """The components that stopped faults of the type, most frequent first: candidates for stopping the
+    rest."""
     stopped: Counter[str] = Counter()
     for course, count in _courses(active, paths):
         for name in course.stopped_at:

@@ -1,6 +1,6 @@
-"""The history of a folder of runs: what each of them found, and what changed from one to the next.
+"""The history of a folder of runs: results of each run, and changes from one to the next.
 
-Written as HISTORY.md and history.html into that folder; nothing in the run folders is written.
+Writes HISTORY.md and history.html into that folder, and nothing into the run folders.
 """
 
 import shlex
@@ -38,8 +38,8 @@ _HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run of the folder. `date`: when its last record was written, as the file system has it; `commit` of
-    the target; `rows` by experiment."""
+    """One run of the folder. `date` is the file time of its last record; `commit` is the target's; `rows` are
+    by experiment."""
 
     folder: RunFolder
     date: datetime
@@ -62,7 +62,7 @@ class PastRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """Where it was written, how many runs it has, and why folders with a run.json are not among them."""
+    """Where the history is, how many runs it has, and why some run folders were left out."""
 
     markdown: Path  #: HISTORY.md
     page: Path  #: history.html
@@ -75,7 +75,7 @@ def _run_folders(folder: Path) -> list[Path]:
 
 
 def write_history(folder: Path) -> History:
-    """Write the history of the runs in a folder; MutatorError where there is none with results."""
+    """Write the history of the runs in a folder; MutatorError if none has results."""
     runs, left_out = [], []
     for path in _run_folders(folder):
         try:
@@ -110,7 +110,7 @@ def _past_run(path: Path) -> PastRun:
 
 
 def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
-    """The runs by campaign and plan; those of the last run first."""
+    """The runs by campaign and plan, the plan of the last run first."""
     found: dict[str, list[PastRun]] = {}
     for run in runs:
         found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
@@ -135,7 +135,7 @@ def _cells(run: PastRun) -> list[str]:
 
 
 def _changes(before: PastRun, after: PastRun) -> str:
-    """What became of the experiments that both have."""
+    """How the shared experiments' results changed."""
     shared = before.rows.keys() & after.rows.keys()
     pairs = [(before.rows[name], after.rows[name]) for name in shared]
     new = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
@@ -143,11 +143,11 @@ def _changes(before: PastRun, after: PastRun) -> str:
     other = sum(a.ending != b.ending for a, b in pairs) - new - gone
     if not new + gone + other:
         return f"all {counted(len(shared), 'shared experiment')} ended the same"
-    return f"{counted(new, 'new hazard')}, {gone} gone, {other} ended otherwise, of {len(shared):,} shared"
+    return f"{counted(new, 'new hazard')}, {gone} gone, {other} changed otherwise, of {len(shared):,} shared"
 
 
 def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
-    """Neighbours of one plan, the newest first."""
+    """Consecutive runs of one plan, newest first."""
     return zip(runs[-2::-1], runs[:0:-1], strict=True)
 
 
@@ -187,7 +187,7 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
 
 
 def _linked(group: Sequence[PastRun]) -> Table:
-    """The runs, the newest first, each with a link to its report and a bar for its hazards."""
+    """The runs, newest first, each with a link to its report and a bar for its hazards."""
     from markupsafe import Markup
 
     link = Markup('<a href="{}">{}</a>').format
@@ -203,6 +203,6 @@ def _linked(group: Sequence[PastRun]) -> Table:
 
 
 def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
-    """The page of a comparison that was made, as seen from the folder; '' where there is none."""
+    """The path from the folder to an existing comparison page; '' if there is none."""
     page = Path(after.name) / FOLDER / f"compare-{before.name}" / "index.html"
     return quote(page.as_posix()) if (folder / page).exists() else ""

@@ -1,4 +1,4 @@
-"""The two forms of a report: Markdown for reading anywhere, one HTML page without outside help."""
+"""The two forms of a report: Markdown, and one self-contained HTML page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from mutator.report.words import Words
 from mutator.web import asset, plainly_embedded
 
 STYLES = ("base.css", "report.css", "replay.css", "path.css")
-SCRIPTS = (  # each uses those before it
+SCRIPTS = (  # in load order: each uses earlier ones
     "packed.js",
     "dom.js",
     "diff.js",
@@ -44,12 +44,12 @@ SCRIPTS = (  # each uses those before it
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """What both forms of a report say.
+    """The content of both forms of a report.
 
-    `alarm` stands before everything else, empty if there is none. `outcomes` counts how experiments ended,
-    `planned` says in words how many there are to be, `words` what the page's words mean.
-    `study` cites the study that has a page of its own, empty if there is none.
-    `answers` come first, the list of experiments follows, then the other `panels`.
+    `alarm` comes first; it is empty if there is none. `outcomes` counts outcomes and statuses, `planned`
+    gives the number of experiments in words, `words` explains the page's terms.
+    `study` cites the study that has its own page; empty if there is none.
+    `answers` come before the list of experiments, the other `panels` after it.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Content:
     study: str
     answers: Panel
     panels: Sequence[Panel]
-    browse: Browse  # the experiments themselves; the page alone has them
+    browse: Browse  # the experiments; only the page has them
 
 
 def markdown(content: Content) -> str:
@@ -83,7 +83,7 @@ def markdown(content: Content) -> str:
 
 
 def page_html(content: Content) -> str:
-    """The report as one HTML page that needs no other file; every text in it is escaped."""
+    """The report as one self-contained HTML page; all text is escaped."""
     from markupsafe import Markup
 
     html = rendered(
@@ -101,7 +101,7 @@ def page_html(content: Content) -> str:
 
 
 def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
-    """The page of the study as Markdown."""
+    """The study's page as Markdown."""
     parts = (
         f"# {content.name}, compared with its study",
         f"{content.study}.",
@@ -111,7 +111,7 @@ def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
 
 
 def study_html(content: Content, panels: Sequence[Panel]) -> str:
-    """The page of the study as HTML that needs no other file."""
+    """The study's page as self-contained HTML."""
     from markupsafe import Markup
 
     styles = [Markup(asset(name)) for name in STYLES]

@@ -1,4 +1,4 @@
-"""Panels: the parts that a report consists of, each said once in Markdown and once in HTML."""
+"""Panels: the parts of a report, each in Markdown and in HTML."""
 
 import re
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ FOLDER = "report"  # of a run folder
 class Panel:
     """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
 
-    `anchor` is its id in the page, `link` its name in the page's bar; `summary` is what the command line
-    shows of it, if anything, `style` a file of CSS that only pages with it need.
+    `anchor` is its id on the page, `link` its name in the page's bar, `summary` what the command line shows
+    of it, `style` a CSS file that it needs.
     """
 
     anchor: str
@@ -29,7 +29,7 @@ class Panel:
 
 
 def rendered(template: str, **values: Any) -> "Markup":
-    """HTML of a Jinja template; every value that is not Markup is escaped. `marked` filters notes."""
+    """HTML of a Jinja template. Values that are not Markup are escaped; the `marked` filter renders notes."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -41,7 +41,7 @@ def rendered(template: str, **values: Any) -> "Markup":
 
 
 def marked(text: str) -> "Markup":
-    """HTML of a note in Markdown that has `code` and *stress*."""
+    """HTML of a note in Markdown with `code` and *emphasis*."""
     from markupsafe import Markup, escape
 
     html = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)))

@@ -1,6 +1,6 @@
-"""The control structure of a run as a drawing whose links and boxes say how many faults came through.
+"""The control structure of a run as a drawing that shows how many faults passed each link and box.
 
-It has the colours of the page, light or dark; ways.js changes the numbers when another fault type is chosen.
+It uses the page's light or dark colours. ways.js updates the numbers when another fault type is chosen.
 """
 
 from collections.abc import Collection, Iterator
@@ -11,13 +11,13 @@ from mutator.report.paths import PathCounts, link_text
 from mutator.stpa.analysis import LinkModel, StructureModel
 from mutator.stpa.layout import Arrow, Box, lay_out
 
-_LINE = 15  # px, from line to line of a count
-_WIDEST = 7.0  # px, of the line of a link that all faults got through
+_LINE = 15  # px, line spacing of a count
+_WIDEST = 7.0  # px, width of a link that all faults passed
 _THIN = 1.8
 
 
 def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
-    """The SVG of a control structure; `links` are those that some fault may take."""
+    """The SVG of a control structure; `links` are those that a fault may take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
     layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
@@ -41,7 +41,7 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
 
 
 def share_text(through: int, came: int) -> str:
-    """How many of those that came got through: `12 of 40, 30 %`; empty where no fault came."""
+    """`12 of 40, 30 %`: how many that came got through; empty if none came."""
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
@@ -58,14 +58,14 @@ def _line(arrow: Arrow) -> str:
 
 
 def _place(arrow: Arrow, line: int = 0) -> str:
-    """Where a line of the label of an arrow stands."""
+    """The position of a line of an arrow's label."""
     x, y = arrow.label.at
     y += (0, arrow.label.apart, arrow.label.apart + _LINE)[line]
     return f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.label.anchor}"'
 
 
 def _is_short(arrow: Arrow) -> bool:
-    """Whether the count needs two lines: between boxes side by side."""
+    """Whether the count needs two lines: the boxes are side by side."""
     return arrow.points[0][1] == arrow.points[-1][1]
 
 
@@ -96,7 +96,7 @@ def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterat
 
 
 def box_lines(injected: int, stopped: int, masked: int) -> tuple[str, str]:
-    """What stands in a box below its name."""
+    """The lines in a box below its name."""
     told = ((injected, "injected"), (stopped, "stopped"))
     return ", ".join(f"{n} {what}" for n, what in told if n), f"{masked} masked" if masked else ""
 

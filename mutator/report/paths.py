@@ -1,4 +1,4 @@
-"""Paths of faults in a report: of each experiment for the page, counted by fault type for the figure."""
+"""Fault paths in a report: by experiment for the page, counted by fault type for the figure."""
 
 import math
 from collections import Counter, defaultdict
@@ -20,11 +20,11 @@ ALL = "all fault types"
 
 
 class _PathsById(Mapping[str, Path]):
-    """The paths of experiments, each made when it is asked for."""
+    """The paths of experiments, computed on access."""
 
     def __init__(self, ways: Ways, planned: Mapping[str, Experiment], records: Mapping[str, Record]) -> None:
         self._ways, self._planned, self._records = ways, planned, records
-        self._last: tuple[str, Path | None] | None = None  # the one that was made last
+        self._last: tuple[str, Path | None] | None = None  # most recently computed
 
     def __getitem__(self, name: str) -> Path:
         last = self._last
@@ -44,15 +44,15 @@ class _PathsById(Mapping[str, Path]):
 
 @dataclass(frozen=True, kw_only=True)
 class FoundPaths:
-    """The paths of a run by experiment, those that there are; `records` has what left golden. `courses` are
-    those that some experiment has."""
+    """The known paths of a run by experiment. `records` list the channels that left the golden run. `courses`
+    are those that occur."""
 
     ways: Ways
-    channels: Sequence[Sequence[str]]  # as run.json has them
+    channels: Sequence[Sequence[str]]  # as in run.json
     by_id: Mapping[str, Path]
     records: Mapping[str, Record]
     courses: Sequence[Course] = ()
-    course_of: Mapping[str, int] = field(default_factory=dict)  # places in it, of some experiments
+    course_of: Mapping[str, int] = field(default_factory=dict)  # index into it; not for all experiments
 
     @classmethod
     def of(
@@ -63,12 +63,12 @@ class FoundPaths:
         records: Mapping[str, Record],
         courses: Sequence[Course],
     ) -> "FoundPaths":
-        """Those of a run folder with this plan and these records."""
+        """The paths of a run folder with this plan and these records."""
         by_id = _PathsById(ways, planned, records)
         return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
 
     def through(self, experiment_id: str) -> str:
-        """The links that a fault got through, joined by `;`: what the page filters by."""
+        """The links that a fault got through, joined by `;`; the page filters by them."""
         if experiment_id in self.course_of:
             crossings = self.courses[self.course_of[experiment_id]].crossings
         else:
@@ -77,9 +77,9 @@ class FoundPaths:
         return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
-        """What the page has of the experiments `ids`: the shape of each path (-1: none), columns of first
-        times and largest deviations, one for each channel, and by row the components that had changed before
-        their channels show it, with the times by which they had."""
+        """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each channel
+        a column of first times and one of largest deviations. `by` has, by row, components that changed
+        before their channels show it, and the latest time of that change."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes, by, names = [], {}, [name for name, *_ in self.channels]
@@ -115,7 +115,7 @@ class FoundPaths:
         return {s.component: round(s.t_by, 4) for s in (path.stages if path else ()) if s.t_by is not None}
 
     def label(self, component: str) -> str:
-        """What pages call a component."""
+        """The name of a component on pages."""
         return self.components[component]["label"]
 
     @cached_property
@@ -128,7 +128,7 @@ class FoundPaths:
 
 
 def link_text(tail: str, tip: str) -> str:
-    """What lists and filters call a link."""
+    """The name of a link in lists and filters."""
     return f"{tail}→{tip}"
 
 
@@ -137,7 +137,7 @@ def _short(value: float) -> float | str:
 
 
 def _placed(path: Path) -> Iterator[tuple[Any, int]]:
-    """The stages, each with its column in a strip: one to the right of the last that feeds it."""
+    """The stages with their columns in a strip: one to the right of the last component that feeds each."""
     columns: dict[str, int] = {}
     for stage in path.stages:
         feeders = (c.tail for c in path.crossings if c.tip == stage.component)
@@ -147,10 +147,9 @@ def _placed(path: Path) -> Iterator[tuple[Any, int]]:
 
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
-    """Of the paths of some faults: at each link, how many `came` to its start (where its end is recorded) and
-    got `through`; at each component, how many were `injected` there, came to it and were `stopped`, and how
-    many of these were `masked` there: they changed no actuator. `ends` counts masked faults by all that
-    stopped them."""
+    """Counts over the paths of some faults. By link: faults that `came` to its start (if its end is recorded)
+    and got `through`. By component: faults `injected` there, `stopped` there, and `masked` there (stopped,
+    with no actuator changed). `ends` counts masked faults by the set of components that stopped them."""
 
     active: int = 0
     came: Counter[str] = field(default_factory=Counter)
@@ -161,7 +160,7 @@ class PathCounts:
     ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def add(self, path: Path | Course, count: int = 1) -> None:
-        """Count so many more of a path."""
+        """Add a path `count` times."""
         self.active += count
         passages = [(c.link, c.tip, c.passage) for c in path.crossings]
         stopped = {tip for _, tip, passage in passages if passage is Passage.STOPPED}
@@ -178,7 +177,7 @@ class PathCounts:
             self.ends[path.stopped_at] += count
 
     def plain(self) -> dict[str, Any]:
-        """For the page."""
+        """The counts for the page."""
         links = {name: [self.through[name], came] for name, came in self.came.items()}
         names = dict.fromkeys((*self.injected, *sorted(self.stopped)))
         components = {n: [self.injected[n], self.stopped[n], self.masked[n]] for n in names}
@@ -188,8 +187,8 @@ class PathCounts:
 def counts_by_fault_type(
     kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
 ) -> Mapping[str, PathCounts]:
-    """The counts of all faults, then those of each fault type by its name; `codes` has the place of each
-    row's course (-1: none)."""
+    """The counts of all faults, then those by fault type; `codes` has the index of each row's course (-1:
+    none)."""
     import pandas as pd
 
     found: dict[str, PathCounts] = defaultdict(PathCounts)

@@ -1,4 +1,4 @@
-"""What a report needs to know of all experiments beyond their results: read once, kept in columns."""
+"""What a report needs from all experiments in addition to results: read once, kept in columns."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-_PIECE = 5_000  # experiments that are looked at in one go
-PLACE, COURSE = "#place", "#course"  # columns that a frame of results gets; no metric has such a name
+_PIECE = 5_000  # experiments read at once
+PLACE, COURSE = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
 _Alerts = tuple[tuple[str, float], ...]  # of one experiment
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """`places` (among the worst, from 0) and `courses_of` (the place in `courses`, -1: none) have a number
-    for each row of the results. `alerts` are those of the experiments with a hazard; `timings` has a row for
-    each that has been timed: its id, CPU time, worker, engine ('' where it was not told) and why."""
+    """`places` (rank, from 0) and `courses_of` (index into `courses`, -1: none) have a number for each row of
+    the results. `alerts` are those of experiments with a hazard. `timings` has a row for each timed
+    experiment: id, CPU time, worker, engine ('' if not recorded), reason."""
 
     places: np.ndarray
     courses_of: np.ndarray
@@ -38,8 +38,8 @@ class Seen:
     def of(
         cls, folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
     ) -> "Seen":
-        """Of a run folder with these results."""
-        codes: dict[int, int] = {}  # of courses, which are the same objects for all that have them
+        """Read a run folder with these results."""
+        codes: dict[int, int] = {}  # by identity: equal courses are one object
         courses: list[Course] = []
         courses_of = np.full(len(texts), -1, dtype=np.int32)
         alerts: dict[str, _Alerts] = {}
@@ -63,7 +63,7 @@ class Seen:
 def _looks(
     folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
 ) -> Iterator[tuple[list[Sight | None], dict[str, _Alerts]]]:
-    """What is seen of each experiment's course, and the alerts of those with a hazard, piece by piece."""
+    """The course of each experiment, and the alerts of those with a hazard, in pieces."""
     faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
 
     def looked_at(piece: "DataFrame") -> tuple[list[Sight | None], dict[str, _Alerts]]:

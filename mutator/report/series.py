@@ -1,4 +1,4 @@
-"""What the report's page knows of series: which there are beside it."""
+"""Which series exist next to the report's page."""
 
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -14,18 +14,16 @@ if TYPE_CHECKING:
 
 
 def series_facts(folder: RunFolder) -> dict[str, Any]:
-    """Whether series are packed, and which experiments have theirs in a file of its own: a page asks for no
-    file that is not there, as that would be an error in its console."""
+    """Whether series are packed, and which experiments have their own file. A page must not request a missing
+    file: that would be an error in the browser's console."""
     series = SeriesFolder(folder.path)
     return {"packed": series.is_packed, "kept": series.kept_ids()}
 
 
 def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
-    """Make the series of each experiment whose trace is kept, and that has none, or a damaged one."""
+    """Write the missing or damaged series of experiments whose traces are kept."""
     traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
-        with suppress(
-            MutatorError, KeyError
-        ):  # the sources have changed, say, or the trace is of another state
+        with suppress(MutatorError, KeyError):  # e.g. the sources changed, or the trace is from another state
             if not series.is_readable(name) and traces.is_kept(name):
                 keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

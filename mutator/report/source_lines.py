@@ -1,7 +1,6 @@
-"""The source of a run's target, line by line, with what came of the faults injected there.
+"""The source of a run's target by line, with the outcomes of the faults injected there.
 
-Lines are those of the tree that was run: where the target has changed since, there is no telling which line
-a fault was on, so nothing is shown.
+Line numbers are those of the tree that was run. If the target has changed since, nothing is shown.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,7 +21,7 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# From the worst to the most harmless; harness errors and mutants that could not be made are none of these.
+# Worst first; harness errors and invalid mutants are not included.
 ENDINGS = (
     Outcome.HAZARD.value,
     Status.CRASHED.value,
@@ -32,13 +31,13 @@ ENDINGS = (
     Outcome.NOT_ACTIVATED.value,
 )
 LASTING = (PERMANENT, TRANSIENT)
-_AROUND = 2  # lines shown before and after one that is in no function
-_JOINED = 3  # lines between two shown parts that are shown, too
+_AROUND = 2  # lines shown before and after one outside functions
+_JOINED = 3  # a gap of up to so many lines is shown, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """What came of the `mutants` of a line: `worst` of them ended in `ending`, the others less badly."""
+    """The outcome of a line's `mutants`: `worst` of them ended in `ending`, the others less badly."""
 
     ending: str
     worst: int
@@ -50,7 +49,7 @@ Marks = Mapping[int, Mapping[str, Mark]]  # line, from 1 -> permanent or transie
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkedFile:
-    """A file with faults: its lines, those `shown` (functions with faults, from 1), and their marks."""
+    """A file with faults: its lines, the ranges `shown` (functions with faults, from 1), and the marks."""
 
     path: str
     data: bytes
@@ -59,15 +58,15 @@ class MarkedFile:
     marks: Marks
 
     def worst_lines(self) -> dict[str, int]:
-        """How many lines have which ending as their worst."""
+        """How many lines have each ending as their worst."""
         worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
         return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, the worst one first; by the ids of faults the line of each, `pkg/plan.py:42`, and
-    what those of operators change, `a + b -> a - b`. Without files `why` says why there are none."""
+    """The files of a run, worst first. `places` has the line of each fault, `pkg/plan.py:42`; `changes` has
+    what operators change, `a + b -> a - b`. `why` explains missing files."""
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
@@ -76,7 +75,7 @@ class SourceLines:
 
     @classmethod
     def of(cls, folder: RunFolder, workspace: Workspace | None, texts: "DataFrame") -> "SourceLines | None":
-        """Of a run with these results; None where no fault is an operator's."""
+        """The source of a run with these results; None if it has no operators."""
         if not (texts["module"] == OPERATORS).any():
             return None
         faults = plan_file.read_faults(folder.path)
@@ -87,12 +86,12 @@ class SourceLines:
         except (MutatorError, KeyError):
             manifest = None
         if manifest is None:
-            return cls(changes=changes, why="The target is not found here, so its source is not shown.")
+            return cls(changes=changes, why="The target was not found, so its source is not shown.")
         if manifest.tree.digest != folder.head["sources"]["target"]:
             return cls(
                 changes=changes,
-                why="The target has changed since this run was planned, so its source is not shown: lines "
-                "would be other ones. Put it back and write the report again (`mutator report`).",
+                why="The target has changed since this run was planned, so line numbers do not match and its "
+                "source is not shown. Restore the target and rebuild the report (`mutator report`).",
             )
         return cls._marked(manifest, known, texts, changes)
 
@@ -125,8 +124,8 @@ def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
 def _marks(
     at: Mapping[str, tuple[str, int]], texts: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
-    """The mark of each line and of permanent and transient faults there; each fault counts by its worst
-    drive."""
+    """The marks of each line for permanent and transient faults; each fault counts by its worst
+    experiment."""
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
         if name in at and ending in ENDINGS:
@@ -149,7 +148,7 @@ def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
 
 
 def _around(file: ParsedFile, line: int) -> range:
-    """The lines of the outermost function around a line; of one in no function a few around it."""
+    """The lines of the outermost function around a line, or a few lines around one outside functions."""
     function = file.outer_function(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
@@ -157,7 +156,7 @@ def _around(file: ParsedFile, line: int) -> range:
 
 
 def _joined(parts: Iterable[range]) -> tuple[range, ...]:
-    """The parts in their order, those that (almost) touch as one."""
+    """The ranges in order, with (almost) touching ones joined."""
     found: list[range] = []
     for part in sorted(parts, key=lambda part: (part.start, part.stop)):
         if found and part.start <= found[-1].stop + _JOINED:
@@ -168,6 +167,6 @@ def _joined(parts: Iterable[range]) -> tuple[range, ...]:
 
 
 def _badness(file: MarkedFile) -> tuple[object, ...]:
-    """The file with most lines of the worst ending first."""
+    """Sort key: the most lines with the worst ending first."""
     counts = file.worst_lines()
     return (*(-counts.get(ending, 0) for ending in ENDINGS), file.path)

@@ -1,4 +1,4 @@
-"""What a report was made from, so that resuming a complete run does not draw it all again."""
+"""A digest of a report's inputs, so that resuming a complete run does not redraw it."""
 
 from pathlib import Path
 
@@ -21,8 +21,8 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """Digest of all that a report depends on: results, run.json, records, timings, proof, reviews,
-    series and pictures that it shows, what the library cites, and mutator's own sources."""
+    """Digest of a report's inputs: results, run.json, records, timings, proof, reviews, series and pictures,
+    the library's citations, and mutator's own sources."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     series = [series_facts(folder), _files(run, f"{series_store.FOLDER}/{series_store.INDEX}.js")]
@@ -30,28 +30,28 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     sources = Path(__file__).parents[1]
     own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
     results = [digests.sha256(run / HEAD), digests.sha256(Results.of_run(run).path)]
-    # The records, too: what the proof compares is more of them than the results have.
+    # Records are included because the equivalence check compares more than the results have.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
     sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
     return digest([SCHEMA, own, results, engine, plots, series, references, *sealed])
 
 
 def is_current(out: Path, made_from: str) -> bool:
-    """Whether the report in `out` was made from `made_from`, and its files are as they were written."""
+    """Whether the report in `out` was made from `made_from` and its files are unchanged."""
     try:
         stamp = read_json(out / FILE, SCHEMA)
-    except MutatorError:  # whatever is wrong with it: the report can be written again
+    except MutatorError:  # unreadable: rewrite the report
         return False
     return (stamp.get("made_from"), stamp.get("files")) == (made_from, _written(out))
 
 
 def write_stamp(out: Path, made_from: str) -> None:
-    """Say what the report in `out` was made from, and what was written; last of its files."""
+    """Record the digests of a report's inputs and files; written last."""
     write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "files": _written(out)})
 
 
 def _written(out: Path) -> dict[str, str]:
-    """Digest of each file of a report; comparisons are no part."""
+    """Digest of each file of a report, without comparisons."""
     paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
     return {
         name.as_posix(): digest(path.read_bytes())
@@ -61,7 +61,7 @@ def _written(out: Path) -> dict[str, str]:
 
 
 def remove_stamp(out: Path) -> None:
-    """Before anything of the report is written: one that is cut short is no report."""
+    """Remove the stamp before writing, so that an interrupted report is not taken for a complete one."""
     (out / FILE).unlink(missing_ok=True)
 
 

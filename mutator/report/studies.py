@@ -1,4 +1,4 @@
-"""What a study adds to the report of a campaign that asks for it."""
+"""The data that a report is made from, and what a study adds to it."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -31,13 +31,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportedRun:
-    """What a report is made from.
+    """The data that a report is made from.
 
-    `texts` are all experiments of results.csv, `frame` the usable ones. Plan and records are read when they
-    are asked for, by experiment id; what a report needs of all of them is in `seen`.
-    Without a workspace nothing can be driven again, and no study can be asked. `study` is None if the
-    campaign asks for none or if it is not installed here. `compared`: the study has something to say of these
-    results, on a page of its own.
+    `texts` are all experiments of results.csv, `frame` the usable ones. Plan and records are read on access,
+    by experiment id; `seen` has what a report needs from all of them.
+    Without a workspace nothing can be rerun and studies are not available. `study` is None if the campaign
+    asks for none or if it is not installed. `compared`: the study has its own page on these results.
     """
 
     folder: RunFolder
@@ -50,12 +49,12 @@ class ReportedRun:
     compared: bool = False
     paths: FoundPaths | None = None
     source: SourceLines | None = None
-    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all that are planned
+    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all planned ones
     records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
     def open(cls, folder: RunFolder, workspace: Workspace | None) -> "ReportedRun":
-        """A run folder whose results.csv is up to date."""
+        """Open a run folder whose results.csv is up to date."""
         experiments, records = Planned(folder.path), folder.records()
         texts, ways = Results.of_run(folder.path).texts(), ways_of(folder.head)
         seen = Seen.of(folder, texts, records, ways)
@@ -75,7 +74,7 @@ class ReportedRun:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """The rows of results.csv, all at once; of a large run rather ask `frame`."""
+        """All rows of results.csv; prefer `frame` for large runs."""
         return Results.of_run(self.folder.path).rows()
 
     @property
@@ -85,11 +84,11 @@ class ReportedRun:
 
     @property
     def done(self) -> int:
-        """Experiments of the plan that ran."""
+        """Number of planned experiments that ran."""
         return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
-        """What the golden runs do by themselves; nothing where they cannot be read."""
+        """The golden runs' alerts, hazards and ranges; empty if they cannot be read."""
         if self.workspace is None:
             return ()
         try:
@@ -98,7 +97,7 @@ class ReportedRun:
             return ()
 
     def ends(self) -> dict[str, float] | None:
-        """When the golden runs of each scenario end, s of simulation; None if they cannot be read."""
+        """The end of the golden runs by scenario, s of simulation; None if they cannot be read."""
         if self.workspace is None:
             return None
         ends: dict[str, float] = {}
@@ -115,11 +114,11 @@ class ReportedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """Published work, as its entry point in `mutator.studies` provides it; `about` cites it.
+    """Published work, provided by its entry point in `mutator.studies`; `about` cites it.
 
-    `check` finds problems of its data in a fault library. `published` gives the counts that stand beside a
-    run's in the tables, None where they do not fit the run. Each of `panels` may give a part of the study's
-    page and write files beside it; without any there is no such page. `drawings` are figures of that page.
+    `check` finds problems of its data in a fault library. `published` returns the counts to show next to a
+    run's, or None if they do not fit the run. Each of `panels` may return a panel of the study's page and
+    write files next to it; without any there is no page. `drawings` are figures of that page.
     """
 
     about: str
@@ -130,8 +129,8 @@ class Study:
 
 
 def _study(folder: RunFolder) -> Study | None:
-    """The study that a run's campaign asks for. A report can be written without it."""
-    name = folder.head.get("study")  # no key in older runs
+    """The study that a run's campaign asks for; None if it is not installed."""
+    name = folder.head.get("study")  # older runs lack the key
     try:
         return cast(Study, find_study(name)) if name else None
     except MutatorError:

@@ -1,4 +1,4 @@
-"""Whether a hazard came with a warning: the one meaning of *silent* in reports."""
+"""Whether a hazard came with a warning: the single definition of *silent* in reports."""
 
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 FIRST = "alert before the hazard"
 NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
-SILENT = (NO_ALERT, LATE)  # no alert came before the hazard
+SILENT = (NO_ALERT, LATE)  # no alert before the hazard
 
 
 def warning(row: Row) -> str:
@@ -24,7 +24,7 @@ def warning(row: Row) -> str:
 
 
 def warnings_of(frame: "pd.DataFrame") -> "np.ndarray":
-    """The same of each row of a frame of results, as `statistics.frame` makes it."""
+    """`warning` for each row of a frame of results from `statistics.frame`."""
     late = np.where(frame["reaction_time"] == "", LATE, FIRST)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
     return np.where(frame["is_hazard"], hazard, "")

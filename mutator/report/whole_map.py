@@ -1,6 +1,6 @@
-"""The map of fault type and scenario over all experiments, for a page that lists no more than the worst.
+"""The map of fault type and scenario over all experiments, for pages that list only the worst.
 
-Its measures have the names that heat.js has for them.
+Measure names match heat.js.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,11 +13,11 @@ from mutator.report.studies import ReportedRun
 from mutator.statistics.frame import hazard_names
 from mutator.targets.severity import CLASSES
 
-Cells = list[list[Any]]  # row by row; of each a count or value, and of how many
+Cells = list[list[Any]]  # by row; each cell has a count or value, and its base
 
 
 def map_of(run: ReportedRun) -> dict[str, Any]:
-    """Fault types, scenarios, and the cells of each measure by its name; last row and column are of all."""
+    """Fault types, scenarios, and cells by measure; the last row and column are totals."""
     frame = run.frame
     kinds, scenarios = (sorted(map(str, frame[name].unique())) for name in ("kind", "scenario"))
     named = (("kind", kinds), ("scenario", scenarios))
@@ -35,7 +35,7 @@ def map_of(run: ReportedRun) -> dict[str, Any]:
 
 
 def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Name of each measure that counts, what it counts, and of which rows."""
+    """For each share: its name, the rows counted, and the rows in the base."""
 
     def flag(name: str) -> np.ndarray:
         return frame[name].to_numpy(dtype=bool)

@@ -1,4 +1,4 @@
-"""The words of a report's page, explained: outcomes, hazards, severity, scenarios, triggers."""
+"""Explains the terms of a report's page: outcomes, hazards, severity, scenarios, triggers."""
 
 from collections.abc import Mapping
 
@@ -12,26 +12,26 @@ from mutator.report.warnings import LATE, NO_ALERT
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 
 _RUNS = {
-    "golden run": "the run without a fault that an experiment is compared with: same scenario, same seed",
-    "injected": "experiments that say something about their fault: no harness error, no invalid mutant",
+    "golden run": "the fault-free run that an experiment is compared with: same scenario, same seed",
+    "injected": "experiments with a valid result: no harness error, no invalid mutant",
     "activated": "a changed statement ran while its trigger held",
-    "manifested": "after that an actuator output differed from the golden run",
-    "fault-tolerant time": "from the activation to the first hazard",
-    "margin": "how far a run stayed from a hazard, negative in it",
-    "rank": "1 is the worst: by severity, then delta-v; without contact by ending, then margin",
+    "manifested": "after activation, an actuator output differed from the golden run",
+    "fault-tolerant time": "the time from activation to the first hazard",
+    "margin": "the distance that a run kept from a hazard, negative inside it",
+    "rank": "1 is the worst; by severity, then delta-v; without contact by outcome, then margin",
 }
 _ENDINGS = {
-    "hazard": "a hazard came at or after the activation",
-    "sdc": "silent data corruption: the fault changed an actuator, and no hazard came",
-    "masked": "the fault was activated, changed no actuator, and no hazard came",
+    "hazard": "a hazard occurred at or after activation",
+    "sdc": "silent data corruption: the fault changed an actuator, without a hazard",
+    "masked": "the fault was activated but changed no actuator, without a hazard",
     "not activated": "no changed statement ran while the trigger held",
-    "crashed, timeout": "the fault ended the program, or kept it from ending",
-    "harness error, invalid mutant": "says nothing about the fault, and is in no count but its own",
+    "crashed, timeout": "the fault crashed the program, or kept it from finishing",
+    "harness error, invalid mutant": "no result about the fault; counted only here",
 }
 _ALERTS = {
     "silent hazard": f"no alert came before it: {NO_ALERT}, or an {LATE.removesuffix(' the hazard')} it",
-    "hazard, no alert": "in tables: no alert at all, the narrower meaning",
-    "reaction time": "from the first alert to the hazard that follows it",
+    "hazard, no alert": "in tables, the narrower meaning: no alert at all",
+    "reaction time": "the time from the first alert to the hazard that follows it",
 }
 _METHODS = {
     Method.GUIDED.value: "the trigger is a condition, such as a context of the hazard analysis",
@@ -40,7 +40,7 @@ _METHODS = {
 
 
 def words_of(run: ReportedRun) -> Words:
-    """What the page explains, without what a run has nothing of."""
+    """The terms that the page explains, without those that the run does not use."""
     head = run.folder.head
     found = {
         "How an experiment ends": _ENDINGS,
@@ -55,23 +55,23 @@ def words_of(run: ReportedRun) -> Words:
 
 
 def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
-    """The classes with the delta-v that each begins at."""
+    """The classes with their lower delta-v limits."""
     if not scale:
         return {}
     classes = scale["classes"]
     assert isinstance(classes, list)
-    told = {f"severity {name}": f"delta-v from {low:.2f} m/s on: {about}" for name, low, about in classes}
-    return told | {"no contact": "no class; such hazards rank by margin, their kinds taking turns"}
+    told = {f"severity {name}": f"delta-v from {low:.2f} m/s: {about}" for name, low, about in classes}
+    return told | {"no contact": "no class; these hazards rank by margin, with hazard types alternating"}
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
-    """What the files of the scenarios say they are, where they say it."""
+    """The scenarios' own descriptions, if they have one."""
     names = sorted(run.texts["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 
 
 def _title(run: ReportedRun, name: str) -> str:
-    """The `title` or `about` of a scenario's file, which may be of any form."""
+    """The `title` or `about` of a scenario's file, whose format is not known."""
     if run.workspace is None:
         return ""
     try:
@@ -83,7 +83,7 @@ def _title(run: ReportedRun, name: str) -> str:
 
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
-    """The methods, then what each guided trigger waits for."""
+    """The methods, then the condition of each guided trigger."""
     methods = set(run.texts["method"].unique())
     told = {name: about for name, about in _METHODS.items() if name in methods}
     abouts = _contexts(run)
@@ -98,7 +98,7 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 
 
 def _contexts(run: ReportedRun) -> dict[str, str]:
-    """The contexts of the table that the campaign takes its triggers from, if it is there."""
+    """The contexts of the campaign's context table, if it is found."""
     try:
         campaign = yaml.safe_load((run.folder.path / "campaign.yaml").read_text(encoding="utf-8"))
         table = campaign["triggers"]["table"]

@@ -1,6 +1,6 @@
-"""What the HTML pages share: their CSS and JavaScript as files of this package, and data carried in a page.
+"""Assets of the HTML pages (CSS and JavaScript files of this package), and data embedded in pages.
 
-The scripts are plain ones, in the order that a page names them; each declares one constant of its own name.
+Scripts are plain, in the order in which a page names them; each declares one constant.
 """
 
 import base64
@@ -13,7 +13,7 @@ from typing import Any
 
 @cache
 def asset(name: str) -> str:
-    """The text of a file of this folder; CSS and JavaScript are ready for `<style>` and `<script>`."""
+    """The text of a file of this folder; CSS and JavaScript are safe inside `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
         raise ValueError(f"{name} would end the element it is put into")
@@ -21,18 +21,18 @@ def asset(name: str) -> str:
 
 
 def packed(value: Any) -> str:
-    """`value` as JSON, compressed, in base64, the same text each time; packed.js reads it."""
+    """`value` as compressed JSON in base64, deterministic; packed.js reads it."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    # mtime 0: a page is the same each time it is made
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")
 
 
 def plainly_embedded(value: Any, name: str) -> str:
-    """A script element with the id `name` that carries `value` as JSON, for scripts that need it at once."""
+    """A script element with id `name` that carries `value` as plain JSON, for scripts that need it
+    immediately."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
 def embedded(value: Any, name: str) -> str:
-    """A script element with the id `name` that carries `value`; `Packed.read(name)` gives it back."""
+    """A script element with id `name` that carries `value`, compressed; `Packed.read(name)` reads it."""
     return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'

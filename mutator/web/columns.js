@@ -1,5 +1,5 @@
 "use strict";
-// Which columns the list shows: a fold-out of all that there are.
+// The choice of the list's columns: a fold-out of all available ones.
 
 class Columns {
   constructor(place, grid, state) {
@@ -13,7 +13,7 @@ class Columns {
     });
     this.element = el("details.facet", {}, el("summary", {}, "Columns"),
       el("fieldset", {}, el("legend.visually-hidden", {}, "Columns of the list"),
-        el("button", { type: "button", onclick: () => state.set({ columns: [] }) }, "The usual ones"), this.boxes.map((b) => b.element)));
+        el("button", { type: "button", onclick: () => state.set({ columns: [] }) }, "Default columns"), this.boxes.map((b) => b.element)));
     place.append(this.element);
   }
 

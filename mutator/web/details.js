@@ -1,10 +1,10 @@
 "use strict";
-// Diff, spec and trigger of each experiment, put together from what they share (report_browse.py: details).
+// Diff, spec and trigger of each experiment, assembled from shared parts (report/browse.py: details).
 
 class Details {
   static #made = null;
 
-  /** The details that the page carries, unpacked once. */
+  /** The page's details, unpacked once. */
   static read() {
     Details.#made ??= Packed.read("details").then((data) => new Details(data));
     return Details.#made;
@@ -12,12 +12,12 @@ class Details {
 
   constructor(data) {
     this.data = data;
-    // the members of a shape come in the order of the rows
+    // a shape's members follow row order
     const seen = new Uint32Array(data.shapes.length);
     this.member = data.shape.map((shape) => (shape < 0 ? -1 : seen[shape]++));
   }
 
-  /** The diff of a row, its values put into the holes of its shape; null: it has none. */
+  /** The diff of a row, with its values in the holes of its shape; null: no diff. */
   patch(row) {
     const shape = this.data.shapes[this.data.shape[row]];
     if (!shape) return null;

@@ -1,8 +1,8 @@
 "use strict";
-// Unified diffs made readable: one column or two, Python in colours, the tags of injected lines dimmed.
+// Renders unified diffs in one column or two, with Python coloured and the tags of injected lines dimmed.
 //
-// renderDiff(element, patchText, {mode: "unified" | "split"}) replaces what is in `element`. What tags look like stands
-// in the page's element `tags` (mutants/probe.py: tag_words).
+// renderDiff(element, patchText, {mode: "unified" | "split"}) replaces the content of `element`. The page's
+// element `tags` has the patterns of tags (mutants/probe.py: tag_words).
 
 const Diff = (() => {
   const { el } = Dom;
@@ -12,9 +12,9 @@ const Diff = (() => {
   const TAGS = JSON.parse(document.getElementById("tags").textContent);
   const MARK = TAGS.mark.replace(/[^\w\s]/g, "\\$&");
   const TAG = new RegExp(`${MARK}\\S+[^\\n]*$`);
-  // What the probe needs to be called at all is the same in every mutant.
+  // The lines that every mutant needs to call the probe.
   const PROBE = new RegExp(`${MARK}(?:${TAGS.probe.join("|")})\\b`);
-  // In this order: holes of a shape, the tag of an injected line, comment, strings (whole or to the line's end), number, word.
+  // In order: holes of a shape, tag of an injected line, comment, string (complete or to the end of the line), number, word.
   const REST =
     /(#[^\n]*$)|([rbfRBF]{0,2}(?:"""(?:[^"]|"(?!""))*(?:"""|$)|'''.*?(?:'''|$)|"(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'))|(\b\d[\w.]*(?:[eE][-+]\d+)?)|(@?\b[A-Za-z_]\w*)/;
   const TOKENS = new RegExp(`(⟨[^⟩]*⟩)|(${TAG.source})|${REST.source}`, "g");
@@ -47,11 +47,11 @@ const Diff = (() => {
     return files;
   }
 
-  /** Whether each line of a hunk begins inside a docstring, which may have begun above the hunk. */
+  /** For each line of a hunk: does it begin inside a docstring? The docstring may begin above the hunk. */
   function prose(lines) {
     const isOdd = (line) => (line.text.match(/"""/g) || []).length % 2 === 1;
     const first = lines.find(isOdd);
-    // the first quotes open a docstring if words follow them, else they end one
+    // the first quotes open a docstring if text follows them, else they close one
     let inside = Boolean(first) && !/^\s*[rRfFbB]*"""./.test(first.text);
     return lines.map((line) => {
       const before = inside;
@@ -79,7 +79,7 @@ const Diff = (() => {
   const word = (text) => (text.startsWith("@") ? "decorator" : KEYWORDS.has(text) ? "keyword" : null);
   const CHANGE = { "+": "added", "-": "removed", " ": "same" };
 
-  // Numbers and signs stand in attributes, shown by CSS: what is copied is source alone.
+  // Numbers and signs are attributes shown by CSS, so that copied text is source only.
   const number = (n) => el("td.no", { "data-n": n ?? "" });
   const code = (line) =>
     line
@@ -89,7 +89,7 @@ const Diff = (() => {
   const unifiedRow = (line) => el(`tr.${CHANGE[line.sign]}`, {}, number(line.old), number(line.new), code(line));
   const splitRow = ([a, b]) => el("tr", {}, number(a && a.old), code(a), number(b && b.new), code(b));
 
-  /** Lines of a hunk side by side: removed ones against the added ones that follow them. */
+  /** Lines of a hunk side by side: removed lines next to the added lines that follow. */
   function pairs(lines) {
     const made = [];
     for (let i = 0; i < lines.length; ) {
@@ -116,7 +116,7 @@ const Diff = (() => {
     return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${path}` }, widths, el("tbody", {}, body));
   }
 
-  // The probe's own lines are there, behind a fold.
+  // The probe's own lines are folded.
   const changes = (hunk) => hunk.lines.filter((line) => line.sign !== " ");
   const isProbe = (hunk) => changes(hunk).every((line) => PROBE.test(line.text));
 
@@ -126,19 +126,19 @@ const Diff = (() => {
         el("div.scroll", { tabindex: 0, role: "region", "aria-label": file.path }, table(file.hunks, file.path, mode))));
   }
 
-  /** Show `patch` in `element`, in place of what is there. */
+  /** Replace the content of `element` with `patch`. */
   function render(element, patch, { mode = "unified" } = {}) {
     const files = parse(patch);
     const shown = sections(files, mode, (hunk) => !isProbe(hunk)), folded = files.flatMap((f) => f.hunks).filter(isProbe).length;
     element.replaceChildren(...shown);
-    if (!files.length) element.append(el("p.quiet", {}, "No change of the source."));
+    if (!files.length) element.append(el("p.quiet", {}, "The source is unchanged."));
     if (!folded) return;
-    const fold = el("details", {}, el("summary.quiet", {}, `and ${folded} ${folded > 1 ? "places" : "place"} where the probe is called`));
+    const fold = el("details", {}, el("summary.quiet", {}, `and ${folded} ${folded > 1 ? "calls" : "call"} of the probe`));
     fold.addEventListener("toggle", () => fold.append(...sections(files, mode, isProbe)), { once: true });
     element.append(fold);
   }
 
-  /** The injected lines alone, without their tags: [{path, lines}]. The probe's own lines are left out. */
+  /** Only the injected lines, without tags and without the probe's own lines: [{path, lines}]. */
   function injected(patch) {
     return parse(patch).filter((file) => !file.isNew).map((file) => ({
       path: file.path,

@@ -1,5 +1,5 @@
 "use strict";
-// Elements made in one expression; text is always text, never markup.
+// Creates elements in one expression; strings become text, never markup.
 
 const Dom = (() => {
   /** An element: `el("a.link", {href, onclick}, "text", child, [more])`. Null attributes and children are left out. */
@@ -17,7 +17,7 @@ const Dom = (() => {
     return made;
   }
 
-  /** The same for SVG. */
+  /** An SVG element. */
   function svg(tag, attributes = {}, ...children) {
     const made = document.createElementNS("http://www.w3.org/2000/svg", tag);
     for (const [name, value] of Object.entries(attributes)) made.setAttribute(name, value);
@@ -25,7 +25,7 @@ const Dom = (() => {
     return made;
   }
 
-  /** A button that copies what `text()` gives, and says so. */
+  /** A button that copies the result of `text()` and confirms it. */
   function copyButton(text, label = "Copy") {
     const button = el("button.copy", { type: "button", onclick: copy }, label);
     async function copy() {
@@ -41,7 +41,7 @@ const Dom = (() => {
     return button;
   }
 
-  /** Select the text of an element: what is left where a page may not copy. */
+  /** Select the text of an element, for pages that are not allowed to copy. */
   function select(element) {
     if (element) getSelection().selectAllChildren(element);
   }

@@ -1,12 +1,12 @@
 "use strict";
-// One experiment opened beside the list: what happened, its path and replay, what was changed, how to do it again.
+// An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
-  static open = null; // what a server's script adds buttons to: {id, experiment}, also told by the event `filled`
-  static NO_PICTURES = "A campaign on pictures takes some of its worst experiments by itself, as each of them has to be driven again. "
-    + "This command makes those of this one; write the report again to have them here:";
+  static open = null; // {id, experiment} for scripts that add buttons; the event `filled` announces it
+  static NO_PICTURES = "A campaign with camera images makes stills of only some of its worst experiments, because each needs a rerun. "
+    + "This command makes stills of this experiment; then rebuild the report to see them here:";
 
-  /** `move(by)` goes on in the list, `place()` says where in it this is, `close()` shuts this. */
+  /** `move(by)` moves in the list, `place()` returns the position in it, `close()` closes the panel. */
   constructor(place, table, state, facts, actions) {
     Object.assign(this, { place, table, state, facts, actions, title: document.title });
     this.mode = innerWidth > 1100 ? "split" : "unified";
@@ -23,24 +23,24 @@ class Experiment {
     if (!id) {
       Experiment.open = null;
       this.place.hidden = true;
-      this.place.replaceChildren(); // or its replay would play on
+      this.place.replaceChildren(); // stops its replay
       this.row = -1;
       document.title = this.title;
       return;
     }
     if (row >= 0 && row === this.row && this.isOpen) {
-      this.#showPlace(); // the list may have been filtered
+      this.#showPlace(); // filters may have changed the list
       return;
     }
     const wasOpen = this.isOpen, hadFocus = this.place.contains(document.activeElement);
-    const button = document.activeElement?.getAttribute("aria-label"); // what goes on is pressed several times
+    const button = document.activeElement?.getAttribute("aria-label"); // next/previous are pressed repeatedly
     this.row = row;
     this.place.hidden = false;
     if (row < 0) this.#none(id);
     else this.#fill();
     this.#showPlace();
     this.place.scrollTop = 0;
-    // what had the keyboard is gone: without it, keys would scroll the page beneath
+    // restore the focus that was lost, or keys would scroll the page below
     if (!wasOpen || hadFocus) {
       const same = hadFocus && [...this.place.querySelectorAll("header button")].find((b) => b.getAttribute("aria-label") === button);
       (same || this.place.querySelector("h2")).focus({ preventScroll: true });
@@ -73,7 +73,7 @@ class Experiment {
     const { el } = Dom;
     document.title = this.title;
     this.place.replaceChildren(el("header", {}, el("h2", { tabindex: -1, id: "experiment-title" }, "No such experiment"), this.#buttons()),
-      el("p", {}, "This report has none whose id begins with ", el("code", {}, id), "."));
+      el("p", {}, "No experiment in this report has an id that begins with ", el("code", {}, id), "."));
   }
 
   #fill() {
@@ -92,9 +92,9 @@ class Experiment {
       typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
       section("Replay", "replay"),
       section("Pictures", "pictures"),
-      section("What was changed", "change"),
-      section("Injected lines alone", "snippet"),
-      section("The fault's spec, with the value of this experiment", "spec"),
+      section("Change", "change"),
+      section("Injected lines", "snippet"),
+      section("Fault spec with this experiment's value", "spec"),
       el("section.again", {}, el("h3", {}, "Run it again"), this.#commands()),
       el("details", {}, el("summary", {}, "All results"), this.#results()));
     Experiment.open = { id, experiment: this };
@@ -117,34 +117,34 @@ class Experiment {
     return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
       el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
         el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
-      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time, from the first alert to the first hazard: ${reaction.toFixed(2)} s.`),
+      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time (first alert to first hazard): ${reaction.toFixed(2)} s.`),
       this.#severity(), this.#metrics());
   }
 
-  /** Why no event is known. */
+  /** Why there are no events. */
   static #nothing(status, outcome) {
-    if (status === "invalid_mutant") return "The mutant could not be made, which says nothing about the fault.";
-    if (status === "harness_error") return "The harness failed, which says nothing about the fault.";
-    return outcome === "not_activated" ? "The fault was never active, so nothing happened." : "No event of it was recorded.";
+    if (status === "invalid_mutant") return "The mutant could not be built. This says nothing about the fault.";
+    if (status === "harness_error") return "The harness failed. This says nothing about the fault.";
+    return outcome === "not_activated" ? "The fault was never active, so nothing happened." : "No event was recorded.";
   }
 
-  /** A hazard with its meaning, where the manifest gives one. */
+  /** A hazard with its meaning, if the manifest has one. */
   #hazard(name) {
     const about = (this.facts.hazards || []).find((hazard) => hazard.name === name)?.about;
     return `hazard ${name}${about ? `: ${about}` : ""}`;
   }
 
-  /** The class of the contact, and what it means. */
+  /** The severity class of the contact, and its meaning. */
   #severity() {
     const { el } = Dom;
     const name = this.text("severity"), scale = this.facts.severity;
     if (!name || !scale) return "";
     const about = scale.classes.find(([of]) => of === name)?.[2];
     return el("div", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
-      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Where the classes come from"), `${scale.name}: ${scale.source}`));
+      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), `${scale.name}: ${scale.source}`));
   }
 
-  /** The metrics of this run, with their meaning. */
+  /** The metrics of this run, with meanings. */
   #metrics() {
     const { el } = Dom;
     const known = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
@@ -162,14 +162,14 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
-    const tried = this.text("module") === "operators" ? [] // which no spec has
+    const tried = this.text("module") === "operators" ? [] // no spec has these
       : [el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try())];
-    return el("div", {}, el("p", {}, "Run it again and compare it with its record; show its diff, times and plot:"),
+    return el("div", {}, el("p", {}, "Rerun it and compare it with its record; show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
-  /** `mutator try` of this fault; a time for what was triggered at random. The reading is always there: which one
-   *  is the default is up to the library. */
+  /** The `mutator try` command for this fault; random triggers become a time. It always names the reading, because
+   *  the default depends on the library. */
   #try() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
     const quoted = (text) => (/^[\w./-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
@@ -192,22 +192,22 @@ class Experiment {
     return this.place.querySelector(`section.${name} .content`);
   }
 
-  /** What is unpacked when it is first needed: diff, spec, pictures, series. */
+  /** The parts that are unpacked on first use: diff, spec, stills, series. */
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
     const [details, media, series] = await Promise.all([Details.read(), Packed.read("media"), SeriesFile.load(id).catch((error) => error)]);
-    if (this.row !== row) return; // another one was opened meanwhile
+    if (this.row !== row) return; // another experiment was opened in the meantime
     this.#change(details.patch(row));
     const spec = details.spec(row);
-    this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "It is in no plan of this run folder."));
+    this.#content("spec").replaceChildren(spec ? this.#spec(spec, details.setting(row)) : Dom.el("p.quiet", {}, "No plan of this run folder has it."));
     this.#pictures(id, [media?.[id]].find((kept) => kept?.stills.length || kept?.films.length));
     const place = this.#content("replay");
     if (series && !(series instanceof Error)) Replay.show(place, series, this.facts);
     else this.#noSeries(id, series);
   }
 
-  /** How far the fault came; `Path` gets the results of this experiment as `text(name)` and `number(name)`. */
+  /** How far the fault got; `Path` reads this experiment's results with `text(name)` and `number(name)`. */
   #path() {
     if (typeof Path === "undefined") return;
     const { table, row } = this;
@@ -219,7 +219,7 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("change"), snippet = this.#content("snippet");
     if (patch === null) {
-      place.replaceChildren(el("p.quiet", {}, "There is no diff: it has not run, or its mutant could not be made."));
+      place.replaceChildren(el("p.quiet", {}, "There is no diff: the experiment has not run, or its mutant could not be built."));
       snippet.parentElement.remove();
       return;
     }
@@ -229,9 +229,9 @@ class Experiment {
       this.#change(patch);
       this.#content("change").querySelector('[aria-pressed="true"]').focus();
     } }, title);
-    place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "How the diff is shown" },
+    place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "Diff layout" },
       button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), shown,
-      el("p.quiet", {}, "Not shown: the probe, a file that every mutant gets."));
+      el("p.quiet", {}, "Not shown: the probe, which is the same file in every mutant."));
     renderDiff(shown, patch, { mode: this.mode });
     const lines = Diff.injected(patch);
     snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),
@@ -240,8 +240,8 @@ class Experiment {
 
   #spec(spec, setting) {
     const { el } = Dom;
-    const rows = [["condition", this.text("condition")], ["how long", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
-      ["not before", `${setting.armed_after_s} s`], ["changes of the scenario", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
+    const rows = [["condition", this.text("condition")], ["duration", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
+      ["not before", `${setting.armed_after_s} s`], ["scenario changes", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
     return el("div", {}, el("pre", { tabindex: 0 }, el("code", {}, spec)),
       el("table", {}, el("tbody", {}, rows.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value))))));
   }
@@ -250,50 +250,50 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("pictures");
     if (!kept && !(this.facts.filmed && this.#endedWell)) {
-      place.parentElement.remove(); // a target without films, or a run that left none of its channels
+      place.parentElement.remove(); // the target has no films, or the run has no channels
       return;
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
     const t = Number.isNaN(hazard) ? (Number.isNaN(begin) ? 10 : begin + 2) : hazard;
     const run = this.facts.run(), separator = run.includes("\\") ? "\\" : "/";
     place.replaceChildren(
-      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden beside faulty at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
-      ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden beside faulty", loading: "lazy" })
-        : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden beside faulty" })),
-      el("p", {}, kept ? "More pictures, or a film:" : Experiment.NO_PICTURES),
+      ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden and faulty runs at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
+      ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden and faulty runs", loading: "lazy" })
+        : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden and faulty runs" })),
+      el("p", {}, kept ? "More stills, or a film:" : Experiment.NO_PICTURES),
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
   }
 
-  /** What happened at the time of a picture, as its name has it. */
+  /** The event at a still's time, from its file name. */
   #moment(time) {
     const moments = { t_activation: "fault first active", t_alert: "first alert", t_hazard: "first hazard" };
     const what = Object.keys(moments).filter((name) => this.table.number(this.row, name).toFixed(2) === time).map((name) => moments[name]);
-    return `${[`${time} s`, ...what].join(", ")} (the nearest picture there is)`;
+    return `${[`${time} s`, ...what].join(", ")} (the nearest still)`;
   }
 
-  /** Why there is no replay, and how to have one; `error`: why the series that is there cannot be read. */
+  /** Why there is no replay, and how to get one; `error`: why an existing series cannot be read. */
   #noSeries(id, error) {
     const { el } = Dom;
     const place = this.#content("replay");
     if (!this.#endedWell) {
-      place.replaceChildren(el("p", {}, "It did not end well, so there are no channels of it."));
+      place.replaceChildren(el("p", {}, "The run did not finish normally, so it has no channels."));
       return;
     }
     const said = el("p", { role: "status" });
     const load = async () => {
       const series = await SeriesFile.load(id, { isNew: true }).catch((error) => error);
       if (this.text("experiment_id") !== id) return;
-      if (!series || series instanceof Error) said.textContent = series ? series.message : "There is no series of it yet.";
+      if (!series || series instanceof Error) said.textContent = series ? series.message : "Its series does not exist yet.";
       else Replay.show(place, series, this.facts);
     };
-    const why = "The channels of this experiment are not in the run folder: there was no room for them, or it ran with an older version.";
-    place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command drives it again:"),
+    const why = "The run folder does not have this experiment's channels: there was no room for them, or an older version ran it.";
+    place.replaceChildren(error ? el("p", { role: "alert" }, error.message) : el("p", {}, why), el("p", {}, "This command reruns it:"),
       this.command(`mutator rerun ${id} --trace --run ${this.facts.run()}`),
-      el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " once it has run."), said);
+      el("p", {}, el("button", { type: "button", onclick: load }, "Show them"), " after the rerun."), said);
   }
 }
 
-/** Lines without the indentation that all of them have. */
+/** Lines without their common indentation. */
 function dedented(lines) {
   const depth = Math.min(...lines.filter((l) => l.trim()).map((l) => l.length - l.trimStart().length));
   return lines.map((line) => line.slice(depth));

@@ -1,12 +1,12 @@
 "use strict";
-// The table of experiments: of however many rows only those that are seen are in the page.
+// The table of experiments. Only visible rows are in the document.
 
 class Grid {
   static ROW_PX = 30;
-  static SPARE = 8; // rows kept ready above and below
-  static PRINTED = 500; // rows that paper gets
+  static SPARE = 8; // extra rows above and below
+  static PRINTED = 500; // rows printed on paper
 
-  /** Column, title, width in px, and how a cell is filled; `narrow`: also on a telephone. */
+  /** Column, title, width in px, cell content; `narrow`: also shown on a phone. */
   static COLUMNS = [
     { name: "kind", title: "fault type", px: 174, narrow: true },
     { name: "variant", title: "variant", px: 72 },
@@ -26,17 +26,17 @@ class Grid {
     { name: "experiment_id", title: "id", px: 76, cell: (t, r) => Dom.el("code", {}, t.text(r, "experiment_id").slice(0, 8)) },
   ];
 
-  /** How an experiment ended, as a word on its colour. */
+  /** The outcome or status as a coloured label. */
   static ending(text) {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
   }
 
-  /** A class of severity, written so that nobody takes it for a scenario. */
+  /** A severity class, labelled so that it is not mistaken for a scenario. */
   static severity(text) {
     return text ? Dom.el("span.class", { title: `severity ${text}` }, Dom.el("span.word", {}, "severity "), text) : "";
   }
 
-  /** A number of whatever size in three digits; '' for none. */
+  /** A number with three significant digits; '' for none. */
   static number(value) {
     return Number.isNaN(value) ? "" : String(Number(value.toPrecision(3)));
   }
@@ -46,9 +46,9 @@ class Grid {
     this.table = table;
     this.state = state;
     this.rows = [];
-    this.current = 0; // place in `rows` of the row that has the keyboard
+    this.current = 0; // index in `rows` of the focused row
     this.isOnPaper = false;
-    this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // alerts: not of every target
+    this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // not every target has alerts
     this.more = Grid.#more(table, metrics);
     this.#choose();
     this.#build();
@@ -56,7 +56,7 @@ class Grid {
     new ResizeObserver(() => this.#soon()).observe(place);
   }
 
-  /** The columns of the table that the list does not show by itself, metrics with unit and meaning. */
+  /** The columns that are not shown by default; metrics have unit and meaning. */
   static #more(table, metrics) {
     const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
     const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));
@@ -69,7 +69,7 @@ class Grid {
     });
   }
 
-  /** Take the columns of the state, or the usual ones. */
+  /** Use the state's columns, or the defaults. */
   #choose() {
     const wanted = this.state.columns;
     this.chosen = wanted.join();
@@ -104,11 +104,11 @@ class Grid {
     this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
   }
 
-  /** Show these rows, others than before from the first on; the opened experiment has the keyboard, if it is among them. */
+  /** Show these rows, from the first if they changed. The open experiment gets the focus if it is among them. */
   show(rows) {
     const areOthers = rows.length !== this.rows.length || rows.some((row, at) => row !== this.rows[at]);
     this.rows = rows;
-    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // few rows have a low window
+    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // a short list has a low window
     if (this.state.columns.join() !== this.chosen) {
       this.#choose();
       this.#build();
@@ -137,12 +137,12 @@ class Grid {
   }
 
   /**
-   * Draw for paper from `beforeprint` to `afterprint`, for the screen otherwise. It is a state, not an argument of one
-   * drawing: printing scrolls and resizes the window, and the redraw that follows must not put the screen's rows back.
+   * Draw for paper from `beforeprint` to `afterprint`, else for the screen. This must be a state, because printing
+   * scrolls and resizes the window, and the redraw that follows must not restore the screen's rows.
    */
   print(isOnPaper) {
     if (isOnPaper === this.isOnPaper) return;
-    if (isOnPaper) this.scrolled = this.place.scrollTop; // paper has fewer rows, so the window loses its place
+    if (isOnPaper) this.scrolled = this.place.scrollTop; // paper has fewer rows, so the scroll position is lost
     this.isOnPaper = isOnPaper;
     this.draw();
     if (isOnPaper) return;
@@ -150,7 +150,7 @@ class Grid {
     this.draw();
   }
 
-  /** The rows to put into the page: those that are seen, with some to spare; on paper the first ones. */
+  /** The rows to render: visible ones plus a margin; on paper the first ones. */
   #span() {
     if (this.isOnPaper) return [0, Math.min(this.rows.length, Grid.PRINTED)];
     const seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
@@ -158,7 +158,7 @@ class Grid {
     return [first, Math.min(this.rows.length, first + seen + 2 * Grid.SPARE)];
   }
 
-  /** Put the rows of the span into the page. */
+  /** Render the rows of the span. */
   draw() {
     const { el } = Dom;
     const [first, last] = this.#span(), more = this.rows.length - last;
@@ -168,8 +168,8 @@ class Grid {
     const shown = [];
     for (let at = first; at < last; at++) shown.push(this.#row(at));
     this.body.replaceChildren(...[space(first), ...shown, this.isOnPaper ? null : space(more)].filter(Boolean));
-    if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: this.columns.length }, `and ${more.toLocaleString("en")} more, which are not printed`)));
-    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, this.table.count ? "No experiment fits these filters." : "No experiment has run yet.")));
+    if (this.isOnPaper && more > 0) this.body.append(el("tr", {}, el("td.quiet", { colspan: this.columns.length }, `and ${more.toLocaleString("en")} more (not printed)`)));
+    if (!this.rows.length) this.body.append(el("tr", {}, el("td.quiet", { colspan: 3 }, this.table.count ? "No experiment matches these filters." : "No experiment has run yet.")));
     if (hadFocus) this.#element(this.current)?.focus({ preventScroll: true });
   }
 
@@ -191,14 +191,14 @@ class Grid {
     return this.body.querySelector(`tr[data-at="${at}"]`);
   }
 
-  /** Open the experiment at a place of the table. */
+  /** Open the experiment at an index of the table. */
   open(at, options) {
     if (at < 0 || at >= this.rows.length) return;
     this.current = at;
     this.state.set({ experiment: this.table.text(this.rows[at], "experiment_id") }, options);
   }
 
-  /** Give the keyboard to the row so many further on; the open experiment follows. */
+  /** Move the focus by a number of rows; the open experiment follows. */
   move(by) {
     if (!this.rows.length) return;
     this.current = Math.max(0, Math.min(this.rows.length - 1, this.current + by));
@@ -207,13 +207,13 @@ class Grid {
     else this.focus();
   }
 
-  /** Which of the rows an experiment is, and of how many: `3 of 16`. */
+  /** The position of an experiment among the rows: `3 of 16`. */
   placeOf(experiment) {
     const at = this.rows.indexOf(this.table.find(experiment)), all = this.rows.length.toLocaleString("en");
     return at < 0 ? "not in this list" : `${(at + 1).toLocaleString("en")} of ${all}`;
   }
 
-  /** Scroll so that the current row is seen. */
+  /** Scroll the current row into view. */
   reveal() {
     const head = this.element.tHead.offsetHeight, top = this.current * Grid.ROW_PX;
     const room = this.place.clientHeight - head - Grid.ROW_PX;

@@ -1,11 +1,11 @@
 "use strict";
-// Fault type x scenario: in each cell a count of a count, or a metric's median or worst value, as text and as colour.
-// A cell filters.
+// Fault type x scenario: each cell shows a share, or a metric's median or worst value, as text and colour.
+// Selecting a cell sets the filters.
 
 class HeatMap {
   static ROW = "kind";
   static COLUMN = "scenario";
-  /** Facets whose filters do not change the map: its own two, and results, which it counts itself. */
+  /** Facets that do not filter the map: its own two, and the results that it counts. */
   static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at", "through"];
 
   constructor(place, picker, table, state, metrics = []) {
@@ -23,7 +23,7 @@ class HeatMap {
     this.picker = picker;
   }
 
-  /** How many of the activated faults had a contact of a class or a worse one. */
+  /** The share of activated faults with a contact of at least each class. */
   static severities(table) {
     const found = table.facets.find((f) => f.name === "severity");
     const classes = found ? found.values.filter((value) => value !== found.none).sort() : [];
@@ -33,7 +33,7 @@ class HeatMap {
     }));
   }
 
-  /** Median and worst value of each metric, over activated faults. */
+  /** Median and worst value of each metric over activated faults. */
   static values(table, metrics) {
     const of = (row) => table.text(row, "t_activation") !== "";
     return metrics.filter(([name]) => table.columns.get(name)?.numbers).flatMap(([name, unit, , worse]) => ["median", "worst"].map((which) => ({
@@ -42,7 +42,7 @@ class HeatMap {
     })));
   }
 
-  /** What can be counted: how many of which rows. */
+  /** The shares: rows counted, and rows in the base. */
   static shares(table) {
     const has = (name) => (row) => table.text(row, name) !== "";
     const isActive = has("t_activation"), isHazard = has("hazards"), isAlert = has("alerts"), all = () => true;
@@ -79,15 +79,15 @@ class HeatMap {
     for (const row of rows) {
       if (!this.table.usable(row) || !measure.of(row)) continue;
       const told = measure.value ? measure.value(row) : measure.part(row);
-      if (Number.isNaN(told)) continue; // a run that has no value of this metric
+      if (Number.isNaN(told)) continue; // the run has no value
       const [y] = this.rows.members[this.rows.codes[row]], [x] = this.columns.members[this.columns.codes[row]];
-      // last row and column: all of them
+      // last row and column: totals
       for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(told);
     }
     this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width, height);
   }
 
-  /** Text, words and colour (0 to 1) of a cell that counts. */
+  /** Text, description and colour (0 to 1) of a share's cell. */
   static #share(told) {
     return HeatMap.#shareOf(told.filter(Boolean).length, told.length);
   }
@@ -96,7 +96,7 @@ class HeatMap {
     return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
   }
 
-  /** The same of cells that sum up a metric: the worst of them has the full colour. */
+  /** The same for a metric's cells; the worst has full colour. */
   static #summaries({ which, turn }, cells) {
     return HeatMap.#coloured({ turn }, cells.map((told) => {
       const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
@@ -105,7 +105,7 @@ class HeatMap {
     }));
   }
 
-  /** The same of values (null: none), each with how many it is of. */
+  /** The same for values (null: none), each with its number of runs. */
   static #coloured({ turn }, told) {
     const values = told.map(([value]) => value ?? NaN);
     const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
@@ -140,7 +140,7 @@ class HeatMap {
     return this.state.chosen.has(HeatMap.ROW) || this.state.chosen.has(HeatMap.COLUMN);
   }
 
-  /** Whether exactly `value` is chosen of a facet; null: nothing is. */
+  /** Whether a facet has exactly `value` chosen; null: nothing. */
   #isChosen(name, value) {
     const chosen = this.state.chosen.get(name);
     return value === null ? !chosen : Boolean(chosen) && chosen.size === 1 && chosen.has(value);

@@ -1,6 +1,6 @@
 "use strict";
-// What the server is asked to do: a list of jobs with progress, cancel, log and result, on every served page. The server
-// keeps the list, so a reload finds it again.
+// The server's jobs on every served page: progress, cancel, log and result. The server keeps the list, so it
+// survives a reload.
 
 const Jobs = (() => {
   const { el } = Dom;
@@ -11,32 +11,32 @@ const Jobs = (() => {
   const watchers = [];
   let place = null, timer = null, known = [];
 
-  /** An error of the server in words. */
+  /** A server error as text. */
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** What the server answers; an Error in words where it refuses or is gone. */
+  /** The server's answer; throws an Error with text if it refuses or is unreachable. */
   async function ask(address, body) {
     const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
     let response = null;
     try {
       response = await fetch(address, post);
     } catch {
-      throw new Error("the server does not answer");
+      throw new Error("no answer from the server");
     }
     const data = await response.json().catch(() => null);
     if (response.ok && data) return data;
-    throw new Error(data?.error ? words(data.error) : `the server answers ${response.status}`);
+    throw new Error(data?.error ? words(data.error) : `the server answered ${response.status}`);
   }
 
-  /** Ask for a job; gives its id. */
+  /** Start a job and return its id. */
   async function start(body) {
     const { id } = await ask("/api/jobs", body);
     await poll();
     return id;
   }
 
-  /** Call `seen(jobs)` with the jobs, newest first, whenever they have been asked for. */
+  /** Call `seen(jobs)` with the jobs, newest first, after every request. */
   function watch(seen) {
     watchers.push(seen);
     seen(known);
@@ -65,7 +65,7 @@ const Jobs = (() => {
     place.hidden = jobs.length === 0 && !place.dataset.always;
     const active = jobs.filter(isActive).length, failed = jobs.filter((job) => job.state === "failed").length;
     const waiting = active ? `${active} unfinished` : "none unfinished";
-    place.querySelector(".jobs-count").textContent = `${jobs.length} in all, ${waiting}${failed ? `, ${failed} failed` : ""}`;
+    place.querySelector(".jobs-count").textContent = `${jobs.length} in total, ${waiting}${failed ? `, ${failed} failed` : ""}`;
     place.querySelector(".jobs-none").hidden = jobs.length > 0;
     const list = place.querySelector("ul"), shown = jobs.slice(0, SHOWN);
     for (const [id, row] of rows) {
@@ -81,7 +81,7 @@ const Jobs = (() => {
     });
   }
 
-  /** A row that stays the same element while its job goes on, so that its buttons keep the keyboard. */
+  /** A job's row. It stays the same element, so that its buttons keep the focus. */
   function rowOf(id) {
     const state = el("span.job-state"), title = el("b"), progress = el("progress", { max: 1 }), message = el("span.quiet"), result = el("a", {}, "Show it");
     const button = (text, onclick) => el("button", { type: "button", onclick }, text);
@@ -106,7 +106,7 @@ const Jobs = (() => {
     return { element: el("li", {}, state, title, progress, message, el("span.job-do", {}, result, cancel, log)), update };
   }
 
-  /** A link to the page that is open loads it anew: its report has been made anew. */
+  /** A link to the open page reloads it, because its report was rebuilt. */
   function opened(event) {
     const to = new URL(event.currentTarget.href);
     if (to.pathname !== location.pathname) return;
@@ -131,7 +131,7 @@ const Jobs = (() => {
     }
   }
 
-  /** Put the list into the page: into its section `jobs`, or as a bar at its foot. */
+  /** Put the list into the section `jobs`, or into a bar at the bottom. */
   function install() {
     const section = document.getElementById("jobs");
     place = section || el("aside.jobs", { id: "jobs", "aria-label": "Jobs", hidden: true });

@@ -1,17 +1,17 @@
 "use strict";
-// The replay of an experiment: its scene, instruments and plots at one time, which plays, is dragged and is stepped.
+// The replay of an experiment: scene, instruments and plots at one time, which you play, drag or step.
 
 const Replay = (() => {
-  const BEFORE = 1; // s before the activation at which it waits
-  const SPOKEN = 4; // channels in the sentence about a time
-  const SILENCE = 500; // ms that the time must stand before it is read out
+  const BEFORE = 1; // s before activation, where the replay starts
+  const SPOKEN = 4; // channels in the description of a time
+  const SILENCE = 500; // ms that the time must rest before it is read out
 
   const SYMBOLS = {
     play: "M4 2l9 6-9 6z", pause: "M4 2h3v12H4zM9 2h3v12H9z", start: "M3 3h2v10H3zM13 3v10L6 8z", end: "M11 3h2v10h-2zM3 3v10l7-5z",
     back: "M11 3v10L4 8z", on: "M5 3v10l7-5z",
   };
 
-  /** A symbol of a button, whatever fonts there are. */
+  /** A button's symbol, independent of fonts. */
   const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
 
   class Player {
@@ -28,7 +28,7 @@ const Replay = (() => {
       new ResizeObserver(() => this.clock.redraw()).observe(this.root);
     }
 
-    /** The scene, where the target has one and its formulas can be evaluated over this series. */
+    /** The scene, if the target has one whose formulas can be evaluated over this series. */
     #scene() {
       if (!this.facts.scene) return null;
       try {
@@ -52,10 +52,10 @@ const Replay = (() => {
       this.time = el("span.now");
       this.states = el("span.states");
       this.live = el("p.visually-hidden", { "aria-live": "polite" });
-      this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays, arrows step, Shift and an arrow goes a second.",
+      this.root = el("div.replay-player", { role: "group", "aria-label": "Replay. Space plays and pauses, arrows step, Shift and an arrow moves a second.",
         onkeydown: (event) => this.#key(event), onpointerdown: (event) => {
           if (!event.target.matches("canvas")) return;
-          if (event.pointerType === "mouse") event.preventDefault(); // or the focus would go to the page
+          if (event.pointerType === "mouse") event.preventDefault(); // keep the focus off the page
           this.bar.element.focus({ preventScroll: true }); // for the keys
         } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
@@ -78,7 +78,7 @@ const Replay = (() => {
       const speed = el("select", { "aria-label": "Speed", onchange: () => (clock.speed = Number(speed.value)) },
         ReplayClock.SPEEDS.map((value) => el("option", { value, selected: value === 1 }, `${value}×`)));
       return el("div.controls", {}, this.playing, button("start", "To the start (Home)", () => this.#go(this.series.start)),
-        button("back", "One step back (←)", () => clock.step(-1)), button("on", "One step on (→)", () => clock.step(1)),
+        button("back", "One step back (←)", () => clock.step(-1)), button("on", "One step forward (→)", () => clock.step(1)),
         button("end", "To the end of the drive (End)", () => this.#go(ReplayData.until(this.series))), speed,
         this.scene ? el("p.legend", {}, el("span.key.box-faulty"), "faulty", el("span.key.box-golden"), "golden",
           this.facts.scene.actors.some(({ believed }) => believed) ? [el("span.key.box-belief"), "what the controller believes"] : null) : null);
@@ -103,7 +103,7 @@ const Replay = (() => {
       event.preventDefault();
     }
 
-    /** The state at a time in words. */
+    /** The state at a time, as text. */
     describe(t) {
       const words = [`${t.toFixed(2)} s`, ...this.#stateAt(t).map(([, text]) => text)];
       const differ = this.channels.filter((c) => !ReplayData.same(ReplayData.held(c, "faulty", t), ReplayData.held(c, "golden", t)));
@@ -114,7 +114,7 @@ const Replay = (() => {
       return `${words.join(", ")}${differ.length ? "" : ", as golden"}`;
     }
 
-    /** [kind, text] of what is so at a time: fault active, manifested, the alerts and hazards that came, the end. */
+    /** [kind, text] of each state at a time: fault active, manifested, earlier alerts and hazards, the end. */
     #stateAt(t) {
       const { active, marks, tEnd } = this.series, came = marks.filter(([, at]) => at <= t + ReplayData.TINY), states = [];
       if (active && t >= active[0] - ReplayData.TINY && t <= active[1] + ReplayData.TINY) states.push(["active", "fault active"]);
@@ -129,7 +129,7 @@ const Replay = (() => {
       return about ? `${label}: ${about}` : label;
     }
 
-    /** Draw the time of the clock: all that is shown follows from it. */
+    /** Draw everything for the time of the clock. */
     draw() {
       if (!this.root.isConnected) return this.clock.pause();
       const { clock, series } = this, { t, isPlaying } = clock, now = performance.now(), colours = ReplayColours.now();
@@ -178,7 +178,7 @@ const Replay = (() => {
       if (!isPlaying) this.speaking = setTimeout(() => document.activeElement !== this.bar.element && this.#say(t), SILENCE);
     }
 
-    /** Read the state out once the time stands; the bar says its own. */
+    /** Read the state out when the time rests; the bar announces its own. */
     #say(t) {
       const text = this.describe(t);
       if (this.root.contains(document.activeElement) && this.live.textContent !== text) this.live.textContent = text;
@@ -188,8 +188,8 @@ const Replay = (() => {
   let current = null;
   for (const query of ["(prefers-color-scheme: dark)", "print"]) matchMedia(query).addEventListener("change", () => current?.draw());
 
-  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` of the page: scene, hazards. Returns the player, null
-   *  for a series without channels. */
+  /** Fill `place` with the replay of a series (SeriesFile.load); `facts` has scene and hazards. Returns the player, or null
+   *  if the series has no channels. */
   function show(place, series, facts) {
     current?.clock.pause();
     current = series.channels.length ? new Player(place, series, facts) : null;

@@ -1,8 +1,8 @@
 "use strict";
-// The time of a replay as a bar: drag it, with marks of what happened when; beneath it a button for each of these.
+// The time bar of a replay: draggable, with marks for events and a button below for each event.
 
 class ReplayBar {
-  /** `describe(t)` says the state at a time in words. */
+  /** `describe(t)` returns the state at a time as text. */
   constructor(series, clock, describe) {
     const { el } = Dom;
     Object.assign(this, { series, clock, describe });
@@ -60,7 +60,7 @@ class ReplayBar {
     for (const name of ["pointerup", "pointercancel"]) this.element.addEventListener(name, () => over.abort(), { signal });
   }
 
-  /** Show the time; what is said of it only while it stands, or a screen reader would never be silent. */
+  /** Show the time. Describe it only at rest, or a screen reader would talk all the time. */
   show() {
     const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
     this.handle.style.left = `${100 * share}%`;
@@ -70,7 +70,7 @@ class ReplayBar {
     this.element.setAttribute("aria-valuetext", this.describe(t));
   }
 
-  /** Show which part of the time the plots show; all of it needs no sign. */
+  /** Show which part of the time the plots cover; nothing if they cover all of it. */
   zoomed(from, to) {
     this.window.hidden = from <= this.series.start && to >= this.series.end;
     this.window.style.left = this.#at(from);

@@ -1,15 +1,15 @@
 "use strict";
-// The time of a replay: playing, stepping, and how many frames a second are drawn.
+// The time of a replay: playing, stepping and the frame rate.
 
 class ReplayClock {
   static SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
-  static CALM = 500; // ms between two pictures where motion is to be little
-  #frames = []; // when the last ones were drawn, ms
-  #last = null; // ms, of the frame before while playing
-  #isDue = false; // a frame is asked for
+  static CALM = 500; // ms between frames with reduced motion
+  #frames = []; // times of the last frames, ms
+  #last = null; // ms, time of the previous frame while playing
+  #isDue = false; // a frame is requested
   #timer = null;
 
-  /** From `start` to `end` s; playing pauses at each of `stops` on its way. `draw(clock)` is called when anything changed. */
+  /** From `start` to `end` s; playing pauses at each of `stops`. `draw(clock)` is called after every change. */
   constructor({ start, end, stops, steps, at }, draw) {
     Object.assign(this, { start, end, stops, steps, draw, t: at, speed: 1, isPlaying: false, rate: 0 });
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -31,7 +31,7 @@ class ReplayClock {
   }
 
   pause() {
-    if (!this.isPlaying) return; // a replay that has left the page pauses with each frame: the last one must not ask for another
+    if (!this.isPlaying) return; // a replay that left the page pauses at each frame; the last must not request another
     this.isPlaying = false;
     this.#ask();
   }
@@ -41,7 +41,7 @@ class ReplayClock {
     this.#ask();
   }
 
-  /** Go `by` samples on or back. */
+  /** Move by `by` samples. */
   step(by) {
     this.pause();
     const now = ReplayData.index(this.steps, this.t), isBetween = this.t - this.steps[now] > ReplayData.TINY;
@@ -49,7 +49,7 @@ class ReplayClock {
     this.seek(this.steps[Math.min(this.steps.length - 1, Math.max(0, to))]);
   }
 
-  /** Draw once more, soon: what is shown has changed, not the time. */
+  /** Redraw soon: the content changed, not the time. */
   redraw() {
     this.#ask();
   }
@@ -68,9 +68,9 @@ class ReplayClock {
     if (this.isPlaying && !isCalm) this.#ask();
   }
 
-  /** For those whom motion harms: a picture twice a second, and nothing that glides. */
+  /** Reduced motion: two frames a second, no gliding. */
   #goOnCalmly() {
-    clearInterval(this.#timer); // of a pause a moment ago
+    clearInterval(this.#timer); // left from a recent pause
     this.#timer = setInterval(() => {
       if (!this.isPlaying) return clearInterval(this.#timer);
       this.#advance(performance.now());
@@ -79,7 +79,7 @@ class ReplayClock {
   }
 
   #advance(now) {
-    const passed = this.#last === null ? 0 : Math.min(ReplayClock.CALM, now - this.#last); // a page in the back gets no frames
+    const passed = this.#last === null ? 0 : Math.min(ReplayClock.CALM, now - this.#last); // background pages get no frames
     this.#last = now;
     const from = this.t, to = Math.min(this.end, from + (passed / 1000) * this.speed);
     const stop = this.stops.map((t) => t - ReplayData.TINY).findIndex((t) => from < t && to >= t);

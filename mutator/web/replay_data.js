@@ -1,11 +1,11 @@
 "use strict";
-// Numbers of a series (SeriesFile.load) as the replay shows them: at a time, in a text, on an axis.
+// Values of a series (SeriesFile.load) for the replay: at a time, as text, on an axis.
 
 const ReplayData = (() => {
-  const BEYOND = 100; // so many times what a channel usually is: its axis is cut
+  const BEYOND = 100; // the axis is cut at this multiple of a channel's usual size
   const TINY = 1e-9; // s
 
-  /** The last of `times` that is not after `t`; 0 before the first. */
+  /** The index of the last of `times` that is not after `t`; 0 before the first. */
   function index(times, t) {
     let low = 0, high = times.length - 1;
     while (low < high) {
@@ -16,18 +16,18 @@ const ReplayData = (() => {
     return low;
   }
 
-  /** The value of a channel in a run (`golden` or `faulty`) at a time: that of the last sample; NaN where there is none. */
+  /** The value of a channel in a run (`golden` or `faulty`) at a time: the last sample; NaN if there is none. */
   const held = (channel, run, t) => (channel.t.length && t >= channel.t[0] - TINY ? channel[run][index(channel.t, t)] : NaN);
 
   const same = (a, b) => a === b || (Number.isNaN(a) && Number.isNaN(b));
 
-  /** The times at which the state of a replay can differ: those of the channel that has most. */
+  /** The times at which a replay can change: those of the channel with the most samples. */
   const steps = (series) => series.channels.reduce((most, { t }) => (t.length > most.length ? t : most), []);
 
-  /** Until when what happens is part of the drive. */
+  /** The end of the drive, s. */
   const until = (series) => series.tEnd ?? series.end;
 
-  /** Where golden and faulty differ most up to the end of the drive: {by, t}; `by` is 0 where they do not. */
+  /** The largest difference of golden and faulty up to the end of the drive: {by, t}; `by` is 0 if they are equal. */
   function largest(channel, end) {
     const found = { by: 0, t: NaN };
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) {
@@ -38,8 +38,8 @@ const ReplayData = (() => {
     return found;
   }
 
-  /** How far golden and faulty are apart as a rule, from the activation to the end of the drive, as a share of the axis: the
-   *  root of the mean square. A value that only one of them has counts as the whole axis. */
+  /** The root mean square difference of golden and faulty, from activation to the end of the drive, as a share of the axis.
+   *  A value that only one of them has counts as the whole axis. */
   function apart(channel, { low, high }, begin, end) {
     let sum = 0, count = 0;
     for (let i = index(channel.t, begin); i < channel.t.length && channel.t[i] <= end + TINY; i++, count++) {
@@ -49,8 +49,8 @@ const ReplayData = (() => {
     return Math.sqrt(sum / (count || 1));
   }
 
-  /** The axis of a channel, of what it is up to the end of the drive; `cut`: from where to where its values really
-   *  go, if that is too far to show; `isWhole`: they are all whole numbers. A headway time near standstill goes to any height, and nothing else would be seen. */
+  /** The axis of a channel, from its values up to the end of the drive. `cut`: the true range, if it is too large to show;
+   *  a headway time near standstill, for example, would hide everything else. `isWhole`: all values are integers. */
   function range(channel, end) {
     const values = [];
     for (let i = 0; i < channel.t.length && channel.t[i] <= end + TINY; i++) values.push(channel.golden[i], channel.faulty[i]);
@@ -63,12 +63,12 @@ const ReplayData = (() => {
       cut = [low, high];
       [low, high] = [Math.max(low, -2 * usual), Math.min(high, 2 * usual)];
     }
-    // a narrower range would show rounding as something
+    // a narrower range would magnify rounding errors
     const margin = Math.max((high - low) * 0.06, 1e-6, Math.abs(high) * 1e-3);
     return { low: low - margin, high: high + margin, cut, isWhole };
   }
 
-  /** Round numbers to label an axis from `low` to `high` with, about `count` of them. */
+  /** About `count` round numbers that label an axis from `low` to `high`. */
   function ticks(low, high, count) {
     const rough = (high - low) / count, power = 10 ** Math.floor(Math.log10(rough));
     const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough) || 10), made = [];
@@ -76,14 +76,14 @@ const ReplayData = (() => {
     return made;
   }
 
-  /** How many digits behind the point a channel with this axis is written with. */
+  /** The number of decimals for a channel with this axis. */
   function digits({ low, high, isWhole }) {
     if (isWhole) return 0;
     const size = Math.max(Math.abs(low), Math.abs(high), 1e-9);
     return Math.min(4, Math.max(0, (size < 1 ? 3 : 4) - Math.ceil(Math.log10(size))));
   }
 
-  /** A value as a text; a true minus, so that it is as wide as a plus. */
+  /** A value as text, with a true minus sign, which is as wide as a plus. */
   function text(value, places) {
     if (Number.isNaN(value)) return "–";
     if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";

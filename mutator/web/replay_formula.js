@@ -1,6 +1,6 @@
 "use strict";
-// Formulas and conditions of a manifest over the steps of a run, as Python has them (triggers/over_time.py). They
-// come as trees (triggers/trees.py): numbers, names, and lists of an operator and what it is of.
+// Evaluates a manifest's formulas and conditions over the steps of a run, as triggers/over_time.py does. Input is
+// trees (triggers/trees.py): numbers, names, and lists of an operator and its operands.
 
 const Formula = (() => {
   const OF_NUMBERS = {
@@ -11,7 +11,7 @@ const Formula = (() => {
     and: (...all) => all.every(Boolean), or: (...all) => all.some(Boolean), not: (a) => !a, if: (c, a, b) => (c ? a : b),
   };
 
-  /** Each step's value of `tree`; `values` has an array for each name, all as long as `values.t`. */
+  /** The value of `tree` at each step; `values` has an array for each name, all as long as `values.t`. */
   function evaluate(tree, values) {
     const count = values.t.length;
     if (!Array.isArray(tree)) {
@@ -28,13 +28,13 @@ const Formula = (() => {
     return made;
   }
 
-  /** Whether it has held by then. */
+  /** Whether the condition has held by then. */
   function ever(holds) {
     let found = false;
     return holds.map((now) => (found = found || now));
   }
 
-  /** The change in a second since the step before; NaN in the first. */
+  /** The rate of change per second since the previous step; NaN in the first. */
   const rate = (values, t) => Array.from(values, (value, i) => (i ? (value - values[i - 1]) / (t[i] - t[i - 1]) : NaN));
 
   return { evaluate };

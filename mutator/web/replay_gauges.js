@@ -1,11 +1,11 @@
 "use strict";
-// Instruments: each channel's value with a bar in its range, faulty and golden. One is also the switch of its plot.
+// Instruments: each channel's faulty and golden value with a bar. Pressing an instrument shows or hides its plot.
 
 class ReplayGauges {
-  static FEW = 8; // that a narrow screen shows at first
-  static TEXTS = 100; // ms between two texts while playing: faster than this nobody reads
+  static FEW = 8; // instruments that a narrow screen shows at first
+  static TEXTS = 100; // ms between text updates while playing; faster is not readable
 
-  /** `isPlotted(name)`, and `toggle(name)` which changes that. */
+  /** `isPlotted(name)` returns whether a channel is plotted; `toggle(name)` changes it. */
   constructor(channels, axes, { isPlotted, toggle }) {
     const { el } = Dom;
     Object.assign(this, { isPlotted, written: -Infinity });
@@ -28,7 +28,7 @@ class ReplayGauges {
     return { channel, axis, share, places: ReplayData.digits(axis), button, faulty, golden, fill, needle };
   }
 
-  /** Show the values of a time; `now` is when, in ms: texts are not written in each frame. */
+  /** Show the values at a time; `now`, in ms, limits text updates. */
   show(t, now, isPlaying) {
     const isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
     if (isWritten) this.written = now;
@@ -48,7 +48,7 @@ class ReplayGauges {
     button.classList.toggle("differs", text !== other);
   }
 
-  /** Show which ones are plotted. */
+  /** Show which channels are plotted. */
   pressed() {
     for (const { channel, button } of this.gauges) button.setAttribute("aria-pressed", String(this.isPlotted(channel.name)));
   }

@@ -1,9 +1,9 @@
 "use strict";
-// One channel over time on a canvas: golden broad beneath, faulty narrow above, gray after the end of the drive.
+// One channel over time on a canvas: golden as a broad line, faulty as a narrow line above it, grey after the drive.
 
 class ReplayPlot {
   static HEIGHT = 84; // px
-  static LEFT = 58; // px for the numbers of the axis
+  static LEFT = 58; // px for axis labels
   static RIGHT = 8;
 
   constructor(channel, axis, series) {
@@ -30,20 +30,20 @@ class ReplayPlot {
 
   #note() {
     const [low, high] = (this.axis.cut ?? []).map((value) => String(Number(value.toPrecision(4))).replace("-", "−"));
-    return low ? Dom.el("p.note", {}, `axis cut: values go from ${low} to ${high}`) : null;
+    return low ? Dom.el("p.note", {}, `axis cut: values range from ${low} to ${high}`) : null;
   }
 
-  /** Where a time is, in px of the canvas. */
+  /** The position of a time, in px of the canvas. */
   x(t, { from, to }) {
     return ReplayPlot.LEFT + ((t - from) / (to - from)) * (this.width - ReplayPlot.LEFT - ReplayPlot.RIGHT);
   }
 
-  /** The time at a place of the canvas. */
+  /** The time at a position of the canvas. */
   time(x, { from, to }) {
     return from + ((x - ReplayPlot.LEFT) / (this.width - ReplayPlot.LEFT - ReplayPlot.RIGHT)) * (to - from);
   }
 
-  /** Draw the time from `view.from` to `view.to`, as wide as there is room. */
+  /** Draw the time from `view.from` to `view.to` over the available width. */
   draw(width, view, colours) {
     const { HEIGHT, LEFT, RIGHT } = ReplayPlot;
     this.width = width;
@@ -96,10 +96,10 @@ class ReplayPlot {
     context.fillRect(x(this.series.tEnd), 0, width, HEIGHT);
   }
 
-  /** Until when a value holds: to the next one, at last to the end. */
+  /** How long a value holds: until the next one, or the end. */
   #holds = (i) => this.channel.t[i + 1] ?? this.series.end;
 
-  /** What lies between both runs in the drive, never of a time before the activation. */
+  /** The area between both runs during the drive, from activation. */
   #between(context, x, y, view, colour) {
     const { t, golden, faulty } = this.channel, begin = Math.max(view.from, this.series.active?.[0] ?? -Infinity), end = Math.min(view.to, this.end);
     context.fillStyle = colour;
@@ -124,7 +124,7 @@ class ReplayPlot {
     context.globalAlpha = 1;
   }
 
-  /** A line from one time to another, each value held until the next one comes. */
+  /** A line between two times; each value holds until the next. */
   #line(context, x, y, values, from, to) {
     const { t } = this.channel;
     let isDown = false;
@@ -138,14 +138,14 @@ class ReplayPlot {
     context.stroke();
   }
 
-  /** A difference with its sign, in so many digits that it is none of 0. */
+  /** A signed difference with enough digits to not be 0. */
   #difference(by) {
     if (!Number.isFinite(by)) return "differs";
     const text = this.#text(by);
     return `${by > 0 ? "+" : ""}${/[1-9]/.test(text) ? text : by.toPrecision(1).replaceAll("-", "−")}`;
   }
 
-  /** Put the cursor at a time, and say both values there if `isWritten`. */
+  /** Put the cursor at a time, and show both values there if `isWritten`. */
   look(t, view, isWritten) {
     this.cursor.hidden = t < view.from - ReplayData.TINY || t > view.to + ReplayData.TINY;
     this.cursor.style.transform = `translateX(${this.x(t, view)}px)`;

@@ -1,11 +1,11 @@
 "use strict";
-// The plots below a replay: those channels that are chosen, on one time axis that can be zoomed and moved.
+// The plots below a replay: the chosen channels on one time axis that zooms and moves.
 
 class ReplayPlots {
-  static NARROWEST = 0.2; // s that are shown at least
-  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // plots at first, at most
-  static SEEN = 0.002; // share of an axis by which a channel must be apart to be seen
-  static FACTOR = 1.6; // of a step of zoom
+  static NARROWEST = 0.2; // s, narrowest view
+  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // initial plots, at most
+  static SEEN = 0.002; // smallest visible difference, as a share of the axis
+  static FACTOR = 1.6; // of a zoom step
 
   constructor(channels, axes, series, clock, zoomed) {
     const { el } = Dom;
@@ -22,7 +22,7 @@ class ReplayPlots {
     this.#fill();
   }
 
-  /** The channels that are plotted at first: of each role those that differ most; none does: the first three. */
+  /** The initial channels: those of each role that differ most, or the first three if none differs. */
   #interesting() {
     const begin = this.series.active?.[0] ?? this.series.start, end = ReplayData.until(this.series);
     const ranked = this.plots.map(({ channel, axis }) => ({ channel, apart: ReplayData.apart(channel, axis, begin, end) }))
@@ -38,7 +38,7 @@ class ReplayPlots {
       el("p.legend", {}, el("span.key.golden"), "golden", el("span.key.faulty"), "faulty", this.series.active ? [el("span.key.active"), "fault active"] : null,
         this.series.tEnd === null ? null : [el("span.key.after"), "after the end of the drive"]),
       this.told,
-      el("div.buttons", { role: "group", "aria-label": "Part of the time that is shown" },
+      el("div.buttons", { role: "group", "aria-label": "Time range shown" },
         button("−", "Zoom out (−)", () => this.zoom(-1)), button("+", "Zoom in (+)", () => this.zoom(1)),
         button("◀", "Earlier", () => this.pan(-0.4)), button("▶", "Later", () => this.pan(0.4)),
         button("Event", "From the activation to the end of the drive (e)", () => this.event()), button("All", "The whole run (0)", () => this.all())));
@@ -46,9 +46,9 @@ class ReplayPlots {
 
   #fill() {
     const shown = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
-    this.list.replaceChildren(...shown.map(({ element }) => element), shown.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen: press one above."));
+    this.list.replaceChildren(...shown.map(({ element }) => element), shown.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen. Press one above."));
     this.shown = shown;
-    this.width = 0; // what is new has not been drawn
+    this.width = 0; // new plots are not drawn yet
   }
 
   isPlotted = (name) => this.chosen.has(name);
@@ -59,7 +59,7 @@ class ReplayPlots {
     this.clock.redraw();
   }
 
-  /** Draw all that is shown, as wide as there is room. */
+  /** Draw all plots over the available width. */
   draw(colours) {
     const width = Math.floor(this.list.clientWidth);
     if (!width || (width === this.width && colours === this.colours)) return;
@@ -78,7 +78,7 @@ class ReplayPlots {
     for (const tick of ReplayData.ticks(from, to, Math.max(2, width / 110))) context.fillText(`${tick} s`, Math.min(width - 16, plot.x(tick, this.view)), 14);
   }
 
-  /** Show the time of the clock, or where one points; `now` in ms. */
+  /** Show the time of the clock, or under the pointer; `now` in ms. */
   show(now, isPlaying) {
     if (isPlaying) this.#keepInView(this.clock.t);
     const t = this.hovered ?? this.clock.t, isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
@@ -93,7 +93,7 @@ class ReplayPlots {
     this.#set(t, t + to - from);
   }
 
-  /** Look at a time without going there; null: at that of the clock. */
+  /** Preview a time without moving the clock; null: no preview. */
   #look(t) {
     this.hovered = t;
     this.clock.redraw();
@@ -110,7 +110,7 @@ class ReplayPlots {
     if (event.pointerType === "mouse" && !event.buttons) this.#look(this.#timeAt(event));
   }
 
-  /** A press goes to its time; dragged on, to those it passes; with Shift it moves the plots instead. */
+  /** Pressing and dragging sets the time; with Shift, dragging moves the plots. */
   #press(event) {
     const t = this.#timeAt(event);
     if (event.button || t === null || !event.target.closest(".room, .axis")) return;
@@ -130,7 +130,7 @@ class ReplayPlots {
     for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => over.abort(), { signal });
   }
 
-  /** With Ctrl, or two fingers, a wheel zooms where it points; sideways, or with Shift, it moves. Else it scrolls the page. */
+  /** The wheel zooms with Ctrl or two fingers, moves sideways or with Shift, and otherwise scrolls the page. */
   #wheel(event) {
     const aside = event.deltaX || (event.shiftKey ? event.deltaY : 0);
     if (event.ctrlKey) this.zoom(event.deltaY < 0 ? 0.5 : -0.5, this.#timeAt(event) ?? undefined);
@@ -143,7 +143,7 @@ class ReplayPlots {
     return this.view.from <= this.series.start && this.view.to >= this.series.end;
   }
 
-  /** Zoom in by so many steps (out: negative), around a time. */
+  /** Zoom in by a number of steps (out: negative) around a time. */
   zoom(steps, around = this.clock.t) {
     const { from, to } = this.view, { start, end } = this.series;
     const span = Math.min(end - start, Math.max(ReplayPlots.NARROWEST, (to - from) / ReplayPlots.FACTOR ** steps));
@@ -151,13 +151,13 @@ class ReplayPlots {
     this.#set(left, left + span);
   }
 
-  /** Move by a share of what is shown. */
+  /** Move by a share of the view. */
   pan(share) {
     const { from, to } = this.view, by = share * (to - from);
     this.#set(from + by, to + by);
   }
 
-  /** From when to when something happened in the drive, with a little room at both ends; null: nothing did. */
+  /** The time range of the drive's events, with a margin; null: no events. */
   get #event() {
     const { marks, active, start, end, tEnd } = this.series, until = ReplayData.until(this.series);
     const times = [...marks.map(([, t]) => t), ...(active ?? [])].filter((t) => t <= until);
@@ -166,7 +166,7 @@ class ReplayPlots {
     return [Math.max(start, first - margin), Math.min(end, last + margin)];
   }
 
-  /** Show what happened; nothing did: all. */
+  /** Show the events, or everything if there are none. */
   event() {
     this.#set(...(this.#event ?? [this.series.start, this.series.end]));
   }
@@ -175,7 +175,7 @@ class ReplayPlots {
     this.#set(this.series.start, this.series.end);
   }
 
-  /** Show the drive and a little of what came after it; of a long one only what happened. */
+  /** Show the drive and a short time after it; for a long drive, only the events. */
   begin() {
     const { start, end, tEnd } = this.series, until = tEnd === null ? end : Math.min(end, tEnd + 0.1 * (tEnd - start)), event = this.#event;
     if (event && event[1] - event[0] < (until - start) / 3) this.event();

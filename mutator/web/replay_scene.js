@@ -1,12 +1,12 @@
 "use strict";
-// A scene from above on a canvas: the faulty run solid, the golden run as an outline, and on the ground what happened where.
+// A scene from above on a canvas: the faulty run solid, the golden run as an outline, events marked on the ground.
 
 class ReplayScene {
   static SYMBOLS = { activation: "▲", manifest: "◆", alert: "!", hazard: "✕" };
-  static DASH = [3, 9]; // m of a dashed line and of its gaps
-  static POST = 20; // m between the posts at both sides of the road, by which one sees it move
-  static AT = 0.24; // share of the width at which the followed actor is
-  static ZOOM = [3, 17]; // pixels a metre, at least and at most
+  static DASH = [3, 9]; // m, dash and gap of a line
+  static POST = 20; // m between roadside posts, which make motion visible
+  static AT = 0.24; // position of the followed actor, as a share of the width
+  static ZOOM = [3, 17]; // pixels per metre, least and most
 
   constructor(tracks, series) {
     Object.assign(this, { tracks, series, end: ReplayData.until(series) });
@@ -34,14 +34,14 @@ class ReplayScene {
     if (this.impact && t >= this.series.tEnd - ReplayData.TINY) this.#burst(this.impact);
   }
 
-  /** A view of all that ever is to be seen. */
+  /** A view of everything in the run. */
   #whole() {
     const [left, right, low, high] = this.fixed;
     const scale = Math.min(this.width / ((right - left) * 1.08 || 1), this.height / ((high - low) * 1.2 || 1));
     return { scale, x: (left + right) / 2 - this.width / 2 / scale, y: (low + high) / 2 };
   }
 
-  /** A view that goes with the followed actor, as far ahead as there is something. */
+  /** A view that follows an actor and reaches as far ahead as there is something to see. */
   #following() {
     const own = this.tracks.followed("faulty", this.t), [least, most] = ReplayScene.ZOOM;
     const scale = Math.min(most, Math.max(least, ((1 - ReplayScene.AT) * this.width) / (this.tracks.reachAt(this.t) + 9)));
@@ -84,7 +84,7 @@ class ReplayScene {
     context.setLineDash([]);
   }
 
-  /** The ground that was driven over with the fault active, as a band. */
+  /** A band on the ground covered with the fault active. */
   #active() {
     const { active } = this.series;
     if (!active || this.t < active[0] || !this.pins.length) return;
@@ -94,10 +94,10 @@ class ReplayScene {
     this.context.fillRect(Math.max(0, from), this.height - 5, to - Math.max(0, from), 5);
   }
 
-  /** A mark where the followed actor was when it came: a line across, and its name at the foot. */
+  /** A mark at the followed actor's position during an event: a line across, and its name at the bottom. */
   #pin({ kind, x, label }, i) {
     const { context, colours, height } = this, at = this.#x(x);
-    if (at < 0 || at > this.width) return; // its name goes with it, or it would be cut
+    if (at < 0 || at > this.width) return; // drop its name, too: it would be cut
     context.strokeStyle = colours[kind] ?? colours.ink;
     context.lineWidth = 1.4;
     context.setLineDash(kind === "hazard" ? [] : [4, 3]);
@@ -121,8 +121,8 @@ class ReplayScene {
     context.fillText(text, x, y);
   }
 
-  /** Lay out the shape of an actor, `grow` pixels larger all around; or a part of it, from `back` to `front` and
-   *  `across` of its sides. */
+  /** Lay out an actor's shape, `grow` pixels larger on all sides; or a part, from `back` to `front` and
+   *  `across` of its width. */
   #shape({ actor, x, y, heading }, grow = 0, { back = -0.5, front = 0.5, across = 1 } = {}) {
     const { context, view } = this, long = actor.length * view.scale + 2 * grow, wide = Math.max(2, actor.width * view.scale) + 2 * grow;
     context.save();
@@ -147,7 +147,7 @@ class ReplayScene {
     context.lineWidth = 1;
     context.strokeStyle = colours.edge;
     context.stroke();
-    // a windscreen, by which one sees where it goes
+    // a windscreen shows the direction
     if (actor.shape !== "box" || actor.length > 4 * actor.width || actor.width * view.scale < 6) return;
     this.#shape(pose, 0, { back: 0.1, front: 0.26, across: 0.78 });
     context.fillStyle = colours.glass;
@@ -170,7 +170,7 @@ class ReplayScene {
     return Boolean(active) && this.t >= active[0] - ReplayData.TINY && this.t <= active[1] + ReplayData.TINY;
   }
 
-  /** The names of what is there; of what the controller believes, and of the golden run's followed actor, where they are when out of sight. */
+  /** The actors' names. What the controller believes, and the golden run's followed actor, also get a label when out of view. */
   #names(faulty, golden) {
     const { colours, width, view } = this;
     for (const pose of faulty) {
@@ -186,14 +186,14 @@ class ReplayScene {
     else if (x < 0) this.#label(`◀ golden ${by} m behind`, 8, y, colours.goldenText);
   }
 
-  /** The name of what the controller believes; out of sight ahead, how much free road it sees to there. */
+  /** The name of what the controller believes; if it is out of view ahead, with its distance. */
   #believed(pose, name, y, own) {
     const { colours, width } = this, by = own ? (pose.x - own.x - (pose.actor.length + own.actor.length) / 2).toFixed(0) : null;
     if (own && this.#x(pose.x - pose.actor.length / 2) > width) this.#label(`${name} ${by} m ahead ▶`, width - 8, y, colours.belief, "right");
     else this.#label(name, this.#x(pose.x), y, colours.belief, "center");
   }
 
-  /** A star where the drive ended. */
+  /** A star at the end of the drive. */
   #burst({ x, y }) {
     const { context, colours } = this, size = Math.min(28, Math.max(14, this.view.scale * 1.6));
     context.beginPath();

@@ -1,10 +1,10 @@
 "use strict";
-// Where the actors of a scene are in both runs of a series: the manifest's formulas over its channels.
+// The positions of a scene's actors in both runs of a series, from the manifest's formulas over its channels.
 
 class ReplayTracks {
-  static REACH = { least: 25, most: 150, spread: 1.5 }; // m ahead that are shown at least and at most; s over which that changes
+  static REACH = { least: 25, most: 150, spread: 1.5 }; // m shown ahead, least and most; s over which that changes
 
-  /** `scene` comes from the manifest (report/scenes.py); Error for one with a channel that the series lacks. */
+  /** `scene` comes from the manifest (report/scenes.py); throws an Error if the series lacks one of its channels. */
   constructor(scene, series) {
     this.scene = scene;
     this.t = series.channels.length ? ReplayData.steps(series) : [0];
@@ -14,14 +14,14 @@ class ReplayTracks {
     if (this.follow >= 0) this.reach = this.#reach();
   }
 
-  /** The channels of a run on one time axis. */
+  /** A run's channels on one time axis. */
   #values(run, series) {
     const values = { t: this.t };
     for (const channel of series.channels) values[channel.name] = channel.t === this.t ? channel[run] : this.#spread(channel, run);
     return values;
   }
 
-  /** A channel with fewer samples on the axis of the others: straight from one of its samples to the next. */
+  /** A channel with fewer samples, interpolated linearly onto the common axis. */
   #spread(channel, run) {
     return Array.from(this.t, (t) => {
       const i = ReplayData.index(channel.t, t), a = channel[run][i], b = channel[run][i + 1];
@@ -39,7 +39,7 @@ class ReplayTracks {
     return { ground, actors };
   }
 
-  /** How far the origin has come: the speed summed up; without a value it stands still. */
+  /** The origin's distance: the integrated speed; missing values count as standstill. */
   #ground(speed) {
     let sum = 0;
     return Array.from(speed, (v, i) => {
@@ -48,7 +48,7 @@ class ReplayTracks {
     });
   }
 
-  /** How far ahead of the followed actor the view must go, so smooth that zooming in and out is not felt. */
+  /** How far the view must reach ahead of the followed actor, smoothed so that zooming is not noticeable. */
   #reach() {
     const { least, most, spread } = ReplayTracks.REACH, { actors } = this.runs.faulty, own = actors[this.follow];
     const wanted = Array.from(this.t, (_, i) => this.#farthest(actors, own, i, least, most));
@@ -62,7 +62,7 @@ class ReplayTracks {
     return Math.max(least, ...ahead.filter((x) => x <= most));
   }
 
-  /** The two steps around a time, and how far it is from the first to the second. */
+  /** The two steps around a time, and its fraction between them. */
   #around(t) {
     const i = ReplayData.index(this.t, t), next = Math.min(i + 1, this.t.length - 1);
     const part = next === i ? 0 : Math.min(1, Math.max(0, (t - this.t[i]) / (this.t[next] - this.t[i])));
@@ -74,7 +74,7 @@ class ReplayTracks {
     return Number.isFinite(a) && Number.isFinite(b) ? a + (b - a) * part : a;
   }
 
-  /** The actors that are there at a time: {actor, x, y, heading}, metres of the world. */
+  /** The actors present at a time: {actor, x, y, heading}, in world metres. */
   at(run, t) {
     const near = this.#around(t);
     return this.runs[run].actors.flatMap(({ x, y, heading, visible }, k) => {
@@ -84,7 +84,7 @@ class ReplayTracks {
     });
   }
 
-  /** Where the actor is that the view stays with; what a run has no more stays where it was. */
+  /** The followed actor's position; an actor that disappeared keeps its last one. */
   followed(run, t) {
     const { x, y } = this.runs[run].actors[this.follow];
     let near = this.#around(t);
@@ -100,7 +100,7 @@ class ReplayTracks {
     return ReplayTracks.#between(line.across, this.#around(t));
   }
 
-  /** What a view that stays where it is must hold: [left, right, low, high] of all points and ways. */
+  /** The bounds of a fixed view: [left, right, low, high] of all points and tracks. */
   bounds(end) {
     const last = ReplayData.index(this.t, end), xs = [], ys = [];
     for (const line of this.scene.lines) for (const [x, y] of line.points) (xs.push(x), ys.push(y));
@@ -116,7 +116,7 @@ class ReplayTracks {
     return [least(xs), most(xs), least(ys), most(ys)];
   }
 
-  /** Where the followed actor touches, or comes nearest to, another one at a time; its own place where it is alone. */
+  /** Where the followed actor touches or is nearest to another at a time; its own position if it is alone. */
   contact(t) {
     const there = this.at("faulty", t), own = there.find(({ actor }) => actor.name === this.scene.follow) ?? there[0];
     if (!own || this.follow < 0) return own ?? null;

@@ -1,11 +1,11 @@
 "use strict";
-// The browsable part of the report: its parts made, tied to the state, and the keyboard.
+// The report's interactive part: creates its components, ties them to the state and handles keys.
 
 const Report = (() => {
-  const WIDE = "(min-width: 1000px)"; // room for the list beside an experiment, as report.css has it
+  const WIDE = "(min-width: 1000px)"; // room for list and experiment, as in report.css
   const find = (id) => document.getElementById(id);
 
-  /** The run folder as a command names it: where this page was opened from, if that is a disk. */
+  /** The run folder as commands name it; the page's location if it was opened from disk. */
   function runFolder() {
     const path = decodeURIComponent(location.pathname);
     const found = location.protocol === "file:" && /^(.*)\/report\/[^/]*$/.exec(path);
@@ -13,7 +13,7 @@ const Report = (() => {
     return /^[\w./-]+$/.test(found[1]) ? found[1] : `'${found[1].replaceAll("'", "'\\''")}'`;
   }
 
-  /** Make the parts of the page and tie them to its state. */
+  /** Create the page's components and tie them to its state. */
   async function start() {
     const data = await Packed.read("table");
     const given = JSON.parse(find("facts").textContent);
@@ -44,7 +44,7 @@ const Report = (() => {
     search.parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
   }
 
-  /** How many experiments a state leaves, and what it asks for in vain. */
+  /** The number of experiments that a state leaves, and the requests that it cannot meet. */
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
     const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;
@@ -52,18 +52,18 @@ const Report = (() => {
     return [found + listed, ...missing(table, state), ...table.unknown(state)].join(". ");
   }
 
-  /** What is said of an opened experiment that is not among those listed. */
+  /** The message for an open experiment that is not listed. */
   function missing(table, { experiment }) {
     if (table.of === table.count || !experiment || table.find(experiment) >= 0) return [];
-    return [`Experiment ${experiment} is not among the listed ones: mutator show ${experiment} --run ${runFolder()}`];
+    return [`Experiment ${experiment} is not listed here. Run mutator show ${experiment} --run ${runFolder()}`];
   }
 
-  /** What shows the state in all parts. */
+  /** The function that shows the state in all components. */
   function viewOf({ table, state, search, heat, filters, grid, columns, experiment }) {
     let drawn = null;
-    let scrolled = 0; // where the page stood before an experiment took its place
+    let scrolled = 0; // scroll position before an experiment was opened
 
-    /** Show the state. Rows are found and sorted again only when what they depend on has changed. */
+    /** Show the state. Rows are searched and sorted again only if their inputs changed. */
     function update() {
       const key = JSON.stringify([state.query, [...state.chosen].map(([n, v]) => [n, [...v]]), state.sort, state.heat, state.columns]);
       if (key !== drawn) {
@@ -79,7 +79,7 @@ const Report = (() => {
       arrange();
     }
 
-    /** The opened experiment beside the list, or over all of the page where the screen is narrow. */
+    /** Show the open experiment next to the list, or on the full page on a narrow screen. */
     function arrange() {
       const isOpen = Boolean(state.experiment), wasOpen = experiment.isOpen;
       if (isOpen && !wasOpen) scrolled = scrollY;
@@ -99,7 +99,7 @@ const Report = (() => {
     return { update, arrange, close };
   }
 
-  /** Links to filters work as a change of state, links to sections leave it alone. */
+  /** Links to filters change the state; links to sections do not. */
   function links(grid, close) {
     document.addEventListener("click", (event) => {
       const link = event.target.closest('a[href^="#"]');
@@ -112,7 +112,7 @@ const Report = (() => {
         find("experiments").scrollIntoView();
       } else if (find(to)) {
         event.preventDefault();
-        if (!find("experiments").contains(find(to))) close(); // an opened experiment stands in place of the other sections
+        if (!find("experiments").contains(find(to))) close(); // an open experiment replaces the other sections
         find(to).scrollIntoView();
         if (to === "grid") grid.focus();
       }

@@ -1,6 +1,6 @@
 "use strict";
-// The review page: groups found, shown and decided about. What is shown is kept in the address behind #, so that it can be
-// shared: #g=GROUP&q=words&state=new,changed&flag=1&diff=split
+// The review page: find, inspect and decide on groups. The address after # keeps the view, so that it can be shared:
+// #g=GROUP&q=words&state=new,changed&flag=1&diff=split
 
 const Review = (() => {
   const { el } = Dom;
@@ -12,14 +12,14 @@ const Review = (() => {
     constructor(data) {
       this.data = data;
       this.groups = new Map(data.groups.map((g) => [g.id, g]));
-      this.said = new Map(); // group id -> the timer of what its card says
+      this.said = new Map(); // group id -> timer of its card's message
       const actions = {
         mark: (ids, kind, text) => this.mark(ids, kind, text), show: (id) => this.#show(id), unfold: (id) => this.#unfold(id),
         resolve: (id, isMine) => this.#resolve(id, isMine),
       };
       this.cards = new Map(data.groups.map((g) => [g.id, new Card(g, data, actions)]));
       this.stacks = new Stacks(this.cards, { ...actions, mark: (ids, kind) => this.#ask(ids, kind) });
-      this.conflicts = new Map(); // group id -> the mark that was not kept
+      this.conflicts = new Map(); // group id -> mark that was not saved
       this.#read();
       this.#draw();
       this.#controls();
@@ -112,7 +112,7 @@ const Review = (() => {
     #draw() {
       for (const card of this.cards.values()) card.diff(this.mode);
       find("groups").append(...[...this.cards.values()].map((card) => card.element),
-        el("p.nothing.quiet", { id: "nothing", hidden: true }, "No group is like that."));
+        el("p.nothing.quiet", { id: "nothing", hidden: true }, "No group matches."));
     }
 
     #layout(mode) {
@@ -121,13 +121,13 @@ const Review = (() => {
       this.#apply();
     }
 
-    /** Show what is known now of groups; one that no longer fits the filter stays until the filter is changed. */
+    /** Update groups. A group that no longer matches the filter stays until the filter changes. */
     #changed(ids) {
       for (const id of ids) this.cards.get(id).update(this.marks.pending(id));
       this.#apply({ isKept: true });
     }
 
-    /** Do something about groups; false: it needs a name first. A single group's decision is taken back by the same again. */
+    /** Mark groups; false: a name is missing. Repeating a single group's decision takes it back. */
     mark(all, kind, text = "") {
       const outbox = this.data.served && this.marks;
       if (!outbox) return this.marks.mark(all, kind);
@@ -159,8 +159,8 @@ const Review = (() => {
     #conflict(id, words, item) {
       this.conflicts.set(id, item);
       const { decision, flag } = this.groups.get(id);
-      const other = decision ? `Meanwhile: ${Card.told(decision)}.` : flag ? `Meanwhile flagged by ${flag.by}.` : "Meanwhile the decision was taken back.";
-      this.cards.get(id).conflict(`${other} Your mark was not kept: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
+      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime flagged by ${flag.by}.` : "In the meantime the decision was taken back.";
+      this.cards.get(id).conflict(`${other} Your mark was not saved: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
       this.#say(id, "not saved", true);
       find("said").textContent = `${id}: ${words || other}`;
     }
@@ -178,17 +178,17 @@ const Review = (() => {
       this.cards.get(id).element.focus({ preventScroll: true });
     }
 
-    /** Approve or reject several groups after a question that says how many and in which states they are. */
+    /** Approve or reject several groups after a question that shows their number and states. */
     #ask(ids, kind) {
       if (!ids.length) return;
       const verb = Card.VERBS[kind][0], folded = ids.filter((id) => this.cards.get(id).element.hidden).length;
       const states = this.data.states.map((state) => [state, ids.filter((id) => this.groups.get(id).state === state).length]).filter(([, n]) => n);
-      const about = `Their states now: ${states.map(([state, n]) => `${n} ${state}`).join(", ")}.`
-        + (folded ? ` ${folded} of them ${folded === 1 ? "is" : "are"} folded under others like them.` : "");
+      const about = `Current states: ${states.map(([state, n]) => `${n} ${state}`).join(", ")}.`
+        + (folded ? ` ${folded} of them ${folded === 1 ? "is" : "are"} folded under similar groups.` : "");
       Question.ask(`${verb} ${plural(ids.length, "group")}?`, about, `${verb} ${ids.length}`, () => this.mark(ids, kind));
     }
 
-    /** Hide what is not asked for; `isKept`: what is shown stays, although it may fit no more. */
+    /** Hide groups that do not match; `isKept`: shown groups stay even if they no longer match. */
     #apply({ isKept = false } = {}) {
       const wanted = this.query.toLowerCase().split(/\s+/).filter(Boolean);
       const fits = (g) => (!this.states.size || this.states.has(g.state)) && (!this.isFlagged || g.flag)
@@ -227,7 +227,7 @@ const Review = (() => {
       if (this.cards.get(this.current)?.element.hidden) this.#show(first);
     }
 
-    /** Make a group the current one and bring it into view; one that is folded away is opened. */
+    /** Make a group current, unfold it and scroll it into view. */
     #show(id) {
       this.current = id;
       const { element } = this.cards.get(id);
@@ -250,7 +250,7 @@ const Review = (() => {
       if (event.ctrlKey || event.metaKey || event.altKey || find("help").open || find("ask").open) return;
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) {
         if (event.key === "Escape") {
-          event.preventDefault(); // a browser would empty the field to find in
+          event.preventDefault(); // a browser would clear the search field
           this.#leave(event.target);
         }
         return;
@@ -261,7 +261,7 @@ const Review = (() => {
       done();
     }
 
-    /** Out of a field, back to the current group. */
+    /** Leave a field and return to the current group. */
     #leave(field) {
       field.blur();
       this.cards.get(this.current)?.element.focus({ preventScroll: true });

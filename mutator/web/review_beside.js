@@ -1,48 +1,48 @@
 "use strict";
-// What the server knows beside a group, fetched when it comes into view: pictures, a typical experiment, changes.
+// The server's data on a group, fetched when it scrolls into view: images, a typical experiment, changes.
 
 const Beside = (() => {
   const { el } = Dom;
   const LEVELS = { least: "least", middle: "middle", most: "most severe" };
 
-  /** An address with the query of the page, and more of it. */
+  /** An address with the page's query and more parameters. */
   const query = (served, more = {}) => {
     const all = new URLSearchParams(served.query);
     for (const [name, value] of Object.entries(more)) all.set(name, value);
     return String(all) && `?${all}`;
   };
 
-  /** An error of the server in words. */
+  /** A server error as text. */
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** What the server answers; null: there is no such thing. */
+  /** The server's answer; null: not found. */
   async function get(address) {
     const response = await fetch(address, { headers: { accept: "application/json" } });
     if (response.ok) return response.json();
     if (response.status === 404) return null;
     const { error } = await response.json().catch(() => ({}));
-    throw new Error(error ? words(error) : `the server answers ${response.status}`);
+    throw new Error(error ? words(error) : `the server answered ${response.status}`);
   }
 
-  /** The picture as the target has it, and behind the effect, at up to three levels. */
+  /** The target's image before and after the effect, at up to three levels. */
   async function pictures(place, id, served) {
     const address = (name) => `/review/${encodeURIComponent(served.target)}/${id}/picture/${name}.jpg${served.query}`;
     const figure = (name, title, about) => {
-      const image = el("img", { src: address(name), alt: `Picture ${title} ${about}`.trim() });
-      const whole = el("a", { href: address(name), target: "_blank", rel: "noopener", title: "In full size" }, image);
+      const image = el("img", { src: address(name), alt: `Image ${title} ${about}`.trim() });
+      const whole = el("a", { href: address(name), target: "_blank", rel: "noopener", title: "Full size" }, image);
       const shown = el("figure", {}, whole, el("figcaption", {}, title, about ? el("span", {}, ` ${about}`) : ""));
-      image.addEventListener("error", () => whole.replaceWith(el("p.quiet.none", {}, "no picture")));
+      image.addEventListener("error", () => whole.replaceWith(el("p.quiet.none", {}, "no image")));
       return shown;
     };
     const found = await get(`${served.api}/${id}/pictures${served.query}`).catch((error) => error);
-    if (found instanceof Error) place.replaceChildren(el("p.quiet", {}, `No pictures: ${found.message}.`));
+    if (found instanceof Error) place.replaceChildren(el("p.quiet", {}, `No images: ${found.message}.`));
     else if (!found?.levels.length) place.hidden = true;
     else place.replaceChildren(figure("most-before", "before", ""),
       ...found.levels.map(({ name, label }) => figure(`${name}-after`, `after, ${LEVELS[name] || name}:`, label)));
   }
 
-  /** What the experiments of a group came to in a run, with links to a typical and the worst one. */
+  /** The results of a group's experiments in a run, with links to a typical and the worst one. */
   async function typical(place, id, served, run) {
     if (place.dataset.run === run) return;
     place.dataset.run = run;
@@ -50,7 +50,7 @@ const Beside = (() => {
     if (!run) return;
     place.replaceChildren(el("span.quiet", {}, "…"));
     const found = await get(`${served.api}/${id}/typical${query(served, { run })}`).catch((error) => error);
-    if (place.dataset.run !== run) return; // another one was chosen meanwhile
+    if (place.dataset.run !== run) return; // another run was chosen in the meantime
     if (found instanceof Error) place.replaceChildren(el("span.quiet", {}, `No typical experiment: ${found.message}`));
     else place.replaceChildren(...told(found, run));
   }
@@ -64,7 +64,7 @@ const Beside = (() => {
     return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
   }
 
-  /** Tell of each of `elements` once it comes near the screen. */
+  /** Report each of `elements` once, when it comes near the screen. */
   function nearby(seen, elements) {
     const observer = new IntersectionObserver((entries) => {
       for (const { isIntersecting, target } of entries) {

@@ -1,5 +1,5 @@
 "use strict";
-// A group as a card: what it is, what was decided, its diff and values, the remarks about it.
+// A group as a card: its place, decision, diff, values and remarks.
 
 class Card {
   static VERBS = { approve: ["Approve", "a"], reject: ["Reject", "r"] };
@@ -34,7 +34,7 @@ class Card {
       el("div.conflict", { role: "alert", hidden: true }),
       el("ul.what", {}, group.injections.map((text) => el("li", {}, Card.#injection(text)))),
       el("p.facts.quiet", {}, this.#facts()),
-      this.isServed && group.pictures ? el("div.pictures", { role: "group", "aria-label": "Pictures" }, el("p.quiet", {}, "Pictures are drawn …")) : null,
+      this.isServed && group.pictures ? el("div.pictures", { role: "group", "aria-label": "Images" }, el("p.quiet", {}, "Drawing images …")) : null,
       el("div.typical", { hidden: true }),
       el("details.since", { hidden: true }, el("summary", {}, "Changed since the decision"), el("div.content")),
       el("div.diffs"),
@@ -74,10 +74,10 @@ class Card {
         this.element.focus({ preventScroll: true });
       }
     };
-    return el("form.remark", { onsubmit: kept }, field, el("button", {}, "Keep remark"));
+    return el("form.remark", { onsubmit: kept }, field, el("button", {}, "Save remark"));
   }
 
-  /** Show what is known of the group now; `pending`: the kinds of its marks that are on their way. */
+  /** Show the group's current state; `pending`: the kinds of marks being sent. */
   update(pending = new Set()) {
     const { group } = this, header = this.#part("head");
     const state = header.querySelector(".state");
@@ -93,7 +93,7 @@ class Card {
     this.#remarks();
   }
 
-  /** Whether a button is down: by a mark on its way, else by what is decided and holds. */
+  /** Whether a button is pressed: by a mark being sent, else by a valid decision. */
   isMarked(kind, pending) {
     const { state, flag } = this.group;
     if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
@@ -101,14 +101,14 @@ class Card {
     return this.isServed && state === { approve: "approved", reject: "rejected" }[kind];
   }
 
-  /** What became of the last mark: `saving`, `saved 15:20`. */
+  /** The fate of the last mark: `saving`, `saved 15:20`. */
   say(text, isBad = false) {
     const kept = this.#part("head").querySelector(".kept");
     kept.textContent = text;
     kept.classList.toggle("bad", isBad);
   }
 
-  /** What another reviewer did meanwhile; null: nothing. `mine`: the kind of my mark that was not kept. */
+  /** Another reviewer's change in the meantime; null: none. `mine`: the kind of my mark that was not saved. */
   conflict(words, mine) {
     const { el } = Dom;
     const place = this.#part("conflict");
@@ -118,14 +118,14 @@ class Card {
       return;
     }
     const answer = (text, isMine) => el("button", { type: "button", onclick: () => this.actions.resolve(this.group.id, isMine) }, text);
-    place.replaceChildren(el("p", {}, words), el("p", {}, answer(`${Card.name(mine)} all the same`, true), " ", answer("Leave it as it is", false)));
+    place.replaceChildren(el("p", {}, words), el("p", {}, answer(`${Card.name(mine)} anyway`, true), " ", answer("Leave unchanged", false)));
   }
 
   static name(kind) {
     return { approve: "Approve", reject: "Reject", clear: "Take back", flag: "Flag", unflag: "Remove the flag", remark: "Remark" }[kind];
   }
 
-  /** A decision in a line: who, when, about which commit, what has changed since. */
+  /** A decision in one line: who, when, for which commit, and changes since. */
   static told(decision) {
     if (!decision) return "";
     const { verdict, by, at, text, commit, tool, changed } = decision;
@@ -134,7 +134,7 @@ class Card {
       changed.length ? `changed since: ${changed.join(", ")}` : ""].filter(Boolean).join("; ");
   }
 
-  /** A time as people write it, in their zone. */
+  /** A time in the user's format and zone. */
   static moment(text) {
     const at = new Date(text);
     if (!text || Number.isNaN(at.getTime())) return text || "";
@@ -148,7 +148,7 @@ class Card {
     list.replaceChildren(...remarks.map(({ by, at, text }) => el("li", {}, el("span.quiet", {}, `${by}${at ? `, ${Card.moment(at)}` : ""}: `), text)));
   }
 
-  /** The changes are fetched when they are opened, and again after each decision. */
+  /** Fetch the changes when they are opened, and again after each decision. */
   #since() {
     const since = this.#part("since"), isChanged = this.group.state === "changed";
     since.hidden = !isChanged;
@@ -167,14 +167,14 @@ class Card {
     renderDiff(this.#part("diffs"), this.group.diff, { mode });
   }
 
-  /** All that a group can be found by. */
+  /** The text that a group is found by. */
   get words() {
     const g = this.group;
     return [g.id, g.state, Card.told(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
       .join(" ").toLowerCase();
   }
 
-  /** `place: model(parameters)` with the model standing out. */
+  /** `place: model(parameters)` with the model emphasized. */
   static #injection(text) {
     const [, place, model, rest] = /^(.*): (\w+)(\(.*\).*)$/.exec(text) || [null, text, "", ""];
     return model ? [`${place}: `, Dom.el("span.model", {}, model), rest] : [place];
@@ -184,7 +184,7 @@ class Card {
     return Dom.el(`details${name}`, {}, Dom.el("summary", {}, title), content);
   }
 
-  /** The span of each hole that holds numbers: `: by - 245.0 to - 12.0`; a seed's says nothing. */
+  /** The range of each numeric hole: `: by - 245.0 to - 12.0`; without seeds. */
   static #spans(g) {
     const told = g.heads.slice(2).flatMap((head, i) => {
       const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);

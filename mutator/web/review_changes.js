@@ -1,12 +1,12 @@
 "use strict";
-// A diff of diffs: what a reviewer saw against what is there now, each line with a sign of its own and, in the part that
-// is a diff itself, the one it had there.
+// A diff of diffs: what a reviewer saw against the current state. Each line has a sign and, where the content is a diff,
+// that diff's sign, too.
 
 const Changes = (() => {
   const { el } = Dom;
   const KINDS = { "+": "added", "-": "removed", " ": "same" };
 
-  /** The rows of a unified diff without its two heads. */
+  /** The rows of a unified diff without its two header lines. */
   function rows(text) {
     const lines = text.split("\n");
     const first = lines.findIndex((line) => line.startsWith("@@"));
@@ -17,7 +17,7 @@ const Changes = (() => {
     });
   }
 
-  /** A line in colours; a sign that it begins with is that of the diff inside; `-- ` is a heading. */
+  /** A coloured line. A leading sign is that of the inner diff; `-- ` is a heading. */
   function inner(text) {
     const sign = /^[-+](?!-{1,2} |\+{2} )/.exec(text);
     return sign ? [el(`span.inner.${KINDS[sign[0]]}`, {}, sign[0]), ...Diff.coloured(text.slice(1))] : Diff.coloured(text);
@@ -28,7 +28,7 @@ const Changes = (() => {
     place.replaceChildren(text
       ? el("div.file", {}, el("div.scroll", { tabindex: 0, role: "region", "aria-label": "Changed since the decision" },
         el("table.diff.changes", {}, el("tbody", {}, rows(text)))))
-      : el("p.quiet", {}, "What the reviewer saw was not kept, so there is nothing to compare with."));
+      : el("p.quiet", {}, "What the reviewer saw was not saved, so it cannot be compared."));
   }
 
   return { render };

@@ -1,11 +1,11 @@
 "use strict";
-// Marks on a served page: each is sent as it is made. What the server has not confirmed waits here, through a reload and
-// through a server that is gone, and is sent again. Others' marks come in by asking every few seconds.
+// Sends each mark on a served page at once. Unconfirmed marks survive reloads and server restarts and are sent again.
+// Polls every few seconds for other reviewers' marks.
 
 class Outbox {
   static EVERY_MS = 5000;
-  static MOST = 200; // changes in one request
-  static OTHER = "its diff is another by now, load this page again";
+  static MOST = 200; // changes per request
+  static OTHER = "its diff has changed, so reload this page";
 
   /** `events`: changed(ids), kept(ids), refused(id, words), conflict(id, words, item), offline(words or ""). */
   constructor(served, groups, events) {
@@ -13,8 +13,8 @@ class Outbox {
     this.address = `${served.api}${served.query}`;
     this.key = `mutator-review ${this.address}`;
     this.queue = Outbox.#stored(this.key).filter((item) => groups.has(item.group));
-    this.sending = null; // the promise of the request on its way
-    this.isSingle = false; // one change a request, after a batch was refused
+    this.sending = null; // promise of the pending request
+    this.isSingle = false; // one change per request, after a batch was refused
     setInterval(() => this.poll(), Outbox.EVERY_MS);
     document.addEventListener("visibilitychange", () => document.hidden || this.poll());
     this.poll();
@@ -33,7 +33,7 @@ class Outbox {
     return new Set(this.queue.filter((item) => item.group === id).map((item) => item.kind));
   }
 
-  /** Put changes [{group, kind, text}] by a reviewer into the queue and send them. */
+  /** Queue a reviewer's changes [{group, kind, text}] and send them. */
   add(changes, by) {
     for (const change of changes) {
       const waiting = this.queue.find((item) => item.group === change.group);
@@ -50,11 +50,11 @@ class Outbox {
       if (this.queue.length) sessionStorage.setItem(this.key, JSON.stringify(this.queue));
       else sessionStorage.removeItem(this.key);
     } catch {
-      // no room: the marks are in this page alone
+      // storage is full: the marks are only in this page
     }
   }
 
-  /** What others have done since, and what waits here sent again. */
+  /** Fetch others' changes and resend what is waiting. */
   async poll() {
     if (document.hidden && !this.queue.length) return;
     if (this.sending) return;
@@ -64,14 +64,14 @@ class Outbox {
       return;
     }
     this.events.offline("");
-    if (!this.sending) this.#receive(answer.data.groups); // else older than what is being answered
+    if (!this.sending) this.#receive(answer.data.groups); // else outdated by the pending answer
     this.#flush();
   }
 
   #gone({ status }) {
     const waiting = this.queue.length ? ` ${this.queue.length === 1 ? "1 mark waits" : `${this.queue.length} marks wait`} in this tab and will be sent.` : "";
-    if (status === 403) return `The server does not know this page any more. Open the address that it printed in another tab, and leave this one open.${waiting}`;
-    return `The server does not answer${status ? ` as it should (${status})` : ""}.${waiting}`;
+    if (status === 403) return `The server no longer knows this page. Open the address that it printed in another tab, and keep this tab open.${waiting}`;
+    return `${status ? `Unexpected answer from the server (${status})` : "The server does not answer"}.${waiting}`;
   }
 
   async #ask(address, body) {
@@ -90,14 +90,14 @@ class Outbox {
     });
   }
 
-  /** Send what waits, one reviewer's marks at a time, until nothing does or the server is gone. */
+  /** Send waiting marks, one reviewer's at a time, until none are left or the server is unreachable. */
   async #send() {
     while (this.queue.length) {
       const by = this.queue[0].by;
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
       const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // the first mark's counts
-      const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the diffs that were shown
+      const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the shown diffs
       const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {
         this.events.offline(this.#gone(answer));
@@ -107,7 +107,7 @@ class Outbox {
     this.isSingle = false;
   }
 
-  /** Do what an answer asks for; false: there was none. */
+  /** Process an answer; false: there was none. */
   #answered({ status, data }, batch) {
     if (status === 200 && data?.groups) this.#saved(batch, data.groups);
     else if (status === 409 && data?.groups) this.#conflicted(batch, data);
@@ -130,7 +130,7 @@ class Outbox {
     this.events.kept([...new Set(batch.map((item) => item.group))]);
   }
 
-  /** Marks about groups that others have changed: told to the reviewer. The rest is sent again. */
+  /** Show the reviewer the marks on groups that others have changed, and resend the rest. */
   #conflicted(batch, { conflict, groups }) {
     const isOther = (item) => groups[item.group] && groups[item.group].digest !== item.digest;
     const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));
@@ -146,7 +146,7 @@ class Outbox {
     for (const item of lost) this.events.conflict(item.group, conflict, item);
   }
 
-  /** Whether the group is as the mark wants it: the answer that said so was lost. */
+  /** Whether the group already has the mark's state because an answer was lost. */
   static #isThere({ kind, by, text }, { state, decision, remarks, flag }) {
     if (kind === "approve" || kind === "reject") return decision?.by === by && state === { approve: "approved", reject: "rejected" }[kind];
     if (kind === "clear") return decision === null;
@@ -154,7 +154,7 @@ class Outbox {
     return Boolean(flag) === (kind === "flag");
   }
 
-  /** One of a batch was refused: each is sent alone, so that the others are kept. */
+  /** A batch was refused: send each mark alone, so that the others are saved. */
   #refused(batch, error) {
     if (batch.length > 1) {
       this.isSingle = true;
@@ -164,7 +164,7 @@ class Outbox {
     this.events.refused(batch[0].group, error);
   }
 
-  /** Take over what is known of the groups; `mine` are told as changed in any case. */
+  /** Take over the groups' state; always report `mine` as changed. */
   #receive(groups, mine = []) {
     const changed = new Set(mine);
     for (const [id, now] of Object.entries(groups)) {

@@ -4,7 +4,7 @@
 const Question = (() => {
   const find = (id) => document.getElementById(id);
 
-  /** Ask; `yes` is what the button for it says, `done()` is called when it is pressed. */
+  /** Ask; `yes` is the button's label, and `done()` is called when it is pressed. */
   function ask(title, about, yes, done) {
     const dialog = find("ask");
     find("ask-title").textContent = title;

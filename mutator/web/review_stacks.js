@@ -1,17 +1,17 @@
 "use strict";
-// Groups of one template in one function stand under the first of them, until they are opened.
+// Stacks groups of one template in one function under the first, until opened.
 
 class Stacks {
-  static LISTED = 6; // members that are named while a stack is closed
+  static LISTED = 6; // members named in a closed stack
 
   /** `cards`: group id -> Card, in the order of the page; `actions`: mark(ids, kind), unfold(id). */
   constructor(cards, actions) {
     Object.assign(this, { cards, actions });
-    this.open = new Set(); // the `like` of the opened ones
-    this.members = new Map(); // id of a first one -> ids of the others
+    this.open = new Set(); // the `like` of open stacks
+    this.members = new Map(); // first id -> ids of the others
   }
 
-  /** Put the groups that are shown (ids, in order) under the first of their kind; gives those to be seen. */
+  /** Stack the shown groups (ids, in order) under the first of their kind; returns the visible ones. */
   fold(shown) {
     this.members.clear();
     let first = null;
@@ -32,7 +32,7 @@ class Stacks {
     return this.open.has(this.cards.get(id).group.like);
   }
 
-  /** The first of the stack that a group is in, and the others. */
+  /** The first group of a group's stack, and the others. */
   of(id) {
     for (const [first, others] of this.members) if (first === id || others.includes(id)) return [first, ...others];
     return [id];
@@ -67,7 +67,7 @@ class Stacks {
     return others.length > lines.length ? [...lines, el("li.quiet", {}, `and ${others.length - lines.length} more`)] : lines;
   }
 
-  /** What tells texts apart: each without the words that all of them begin and end with. */
+  /** The distinguishing part of each text: without the words that all begin and end with. */
   static differences(texts) {
     const all = texts.map((text) => text.split(" ")), [first] = all;
     const shortest = Math.min(...all.map((words) => words.length));

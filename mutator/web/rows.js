@@ -1,8 +1,8 @@
 "use strict";
-// The results as columns: what is found, counted and sorted, for 100,000 experiments between two key strokes.
+// The results as columns. Search, counts and sorting handle 100,000 experiments between two keystrokes.
 
 const Rows = (() => {
-  /** What can be filtered by: column, title, and for cells with several values what stands between them. */
+  /** The filters: column, title, and for cells with several values their separator. */
   const FACETS = [
     { name: "kind", title: "Fault type" },
     { name: "module", title: "Module" },
@@ -26,9 +26,9 @@ const Rows = (() => {
   const COMPARISON = /^([a-z]\w*)(<=|>=|<|>|=)(.+)$/; // smallest_ttc<1, severity>=S2
   const COMPARED = { "<": (a, b) => a < b, "<=": (a, b) => a <= b, ">": (a, b) => a > b, ">=": (a, b) => a >= b, "=": (a, b) => a === b };
 
-  const number = (value) => (value === null ? NaN : Number(value)); // infinite ones are named
+  const number = (value) => (value === null ? NaN : Number(value)); // infinite values are strings
 
-  /** A column: `text(row)`, `number(row)` (NaN: empty), and `words` with `codes` where it has a dictionary. */
+  /** A column: `text(row)`, `number(row)` (NaN: empty), and `words` with `codes` if it has a dictionary. */
   function column({ name, words, codes, texts, numbers }) {
     if (numbers) {
       return { name, numbers, number: (row) => number(numbers[row]), text: (row) => (numbers[row] === null ? "" : String(numbers[row])) };
@@ -37,7 +37,7 @@ const Rows = (() => {
     return { name, words, codes, number: () => NaN, text: (row) => words[codes[row]] };
   }
 
-  /** A facet's values, and for each word of its column which of them it has. */
+  /** A facet's values, and which of them each word of its column has. */
   function facet(of, columns) {
     const found = columns.get(of.name);
     if (!found || !found.words) return null;
@@ -50,16 +50,16 @@ const Rows = (() => {
   class Table {
     constructor(data) {
       this.count = data.count;
-      this.checked = data.checked; // hazards that were looked for
+      this.checked = data.checked; // hazards checked for
       this.labels = data.labels; // of components
-      this.of = data.of || data.count; // experiments of the run: of a large one the worst are here
-      this.map = data.map || null; // of all experiments, where not all are here (report/whole_map.py)
+      this.of = data.of || data.count; // experiments of the run; a large run lists only the worst
+      this.map = data.map || null; // of all experiments, if not all are listed (report/whole_map.py)
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.byId = null;
       const status = this.columns.get("status");
       const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
-      // What says nothing about its fault is in no count.
+      // Experiments without a valid result are not counted.
       this.usable = (row) => !status || !unusable[status.codes[row]];
     }
 
@@ -68,7 +68,7 @@ const Rows = (() => {
       return found ? found.text(row) : "";
     }
 
-    /** What a text of a column is called: components by their labels. */
+    /** The display name of a column's text: components have labels. */
     called(name, text) {
       return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
     }
@@ -78,7 +78,7 @@ const Rows = (() => {
       return found ? found.number(row) : NaN;
     }
 
-    /** The row of an experiment, or of the only one whose id begins so; -1: none. */
+    /** The row of an experiment by id or unique prefix; -1: none. */
     find(id) {
       const ids = this.columns.get("experiment_id");
       this.byId ??= new Map(Array.from({ length: this.count }, (_, row) => [ids.text(row), row]));
@@ -87,7 +87,7 @@ const Rows = (() => {
       return begun.length === 1 ? this.byId.get(begun[0]) : -1;
     }
 
-    /** For each word or row of a searched column whether it has `token`; as a function of the row. */
+    /** A function of the row: does a searched column contain `token`? */
     #has(name, token) {
       const found = this.columns.get(name);
       if (!found) return null;
@@ -99,7 +99,7 @@ const Rows = (() => {
       return (row) => found.text(row).toLowerCase().includes(token);
     }
 
-    /** `smallest_ttc<1` as a function of the row; null: no comparison with a column. An empty cell fits `alerts=none` only. */
+    /** `smallest_ttc<1` as a function of the row; null: not a comparison with a column. An empty cell matches only `alerts=none`. */
     #comparison(token) {
       const [, name, sign, wanted] = COMPARISON.exec(token) || [];
       const found = this.columns.get(name), compare = COMPARED[sign];
@@ -109,7 +109,7 @@ const Rows = (() => {
       return (row) => found.text(row) !== "" && compare(found.text(row).toLowerCase(), wanted);
     }
 
-    /** Which rows have all words of `query`, in whatever column, and fit its comparisons; null: no query. */
+    /** The rows that have all words of `query` in any column and satisfy its comparisons; null: no query. */
     #searched(query) {
       const tokens = query.toLowerCase().split(/\s+/).filter(Boolean);
       if (!tokens.length) return null;
@@ -125,9 +125,9 @@ const Rows = (() => {
     }
 
     /**
-     * The rows that `query` and `chosen` (facet name -> set of values) leave.
-     * `counts` says of each facet's values how many rows there would be, the other facets as they are chosen;
-     * `apart` are the rows that fail at most in the facets of `free`: what a map over these counts.
+     * The rows that match `query` and `chosen` (facet name -> set of values).
+     * `counts` has the number of rows for each facet value, given the other facets' choices.
+     * `apart` has the rows that fail at most in the facets of `free`, which a map over these counts.
      */
     filter(query, chosen, free = []) {
       const found = this.#searched(query);
@@ -160,7 +160,7 @@ const Rows = (() => {
       return { rows, apart, counts: new Map(this.facets.map((f, i) => [f.name, counts[i]])) };
     }
 
-    /** What in a state names no column or filter, and filters none of whose values these results have; in sentences. */
+    /** Sentences on a state's unknown columns and filters, and on filters without a value in these results. */
     unknown({ query, chosen, unknown }) {
       const made = unknown.map((name) => `This page has no filter "${name}"`);
       for (const token of query.toLowerCase().split(/\s+/)) {
@@ -175,7 +175,7 @@ const Rows = (() => {
       return made;
     }
 
-    /** `rows` by a column: words by their alphabet, numbers by size, what is empty last; equal ones as they were. */
+    /** `rows` sorted by a column: text alphabetically, numbers by size, empty cells last; the sort is stable. */
     sort(rows, name, descending) {
       const found = this.columns.get(name);
       if (!found) return rows;

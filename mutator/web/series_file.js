@@ -1,25 +1,25 @@
 "use strict";
-// The series of experiments, format series/1: channels over time, golden and faulty. They lie in chunks beside the
-// report, in the folder series/ of the run, as scripts, since a page opened from a disk may load nothing else.
+// Reads the series of experiments (format series/1): channels over time, golden and faulty. Chunks are scripts in the
+// run's folder series/, because a page opened from disk can load only scripts.
 
 const SeriesFile = (() => {
-  const FOLDER = "../series/", CHUNKS = 6; // as many chunks are remembered
-  const waiting = new Map(); // name of a file -> what to do with its text
-  const chunks = new Map(); // name -> promise of its bytes, the last used one last
+  const FOLDER = "../series/", CHUNKS = 6; // CHUNKS: chunks kept in memory
+  const waiting = new Map(); // file name -> what to do with its text
+  const chunks = new Map(); // name -> promise of its bytes, most recently used last
   const goldens = new Map(); // entry -> promise of a golden run
   let index = null; // promise of it
-  const SIGN = 0x7fffffff, NONE = 0x7fc00000; // the bits of no value
+  const SIGN = 0x7fffffff, NONE = 0x7fc00000; // NONE: the bits of a missing value
 
-  /** What the files call, each with its own name. */
+  /** The function that each file calls with its name. */
   function loaded(name, text) {
     waiting.get(name)?.(text);
   }
 
-  /** The bytes that a file hands over; null where there is no such file, an error where it is damaged. */
+  /** The bytes of a file; null if it does not exist, an error if it is damaged. */
   function read(path, name) {
     return new Promise((resolve, reject) => {
       const script = document.createElement("script");
-      script.charset = "x-user-defined"; // a character for each byte
+      script.charset = "x-user-defined"; // one character per byte
       script.src = `${FOLDER}${path}.js`;
       const done = (what, value) => {
         waiting.delete(name);
@@ -41,16 +41,16 @@ const SeriesFile = (() => {
 
   async function inflated(bytes) {
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return new Response(stream).arrayBuffer(); // which also compares the checksum
+    return new Response(stream).arrayBuffer(); // also verifies the checksum
   }
 
-  /** Which entry is whose, and where each begins; null: nothing was packed. */
+  /** The entries' owners and positions; null: nothing was packed. */
   async function readIndex() {
     const bytes = await read("index", "index");
     if (!bytes) return null;
     const data = JSON.parse(new TextDecoder().decode(await inflated(bytes)));
-    if (data.schema !== "series/1") throw new Error(`series of the unknown schema ${data.schema}`);
-    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // else names that are numbers come first
+    if (data.schema !== "series/1") throw new Error(`unknown series schema ${data.schema}`);
+    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // numeric names would come first
     for (const [name, count] of data.chunks) {
       for (let at = 0, i = 0; i < count; i++) {
         const size = data.sizes[places.length];
@@ -78,8 +78,8 @@ const SeriesFile = (() => {
 
   const ordered = (word) => word ^ ((word >> 31) & SIGN);
 
-  /** A run, as store/series_format.py writes it: { about, t, every, rows, points }; `rows` are of the channels of
-   *  golden, each with a value at so many times as `every` says. */
+  /** A run as store/series_format.py writes it: { about, t, every, rows, points }. `rows` has a row for each channel
+   *  of golden; `every` gives its spacing in samples. */
   async function decoded(bytes, golden) {
     const raw = await inflated(bytes), view = new DataView(raw);
     const text = 4 + view.getUint32(0, true), about = JSON.parse(new TextDecoder().decode(new Uint8Array(raw, 4, text - 4)));
@@ -98,19 +98,19 @@ const SeriesFile = (() => {
       change(new Int32Array(rows[channel].buffer), words.subarray(at));
       at += rows[channel].length;
     }
-    if (words.length !== at + 2 * points.length) throw new Error("another number of values");
+    if (words.length !== at + 2 * points.length) throw new Error("the number of values does not match");
     const exact = new Float32Array(words.buffer, 4 * at);
     return { about, t, every, rows, points: points.map((channel, i) => ({ channel, t: own[more + i], golden: exact[i], faulty: exact[points.length + i] })) };
   }
 
-  /** Words whose first bytes come first, then all second ones, and so on. */
+  /** Words stored by byte: all first bytes, then all second ones, and so on. */
   function unplaned(planes) {
     const count = planes.length / 4, words = new Int32Array(count);
     for (let i = 0; i < count; i++) words[i] = planes[i] | (planes[count + i] << 8) | (planes[2 * count + i] << 16) | (planes[3 * count + i] << 24);
     return words;
   }
 
-  /** Golden's values, as bits, become those of the faulty run. */
+  /** Turn golden values, as bits, into those of the faulty run. */
   function change(bits, words) {
     for (let i = 0, step = 0, apart = 0; i < bits.length; i++) {
       step = (step + ((words[i] >>> 1) ^ -(words[i] & 1))) | 0;
@@ -119,7 +119,7 @@ const SeriesFile = (() => {
     }
   }
 
-  /** Golden and faulty of a channel on the same times, with the points between them. */
+  /** A channel's golden and faulty values at the same times, with the points in between. */
   function together(golden, run, channel) {
     const longer = run.t.length > golden.t.length ? run : golden, t = longer.t.filter((_, i) => i % golden.every[channel] === 0);
     const between = run.points.filter((p) => p.channel === channel), length = t.length + between.length;
@@ -154,7 +154,7 @@ const SeriesFile = (() => {
     };
   }
 
-  /** The two runs of a file of one experiment, which was driven again for it. */
+  /** The two runs in the file of one rerun experiment. */
   async function readKept(id) {
     const bytes = await read(`kept/${id}`, id);
     if (!bytes) return null;
@@ -163,8 +163,8 @@ const SeriesFile = (() => {
   }
 
   async function found(id, isNew) {
-    const there = JSON.parse(document.getElementById("facts").textContent).series; // what is not there is not asked for
-    if (isNew || there.kept.includes(id)) { // driven again for it, maybe since the others are damaged
+    const there = JSON.parse(document.getElementById("facts").textContent).series; // do not request missing files
+    if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
       const own = await readKept(id);
       if (own) return own;
     }
@@ -177,8 +177,8 @@ const SeriesFile = (() => {
     return shown(id, golden, await decoded(await bytesOf(places[entry]), golden));
   }
 
-  /** The series of an experiment; null where there is none. Rejects, with what to say, where it is damaged.
-   *  `isNew`: it may have been made since this page was written. */
+  /** The series of an experiment; null if there is none. Rejects with a message if it is damaged.
+   *  `isNew`: it may be newer than this page. */
   async function load(id, { isNew = false } = {}) {
     try {
       return await found(id, isNew);

@@ -1,5 +1,5 @@
 "use strict";
-// An experiment of a served report: what else would need a shell, as buttons.
+// Buttons on an experiment of a served report for actions that would otherwise need a shell.
 
 (() => {
   const { el } = Dom;
@@ -8,9 +8,9 @@
   if (!place || kind !== "runs") return;
   const run = decodeURIComponent(key);
   const facts = JSON.parse(document.getElementById("facts").textContent);
-  let shown = null; // the id of the experiment that has its buttons
+  let shown = null; // id of the experiment with buttons
 
-  /** The time that a still is of, unless another is given: where something happened. */
+  /** The default time of a still: that of an event. */
   function momentOf(experiment) {
     const at = (name) => experiment.table.number(experiment.row, name);
     const found = ["t_hazard", "t_manifest", "t_activation"].map(at).find((t) => !Number.isNaN(t));
@@ -30,17 +30,17 @@
     };
     const button = (text, title, ask) => el("button", { type: "button", title, onclick: () => order(ask()) }, text);
     const time = el("input", { type: "number", min: 0, step: "0.05", value: momentOf(experiment), "aria-label": "Time of the still, in seconds" });
-    const pictures = facts.filmed ? [button("Film", "Golden beside faulty, the whole drive", () => ({ kind: "film" })),
-      el("span.still", {}, button("Still", "A picture of that film", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
+    const pictures = facts.filmed ? [button("Film", "Golden and faulty runs, the whole drive", () => ({ kind: "film" })),
+      el("span.still", {}, button("Still", "One image of that film", () => ({ kind: "still", t: Number(time.value) })), " at ", time, " s")] : [];
     const made = el("section.do", { "data-id": id }, el("h3", {}, "Run it here"),
-      el("div.row", {}, button("Drive again", "Is the result the same?", () => ({ kind: "rerun" })),
-        button("Exact plot", "Drive it again and keep every step of its channels", () => ({ kind: "plot" })), pictures),
+      el("div.row", {}, button("Rerun", "Check that the result is the same", () => ({ kind: "rerun" })),
+        button("Exact plot", "Rerun and record every step of the channels", () => ({ kind: "plot" })), pictures),
       said, jobs);
     plot(id, made);
     return made;
   }
 
-  /** The exact plot, if it has been drawn. */
+  /** The exact plot, if it exists. */
   async function plot(id, place) {
     const link = (await Packed.read("media"))?.[id]?.plot;
     if (!link) return;
@@ -55,7 +55,7 @@
     Jobs.watch(own);
   }
 
-  /** What was asked for of the open experiment. */
+  /** The jobs of the open experiment. */
   function own(jobs) {
     const list = place.querySelector(".own-jobs");
     if (!list) return;

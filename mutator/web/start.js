@@ -1,5 +1,5 @@
 "use strict";
-// The forms of the first page: a single try of a fault, and a small campaign.
+// The forms of the first page: try a fault, and run a small campaign.
 
 (() => {
   const { el } = Dom;
@@ -10,7 +10,7 @@
   const select = (name, options, more = {}) => el("select", { name, ...more }, options);
   const labelled = (text, field, hint = "") => el("label", {}, el("span", {}, text), field, hint ? el("small.quiet", {}, hint) : null);
 
-  /** A form that becomes a job; `order(fields)` is what is asked of the server. */
+  /** A form that starts a job; `order(fields)` returns the request. */
   function form(title, about, fields, verb, order) {
     const said = el("p", { role: "status" }), button = el("button.main", {}, verb);
     const made = el("form.order", { "aria-label": title, onsubmit: sent }, el("h3", {}, title), el("p.quiet", {}, about), el("div.fields", {}, fields), el("p", {}, button), said);
@@ -42,14 +42,14 @@
     };
     const name = el("input", { name: "spec", list: "specs", required: true, autocomplete: "off", spellcheck: "false", placeholder: specs[0]?.name || "", oninput: fill });
     const time = el("input", { name: "time", type: "number", min: 0, step: "0.01", value: 10, "aria-label": "Time in seconds", hidden: true });
-    const trigger = select("trigger", [option("always"), option("time", "from a time on (s)"), ...contexts.map((c) => option(c.name, `${c.name}: ${c.condition}`))],
+    const trigger = select("trigger", [option("always"), option("time", "from a time (s)"), ...contexts.map((c) => option(c.name, `${c.name}: ${c.condition}`))],
       { onchange: () => (time.hidden = trigger.value !== "time") });
     fill();
-    return form("Try a fault", "Inject one fault and drive once: diff, verdict and plot.", [
+    return form("Try a fault", "Inject one fault and run it once: diff, verdict and plot.", [
       labelled("Fault", el("span", {}, name, el("datalist", { id: "specs" }, specs.map((spec) => option(spec.name))))),
       labelled("Variant", variants), labelled("Scenario", select("scenario", scenarios.map((s) => option(s)))),
       labelled("Trigger", el("span.two", {}, trigger, time)),
-      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[\\-+]?[0-9.]+([eE][\\-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: drawn"),
+      labelled("Value", el("input", { name: "value", inputmode: "decimal", pattern: "\\s*[\\-+]?[0-9.]+([eE][\\-+]?[0-9]+)?\\s*", title: "a number" }), "in the fault's unit; empty: random"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: 0"),
       readings.length > 1 ? labelled("Reading", select("reading", readings.map((r) => option(r)))) : null,
       targets.length > 1 ? labelled("Target", select("target", targets.map((t) => option(t)))) : null,
@@ -67,10 +67,10 @@
       name.value = `${campaign.value}-${two(now.getMonth() + 1)}${two(now.getDate())}-${two(now.getHours())}${two(now.getMinutes())}`;
     }
     suggest();
-    return form("Run a small campaign", "Some experiments of a campaign, spread over its plan.", [
+    return form("Run a small campaign", "A sample of a campaign's experiments, spread over its plan.", [
       labelled("Campaign", campaign),
       labelled("At most", el("input", { name: "limit", type: "number", min: 1, max: 1000, value: 20, required: true }), "experiments"),
-      labelled("Run folder", name, "beside the other runs"),
+      labelled("Run folder", name, "next to the other runs"),
       labelled("Only", el("input", { name: "only", placeholder: "scenario == \"S1\"", autocomplete: "off", spellcheck: "false" }), "a filter; empty: all"),
       labelled("Seed", el("input", { name: "seed", type: "number", min: 0, step: 1 }), "empty: the campaign's"),
     ], "Run it", (given) => ({

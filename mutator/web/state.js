@@ -1,16 +1,16 @@
 "use strict";
-// What is shown, kept in the address behind #, so that it can be shared and Back works:
+// The view's state, kept in the address after #, so that it can be shared and Back works:
 // #e=EXPERIMENT&q=words&kind=sensor%2Fshifted&scenario=S1,S2&sort=-t_hazard&heat=warned&cols=kind,delta_v
 
 class State {
-  /** `changed(state)` is called after every change, whoever made it. */
+  /** `changed(state)` is called after every change. */
   constructor(changed) {
     this.changed = changed;
     this.#read();
     addEventListener("popstate", () => this.#came());
   }
 
-  /** A link to a section (#tables) is none of ours: it leaves the state as it is. */
+  /** A link to a section (#tables) does not change the state. */
   static isOurs(fragment) {
     return fragment === "" || fragment.includes("=");
   }
@@ -29,7 +29,7 @@ class State {
       try {
         given.set(name, value.split(",").map(decodeURIComponent));
       } catch {
-        // a link cut short in its middle: what can be read of it counts
+        // a truncated link: use the readable part
       }
     }
     const one = (name, otherwise) => (given.get(name) || [otherwise])[0];
@@ -37,16 +37,16 @@ class State {
     this.query = one("q", "");
     this.sort = one("sort", "");
     this.heat = one("heat", "");
-    this.columns = (given.get("cols") || []).filter(Boolean); // of the list; none: those it has by itself
+    this.columns = (given.get("cols") || []).filter(Boolean); // of the list; none: the defaults
     this.chosen = new Map();
     for (const { name, none } of Rows.FACETS) {
       if (given.has(name)) this.chosen.set(name, new Set(given.get(name).map((value) => (value === "none" && none) || value)));
     }
     const known = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
-    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // what this page cannot show
+    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // not known to this page
   }
 
-  /** The fragment of this state; with `experiment` of the same with that one opened. */
+  /** The fragment of this state; with `experiment`, that experiment is open. */
   fragment(experiment = this.experiment) {
     const parts = [];
     const add = (name, values) => parts.push(`${name}=${values.map(encodeURIComponent).join(",")}`);
@@ -62,13 +62,13 @@ class State {
     return parts.join("&");
   }
 
-  /** Change something (`{query, sort, heat, columns, experiment}`); `replace`: a step too small for Back. */
+  /** Change the state (`{query, sort, heat, columns, experiment}`); `replace`: too small a step for Back. */
   set(change, { replace = false } = {}) {
     Object.assign(this, change);
     this.#write(replace);
   }
 
-  /** Choose exactly `values` of a facet; none: all. */
+  /** Choose exactly these values of a facet; none: all. */
   choose(facets, { replace = false } = {}) {
     for (const [name, values] of Object.entries(facets)) {
       if (values.length) this.chosen.set(name, new Set(values));
@@ -77,7 +77,7 @@ class State {
     this.#write(replace);
   }
 
-  /** Choose a value of a facet, or choose it no more. */
+  /** Toggle a value of a facet. */
   toggle(name, value) {
     const values = new Set(this.chosen.get(name) || []);
     if (!values.delete(value)) values.add(value);
@@ -90,7 +90,7 @@ class State {
     this.#write(false);
   }
 
-  /** What the list is sorted by: the worst first, unless a column was chosen. */
+  /** The list's sort order: worst first, unless a column was chosen. */
   get order() {
     return this.sort || "rank";
   }

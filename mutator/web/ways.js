@@ -1,5 +1,5 @@
 "use strict";
-// The control structure in the report: the numbers of the fault type that is chosen (report/path_drawing.py draws it).
+// Updates the report's control structure to the chosen fault type (report/path_drawing.py draws it).
 
 const Ways = (() => {
   const ALL = "all fault types", THIN = 1.8, WIDEST = 7;

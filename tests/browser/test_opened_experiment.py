@@ -19,7 +19,7 @@ WITHOUT_EVENTS = """() => {
 
 
 @pytest.mark.parametrize(
-    ("status", "said"), [("harness_error", "The harness failed"), ("crashed", "No event of it")]
+    ("status", "said"), [("harness_error", "The harness failed"), ("crashed", "No event was")]
 )
 def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
     page: "Page", status: str, said: str

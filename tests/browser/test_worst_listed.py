@@ -61,4 +61,4 @@ def test_an_experiment_that_is_not_listed_is_told(
     )
     other = next(name for name in ids if name not in listed)
     page.open(f"e={other}")
-    assert f"Experiment {other} is not among the listed ones: mutator show {other} --run" in page.found
+    assert f"Experiment {other} is not listed here. Run mutator show {other} --run" in page.found

@@ -249,7 +249,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
     assert answer.code == 1
     assert f"experiment {wrong['experiment_id']} is another one" in answer.err
     text = (run / "report/REPORT.md").read_text()
-    assert text.index("The proof failed") < text.index("12 experiments")
+    assert text.index("The equivalence check failed") < text.index("12 experiments")
     assert f"FAILED: experiment {wrong['experiment_id']}" in text
 
 

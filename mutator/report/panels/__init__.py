@@ -1,6 +1,6 @@
-"""The panels of every report, one module each; a new one is a module here and its line in `PANELS`.
+"""The panels of every report, one module each. To add one, add a module and its line in `PANELS`.
 
-A panel is made by a function from `ReportedRun` to `Panel`, or to None where there is nothing to say.
+A panel function maps `ReportedRun` to `Panel`, or to None if it has nothing to show.
 """
 
 from collections.abc import Callable
@@ -22,9 +22,9 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
 
 
 def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
-    """The page of a run's study: what it says of these results, tables and figures beside the published ones.
+    """The panels of the study's page: its own, then tables and figures next to the published ones.
 
-    Empty where the study has nothing to say: too few experiments, or none of its faults.
+    Empty if the study has nothing to say: too few experiments, or none of its faults.
     """
     said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
     if not said:

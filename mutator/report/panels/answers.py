@@ -1,4 +1,4 @@
-"""The first thing a report says: answers to what a reader asks first."""
+"""The first panel of a report: answers to a reader's first questions."""
 
 import re
 
@@ -34,7 +34,7 @@ _BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</
 
 
 def answers_panel(run: ReportedRun) -> Panel:
-    """The answers in one panel; those with wide tables have a column of the page to themselves."""
+    """The answers in one panel; answers with wide tables get their own column."""
     made = answers_of(run)
     parts = []
     for answer in made:
@@ -51,7 +51,7 @@ def _table(listing: Listing) -> Table:
 
 
 def _html(listing: Listing) -> Markup:
-    """The same with links and bars. Where a screen is too narrow for the heads, cells say what they are."""
+    """The table with links and bars. On narrow screens, cells carry their column's heading."""
     rows = [
         [
             _labelled(head, cell) if i else _cell(cell)
@@ -70,9 +70,7 @@ def _labelled(head: str, cell: Cell) -> str:
 
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Link):
-        text = Markup("<wbr>").join(
-            re.split(r"(?<=[/_])", cell.text)
-        )  # where a long name may go on in the next line
+        text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # a long name may break here
         return Markup('<a href="#{}">{}</a>').format(cell.to, text)
     if isinstance(cell, Part):
         return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)

@@ -1,4 +1,4 @@
-"""Runs that did not end well, harness errors first."""
+"""Runs that did not finish normally, harness errors first."""
 
 from collections.abc import Sequence
 
@@ -10,11 +10,11 @@ from mutator.outcomes.rows import Row, lines_of, row_from
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
-_HEADS = ("status", "experiment", "fault", "scenario", "what was said")
-LISTED, PAGE_LISTED = 30, 200  # runs that the Markdown and the page list; the page can find all
+_HEADS = ("status", "experiment", "fault", "scenario", "message")
+LISTED, PAGE_LISTED = 30, 200  # runs listed in Markdown and on the page; the page can find all
 _HTML = """\
-<h2>Runs that did not end well</h2>
-<p>A harness error says nothing about its fault and is in no count.</p>
+<h2>Runs that did not finish normally</h2>
+<p>A harness error says nothing about its fault, so no count includes it.</p>
 {{ table.as_html() }}
 {% if more > 0 %}
 <p>{{ more }} more: <a href="#status={{ failings | join(',') }}">all of them</a>.</p>
@@ -23,7 +23,7 @@ _HTML = """\
 
 
 def failed_panel(run: ReportedRun) -> Panel | None:
-    """What each of them said; None where all ended well."""
+    """The failed runs with their messages; None if there are none."""
     texts = run.texts[run.texts["status"] != Status.OK.value]
     if texts.empty:
         return None
@@ -34,7 +34,7 @@ def failed_panel(run: ReportedRun) -> Panel | None:
     return Panel(
         anchor="failed",
         link="Failed runs",
-        markdown=f"## Runs that did not end well\n\n{_markdown(failed, count)}",
+        markdown=f"## Runs that did not finish normally\n\n{_markdown(failed, count)}",
         html=rendered(_HTML, table=_linked(failed), more=count - PAGE_LISTED, failings=failings),
     )
 
@@ -47,7 +47,7 @@ def _markdown(failed: Sequence[Row], count: int) -> str:
 
 
 def _linked(failed: Sequence[Row]) -> Table:
-    """The table of the page: each experiment a link that opens it."""
+    """The page's table; each experiment links to its details."""
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format

@@ -24,12 +24,12 @@ _HTML = """\
 
 
 def figures_panel(run: ReportedRun) -> Panel | None:
-    """Figures of all results; None where there are none."""
+    """Figures of all results; None if there are none."""
     return _panel(drawings(run.frame), run)
 
 
 def study_figures(run: ReportedRun) -> Panel | None:
-    """The figures that the run's study adds; None where there are none."""
+    """The figures that the run's study adds; None if there are none."""
     return _panel(run.study.drawings(run), run) if run.study else None
 
 
@@ -48,6 +48,6 @@ def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
 
 
 def _embedded(path: Path) -> str:
-    """The figure itself as an address, so that the page needs no file beside it."""
+    """The figure as a data URL, which keeps the page self-contained."""
     svg = themed(path.read_text(encoding="utf-8"))
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -1,4 +1,5 @@
-"""The mutation score: what operators' mutants change in the closed loop; nothing of a run without them."""
+"""The mutation score: the share of operator mutants that change the closed loop. Empty for runs without
+operators."""
 
 from dataclasses import replace
 
@@ -23,7 +24,8 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The shares in total and by operator, those by function folded, with tables/mutation_score.csv."""
+    """The shares in total and by operator, with those by function folded; writes
+    tables/mutation_score.csv."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()
@@ -41,5 +43,5 @@ def score_panel(run: ReportedRun) -> Panel | None:
 
 
 def _part(score: Sheet, of_functions: bool) -> Sheet:
-    """The lines of functions, or those of everything else."""
+    """The lines of functions, or all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

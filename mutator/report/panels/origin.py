@@ -1,4 +1,4 @@
-"""Where results come from: how the experiments were run, and what they could be made again with."""
+"""Provenance: how the experiments were executed, and what is needed to reproduce them."""
 
 from mutator._common.tables import Table
 from mutator.campaigns.studies import study_problems
@@ -8,7 +8,7 @@ from mutator.review import gate
 from mutator.store.stretches import package_versions, told
 from mutator.verification.seal import seal_or_why_not
 
-PACKAGES = ("jinja2", "libcst", "numpy")  # what makes mutants and compares runs; run.json has all packages
+PACKAGES = ("jinja2", "libcst", "numpy")  # they build mutants and compare runs; run.json lists all packages
 _HTML = """\
 {% if engines %}
 <h2>How the experiments were run</h2>
@@ -57,14 +57,14 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def _study(run: ReportedRun) -> dict[str, str]:
-    """The study that the campaign asks for, and why this report may have nothing of it."""
+    """The study that the campaign asks for, and why this report may lack it."""
     name = run.folder.head.get("study")
     if not name:
         return {}
     if run.study and run.workspace:
         problems = study_problems(name, run.study, run.workspace)
-        silent = "" if run.compared else "; these results decide nothing of it"
+        silent = "" if run.compared else "; these results are not enough for it"
         why = f"; problem with its data (see `mutator check`): {problems[0].got}" if problems else silent
         return {"study": f"{name} ({run.study.about}){why}"}
-    why = "cannot be loaded here" if run.workspace else "needs a fault library, of which there is none here"
+    why = "cannot be loaded here" if run.workspace else "needs a fault library, and none is here"
     return {"study": f"{name}, which {why}"}

@@ -1,4 +1,5 @@
-"""How far faults got: the control structure with the share that got through each link, and the stops."""
+"""How far faults got: the control structure with the share that passed each link, and where faults
+stopped."""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,20 +12,20 @@ from mutator.report.studies import ReportedRun
 from mutator.web import plainly_embedded
 
 _ABOUT = (
-    "Of the faults that were active: how many came to the start of each link between components, and "
-    "how many got through, so that what is recorded behind it left the golden run."
+    "For active faults: how many reached the start of each link between components, and "
+    "how many got through, so that signals recorded after it differ from the golden run."
 )
-_NONE_STOPPED = "None: each fault that was active changed an actuator."
+_NONE_STOPPED = "None: every active fault changed an actuator."
 _HTML = """\
 <h2>How far faults got</h2>
 <p>{{ about }}</p>
 {% if figure %}
-<p class="quiet">The thicker a link, the more got through; it is dashed where none did, and thin where its
-end is not recorded. Dotted: feedback and people, on no path. Orange boxes: <strong>injected</strong> there.
-Green boxes: <strong>stopped</strong> are the faults that came to a component and did not get through, each
-counted once, however many links it came by; <strong>masked</strong> are those of them that changed no
-actuator, while the others got further by way of another component. A fault that two components stopped
-counts at both. A link filters the list to the experiments that got through it, a box to those masked
+<p class="quiet">Thicker links let more faults through. A dashed link let none through; a thin link has no
+recorded end. Dotted: feedback and people, which are on no path. Orange boxes: faults
+<strong>injected</strong> there. Green boxes: faults <strong>stopped</strong> there reached the component
+and got no further through it; each counts once, whatever its number of links. Those <strong>masked</strong>
+changed no actuator; the others got further through another component. A fault that two components stopped
+counts at both. Select a link to list the experiments that got through it, or a box to list those masked
 there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
@@ -45,7 +46,7 @@ there.</p>
 {% endfor %}
 </tbody></table></div></details>
 <h3>Where masked faults were stopped</h3>
-<p class="quiet">Each fault that changed no actuator counts once, at all the components that stopped it.</p>
+<p class="quiet">Each fault that changed no actuator counts once, under all components that stopped it.</p>
 {% if stops %}
 {{ stops.as_html("counts") }}
 {% else %}
@@ -55,7 +56,7 @@ there.</p>
 
 
 def paths_panel(run: ReportedRun) -> Panel | None:
-    """Links and components with their counts; None where no path is known."""
+    """Links and components with their counts; None if no path is known."""
     paths = run.paths
     counts = counts_by_fault_type(kinds(run.texts), run.seen.courses_of, paths) if paths else {}
     if paths is None or not counts:
@@ -86,7 +87,7 @@ Links = Mapping[str, tuple[str, str, str]]  # tail, tip, what it carries
 
 
 def _links(paths: FoundPaths) -> Links:
-    """The links that some path has, in the order of the structure."""
+    """The links that occur in some path, in the structure's order."""
     crossings = {c.link: c for course in paths.courses for c in course.crossings}
     structure = paths.ways.structure
     known = structure.links if structure else {}
@@ -110,8 +111,8 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
-    """A line for each fault type, the total last; a column for each component, or several, that stopped
-    masked faults. None where no fault was masked."""
+    """One line for each fault type, the total last, and one column for each set of components that stopped
+    masked faults. None if no fault was masked."""
     ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
     if not ends:
         return None

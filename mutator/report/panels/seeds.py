@@ -1,4 +1,4 @@
-"""How far the seeds of a campaign lie apart; nothing of a run with one seed."""
+"""How much results vary between a campaign's seeds. Empty for runs with one seed."""
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
@@ -21,7 +21,7 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The spread of each share between the seeds, with tables/seeds.csv and seeds_by_fault_type.csv."""
+    """The spread of each share between seeds; writes tables/seeds.csv and seeds_by_fault_type.csv."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None

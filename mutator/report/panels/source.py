@@ -1,4 +1,4 @@
-"""The source, line by line, coloured by the worst outcome of its mutants; only where operators made some."""
+"""The source by line, coloured by the worst outcome of its mutants. Only for runs with operators."""
 
 import io
 import keyword
@@ -14,7 +14,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile
 from mutator.report.studies import ReportedRun
 
-_SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # in a mark, beside its colour
+_SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # shown next to a mark's colour
 _MEANINGS = dict(
     zip(
         ENDINGS,
@@ -22,18 +22,18 @@ _MEANINGS = dict(
         strict=True,
     )
 )
-_LISTED = 20  # lines that Markdown has
+_LISTED = 20  # lines listed in Markdown
 _ABOUT = (
-    "Functions in which faults were injected. Each line has what came of its permanent mutants and, beside "
-    "it, of its transient ones: the worst outcome, and how many of the mutants there came to it. A mutant "
-    "counts by the worst of its drives; a harness error counts nowhere."
+    "Functions with injected faults. Each line shows the worst outcome of its permanent mutants and, next to "
+    "it, of its transient ones, with the number of mutants that reached it. A mutant counts by its worst "
+    "experiment; harness errors do not count."
 )
 _HTML = """\
 <h2>Source</h2>
 {% if why %}
 <p>{{ why | marked }}</p>
 {% else %}
-<p>{{ about }} A mark lists its experiments, a line's number those of both.</p>
+<p>{{ about }} Select a mark to list its experiments, or a line number to list those of both marks.</p>
 <p class="legend">{% for ending, sign in signs.items() %}
 <span><span class="ending {{ ending }}">{{ sign }}</span> {{ meanings[ending] }}</span>
 {% endfor %}
@@ -61,7 +61,7 @@ _CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STR
 
 
 def source_panel(run: ReportedRun) -> Panel | None:
-    """Each file with faults, the worst one open."""
+    """Each file with faults; the worst one is open."""
     source = run.source
     if source is None:
         return None
@@ -87,7 +87,7 @@ def _told(file: MarkedFile) -> str:
 
 
 def _worst(files: Sequence[MarkedFile]) -> Table:
-    """The lines with the worst endings, for Markdown."""
+    """The lines with the worst outcomes, for Markdown."""
     found = [
         (min(ENDINGS.index(mark.ending) for mark in here.values()), number, line, here)
         for number, file in enumerate(files)
@@ -137,12 +137,12 @@ def _mark(mark: Mark, line: int, place: str, lasting: str) -> Markup:
 
 
 def _query(place: str, *more: str) -> str:
-    """The fragment that searches the list of experiments (web/state.js)."""
+    """The URL fragment that searches the list of experiments (web/state.js)."""
     return f"q={quote(' '.join((f'line={place}', *more)), safe='')}"
 
 
 def _coloured(file: MarkedFile) -> list[Markup]:
-    """The lines of a file as HTML, in the colours that diffs have."""
+    """The lines of a file as HTML, in the colours of diffs."""
     made, done = [Markup("")] * len(file.lines), [0] * len(file.lines)
     for line, start, end, name in _parts(file):
         text, begin = file.lines[line], max(start, done[line])
@@ -152,7 +152,7 @@ def _coloured(file: MarkedFile) -> list[Markup]:
 
 
 def _parts(file: MarkedFile) -> Iterator[tuple[int, int, int, str]]:
-    """What has a colour of its own, in the order of the source: line (from 0), first and last column."""
+    """The coloured parts in source order: line (from 0), first and last column."""
     for token in tokenize.tokenize(io.BytesIO(file.data).readline):
         name = _CLASSES.get(token.type, "")
         if token.type == tokenize.NAME and keyword.iskeyword(token.string):

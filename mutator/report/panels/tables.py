@@ -1,4 +1,4 @@
-"""Counts and statistics of a run as tables; the statistics are files of their own, too."""
+"""Counts and statistics of a run as tables. Statistics are also written as files."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -20,12 +20,12 @@ from mutator.store.run_folder import RunFolder
 
 FOLDER = "tables"  # of the report
 NOTES = (
-    "*Injected* counts the experiments that say something about their fault; a harness error, or a mutant "
-    "that could not be made, is counted apart. *Activated*: an injected statement ran while triggered. "
+    "*Injected*: experiments with a valid result. Harness errors and invalid mutants are counted "
+    "separately. *Activated*: an injected statement ran while triggered. "
     "*Manifested*: an actuator output then differed from the fault-free run."
 )
-NO_ALERT = " *Hazard, no alert*: no counted alert at all, before or after the hazard."
-FAULT_FREE = "The golden runs: first times of alerts and hazards, and how far each plotted channel goes."
+NO_ALERT = " **Hazard, no alert*: no counted alert, before or after the hazard."
+FAULT_FREE = "The golden runs: first times of alerts and hazards, and the range of each plotted channel."
 _GROUPS = (
     ("By fault type", "fault type", kinds),
     ("By scenario", "scenario", itemgetter("scenario")),
@@ -60,14 +60,14 @@ _HTML = """\
 
 
 def notes(folder: RunFolder) -> str:
-    """What the heads of the counts mean."""
+    """What the headings of the counts mean."""
     note = f" {folder.stop_note}" if folder.stop_note else ""
     return NOTES + (NO_ALERT + note if folder.has_alerts else "")
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """Counts by fault type, scenario and method, then what statistics say of them; statistics that stand
-    beside published ones are on the page of the study."""
+    """Counts by fault type, scenario and method, then statistics. Statistics with published counterparts are
+    on the study's page."""
     runs = run.fault_free()
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)
@@ -93,14 +93,14 @@ def tables_panel(run: ReportedRun) -> Panel:
 
 
 def published_panel(run: ReportedRun) -> Panel | None:
-    """The statistics of a run beside those that its study published; None where there are none."""
+    """The run's statistics next to those that its study published; None if there are none."""
     note = own_alerts(run.fault_free())
     published = run.study.published(run) if run.study else None
     sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
     if not sheets:
         return None
     write_sheets(sheets, run.out)
-    title = "Tables beside the published ones"
+    title = "Tables next to the published ones"
     markdown = "\n\n".join([f"## {title}", *(f"#{sheet.markdown().rstrip()}" for sheet in sheets)])
     html = rendered(_HTML, title=title, counts=(), fault_free=None, sheets=sheets)
     return Panel(anchor="tables", link="Tables", markdown=markdown, html=html)
@@ -117,13 +117,13 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
 
 
 def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
-    """What can be compared by method and scenario, beside published counts if there are some."""
+    """Statistics by method and scenario, next to published counts if there are any."""
     alerts = run.seen.alerts if run.folder.has_alerts else None
     return run_sheets(run.frame, published, alerts, run.ends())
 
 
 def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
-    """How bad the runs were: severity, times to the hazard, metrics."""
+    """How bad the runs were: severity, times to hazard, metrics."""
     made = (
         severity_sheet(run.frame),
         tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
@@ -133,7 +133,7 @@ def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:
-    """The sheet; where it counts alerts, with a note on those of the fault-free runs."""
+    """The sheet; if it counts alerts, with a note on those of fault-free runs."""
     words = (sheet.title, *sheet.heads, *(line[0] for line in sheet.lines))
     if not note or not any("alert" in str(word).lower() for word in words):
         return sheet
@@ -141,13 +141,13 @@ def _noted(sheet: Sheet, note: str) -> Sheet:
 
 
 def write_sheets(sheets: Sequence[Sheet], out: Path) -> None:
-    """Write each table into `out`/tables as <name>.csv and <name>.md."""
+    """Write each table as `out`/tables/<name>.csv and <name>.md."""
     for sheet in sheets:
         write_csv(sheet, out)
         write_atomic(out / FOLDER / f"{sheet.name}.md", sheet.markdown().encode())
 
 
 def write_csv(sheet: Sheet, out: Path) -> None:
-    """Write a table into `out`/tables as <name>.csv."""
+    """Write a table as `out`/tables/<name>.csv."""
     (out / FOLDER).mkdir(parents=True, exist_ok=True)
     write_atomic(out / FOLDER / f"{sheet.name}.csv", sheet.csv().encode())

@@ -105,7 +105,7 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
     """Three of four hazards had no alert before: two none at all, one an alert too late."""
     answer = said["unwarned"]
     assert answer.says == (
-        "3 of 4 hazards (75 %) were silent, that is, no alert came before: 2 with no alert at all, 1 with an "
+        "3 of 4 hazards (75 %) were silent (no alert came before): 2 with no alert at all, 1 with an "
         "alert only after the hazard."
     )
     assert [line[2] for line in answer.listings[0].lines] == ["1", "1"]
@@ -215,8 +215,8 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
     answer = said["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 "
-        "whose trigger never held, so that the golden run's result stands. Median 8.00 s, longest 64.00 s. "
-        "No times are kept of checks, golden runs and proof."
+        "whose trigger never held, so the golden run's result was used. Median 8.00 s, longest 64.00 s. "
+        "Checks, golden runs and the equivalence check are not timed."
     )
     [first, *_] = answer.listings[0].lines
     assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))

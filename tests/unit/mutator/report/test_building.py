@@ -34,7 +34,7 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
     """It is listed first among the runs that ended badly, and is in no count of faults."""
     text = building.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
-    failed = text.split("## Runs that did not end well")[1]
+    failed = text.split("## Runs that did not finish normally")[1]
     assert failed.index("harness_error") < failed.index("crashed")
     assert "the disk \\| is &lt;gone>" in failed
     counts = text.split("## By fault type")[1].split("##")[0]
@@ -152,7 +152,7 @@ def test_what_runs_that_stop_have_not_seen_is_told(run: Path) -> None:
     (run / "run.json").write_text(json.dumps(HEAD | stops))
     written = building.write(run, None)
     assert written.markdown.read_text().count(STOP_NOTE) == 3
-    assert f"counted in each. {STOP_NOTE}" in written.markdown.read_text()
+    assert f"counts in each. {STOP_NOTE}" in written.markdown.read_text()
     assert STOP_NOTE in written.page.read_text()
 
 

@@ -92,7 +92,7 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
     assert told is not None
     ways = dict(told.table.rows)
     assert list(ways.values()) == ["1"] * 4
-    assert "a fork of the golden run, taken right before the fault is first active" in ways
+    assert "a fork of the golden run, just before the fault is first active" in ways
     assert any("cannot be forked: its golden run has <two> threads" in way for way in ways)
 
 
@@ -131,7 +131,7 @@ def record_ids(run: Path) -> list[str]:
             "3 of 4 experiments came out the same on the reference engine, byte for byte. The rest",
             "not finished: 3 of 4 same",
         ),
-        (None, "there is nothing to prove. Forking pays off from 40 experiments on.", "none needed"),
+        (None, "no equivalence check is needed. Forking pays off from 40 experiments.", "none needed"),
     ],
 )
 def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
@@ -151,7 +151,7 @@ def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
-    assert told.proof.endswith("so there is nothing to prove.")
+    assert told.proof.endswith("so no equivalence check is needed.")
 
 
 def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
@@ -161,7 +161,7 @@ def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
     build(run)
     written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
-        assert text.index("The proof failed") < text.index("experiments are planned")
+        assert text.index("The equivalence check failed") < text.index("experiments are planned")
         assert f"FAILED: experiment {record_ids(run)[0]} is another one" in text
         assert "How the experiments were run" in text
     assert "its golden run has &lt;two&gt; threads" in written.page.read_text()

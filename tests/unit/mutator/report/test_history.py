@@ -36,7 +36,7 @@ def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
     written = write_history(folder)
     text = written.markdown.read_text()
     assert written.runs == 2
-    assert "before to after: 1 new hazard, 1 gone, 0 ended otherwise, of 3 shared." in text
+    assert "before to after: 1 new hazard, 1 gone, 0 changed otherwise, of 3 shared." in text
     assert f"`mutator compare {folder / 'before'} {folder / 'after'}`" in text
     assert text.index("| after |") < text.index("| before |"), "the newest run is first"
     assert "| 1970-01-01 02:00 | - | 3 of 3 | 1 of 3 activated | - | 1 of 1 |" in text
