@@ -126,7 +126,7 @@ def test_two_reviewers_do_not_overwrite_each_other_unseen(
     second.wait_for_selector(f"#group-{group} .conflict:visible")
     assert "approved by Jane" in second.inner_text(f"#group-{group} .conflict")
     assert load_review(library, "toycar").decision(group).by == "Jane"  # type: ignore[union-attr]
-    second.click("text=Reject all the same")
+    second.click("text=Reject anyway")
     saved(second, group)
     first.wait_for_selector(f"#group-{group} .decision:text('rejected by Jim')")
 
