@@ -1,7 +1,6 @@
 """Compile-time fault injection for driving controllers: from fault specs to verdicts.
 
-The names of `__all__` are the public API, described in docs/reference/api.md; each is imported when it is
-first used.
+The names in `__all__` are the public API. Each is imported on first use.
 """
 
 from importlib import import_module
@@ -47,7 +46,7 @@ if TYPE_CHECKING:
 
 __version__ = VERSION
 
-# module -> names; pandas, libcst and pytest are not paid for by who only wants the version
+# module -> names: `import mutator` stays fast because it does not load pandas, libcst or pytest
 _HOMES = {
     "mutator.api.audits": ("Audit", "verify"),
     "mutator.api.caches": ("cache_entries", "cache_folder", "clear_caches", "prune_caches"),

@@ -1,9 +1,9 @@
-"""Errors a user can mend, and the exit codes of every command."""
+"""Errors that users can fix, and the exit codes of all commands."""
 
 from pathlib import Path
 from typing import Any
 
-_LONGEST = 2000  # characters of a part of an error
+_LONGEST = 2000  # characters of each part of an error
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
 EXIT_WRONG_INPUT = 2
@@ -11,12 +11,11 @@ EXIT_HARNESS_ERRORS = 3
 
 
 class MutatorError(Exception):
-    """Something the user can mend: shown in one piece, without a traceback.
+    """An error that the user can fix, shown without a traceback.
 
-    `where` is the file at fault, `line` its line when known; `got` what was found there and `expected` what
-    would be right; `remedy` what to do. `argument` names the argument of the API at fault instead of a file;
-    in the remedy of such an error `names` in backquotes are arguments, too. The command line shows the
-    options that they stand for.
+    `where` is the file at fault and `line` its line, if known. `got` is what was found, `expected` what would
+    be valid, `remedy` what to do. For a wrong argument of the API, `argument` names it instead of a file, and
+    `names` in backquotes in the remedy are arguments too; the command line shows the matching options.
     """
 
     exit_code = EXIT_WRONG_INPUT  #: exit code of a command that ends with this error
@@ -63,11 +62,11 @@ class MutatorError(Exception):
 
 
 class MutatorWarning(UserWarning):
-    """Something that the user should know although nothing failed: shown in one line."""
+    """A warning for the user, shown in one line."""
 
 
 def _short(text: str) -> str:
-    """The text, cut where nobody reads on: what is wrong may be megabytes long."""
+    """Cut the text: an invalid value may be megabytes long."""
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 
@@ -76,6 +75,6 @@ def _rebuild(cls: type[MutatorError], got: str, state: dict[str, Any]) -> Mutato
 
 
 class CheckFailed(MutatorError):
-    """A check said no: the campaign does not start, or a comparison is beyond its bounds."""
+    """A check failed: a campaign cannot start, its results are not valid, or a gate found something."""
 
     exit_code = EXIT_CHECK_FAILED  #: exit code of a command that ends with this error

@@ -1,4 +1,4 @@
-"""The public Python API behind `import mutator`: what the command line does is a call of what is here.
+"""The public Python API behind `import mutator`, which the command line also calls.
 
-Nothing here prints, asks or ends the process; that is left to who calls.
+Nothing here prints, asks questions or ends the process.
 """

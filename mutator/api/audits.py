@@ -1,4 +1,4 @@
-"""Audits: does a run folder hold what was found, and does it all follow from its plan and sources?"""
+"""Audits: check that a run folder is unchanged and follows from its plan and sources."""
 
 import re
 from collections.abc import Mapping
@@ -20,15 +20,15 @@ from mutator.verification.repairing import repair as put_aside
 from mutator.verification.seal import seal_of
 from mutator.workspace import Workspace
 
-SHOWN = 20  # differences that the page lists
+SHOWN = 20  # differences listed on the page
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Audit:
-    """What an audit of a run folder found.
+    """The result of an audit of a run folder.
 
-    `facts` say what was audited, `checks` what was looked at, `seal` is computed from the content (None: not
-    finished, or not verifiable), `repaired` says what was put aside.
+    `facts` describe the run, `checks` list what was checked, `seal` is computed from the content (None: not
+    finished, or not verifiable), `repaired` lists what was set aside.
     """
 
     run: Path  #: the run folder
@@ -41,7 +41,7 @@ class Audit:
         return f"<Audit of {self.run.name}: {self._outcome}>"
 
     def __str__(self) -> str:
-        """One page to be printed or attached."""
+        """Return one page to print or attach."""
         width = max(map(len, self.facts))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
         table = Table(heads=("checked", "of", "differences"), rows=rows, right=(1, 2))
@@ -63,7 +63,7 @@ class Audit:
 
     @property
     def differences(self) -> tuple[MutatorError, ...]:
-        """Everything that is not as it should be, each once."""
+        """All differences, without duplicates."""
         found = (difference for check in self.checks for difference in check.differences)
         return tuple({str(difference): difference for difference in found}.values())
 
@@ -81,11 +81,12 @@ def verify(
     repair: bool = False,
     workspace: WorkspaceLike = None,
 ) -> Audit:
-    """Audit the run folder at `run`, finished or not, also one that does not open any more.
+    """Audit the run folder at `run`, finished or not, even if it no longer opens.
 
-    `rerun` experiments, drawn by lot, are driven again on the reference engine. `expect` is the seal that the
-    run must have. With `repair` what is damaged is put aside, so that the same `run` fills the gap. Without
-    it nothing is written. MutatorError when `run` is no run folder, or its run.json cannot be read.
+    `rerun` randomly drawn experiments are rerun on the reference engine. `expect` is the seal that the run
+    must have. With `repair`, damaged parts are set aside, so that running the campaign again in this folder
+    redoes them; otherwise nothing is written. MutatorError if `run` is not a run folder or its run.json
+    cannot be read.
     """
     check_whole("rerun", rerun)
     if expect is not None:
@@ -110,7 +111,7 @@ def verify(
 
 
 def _workspace(given: WorkspaceLike) -> Workspace | None:
-    """The workspace; None where none is named and none is found."""
+    """Open the workspace; None if none is given and none is found."""
     try:
         return open_workspace(given)
     except MutatorError:
@@ -120,10 +121,10 @@ def _workspace(given: WorkspaceLike) -> Workspace | None:
 
 
 def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
-    """Drive some again; which, joins the facts."""
+    """Rerun some experiments, and add their ids to the facts."""
     what = "experiments driven again on the reference engine"
     if workspace is None:
-        raise MutatorError("no library here", argument="rerun", expected="the sources of the run")
+        raise MutatorError("no library found", argument="rerun", expected="the sources of the run")
     try:
         ids = drawn(folder, count)
     except MutatorError as err:
@@ -133,7 +134,7 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
 
 
 def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
-    """The seal; None where content is missing that it stands for."""
+    """Compute the seal; None if content that it covers is missing."""
     try:
         return seal_of(folder)
     except (MutatorError, OSError):
@@ -143,7 +144,7 @@ def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
 
 
 def _facts(folder: RunFolder) -> dict[str, str]:
-    """What is audited, and what it was made with."""
+    """Describe the run, and what it was made with."""
     head: Any = folder.head
     packages = package_versions(folder.stretches)
     return {

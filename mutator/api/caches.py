@@ -1,4 +1,4 @@
-"""What is kept on this machine from one run to the next; results never depend on it."""
+"""The caches on this machine; results never depend on them."""
 
 from mutator._common.caches import clear as clear_caches
 from mutator._common.caches import entries as cache_entries

@@ -1,4 +1,4 @@
-"""Campaigns: run, resumed."""
+"""Run and resume campaigns."""
 
 import warnings
 from pathlib import Path
@@ -14,7 +14,7 @@ from mutator.store.run_folder import RunFolder
 
 
 class IncompleteRun(UserWarning):
-    """A run ended before all of its experiments had a result, or with harness errors."""
+    """Warning: a run ended with unfinished experiments or harness errors."""
 
 
 def run(
@@ -31,20 +31,23 @@ def run(
     progress: Notify | None = None,
     workspace: WorkspaceLike = None,
 ) -> Run:
-    """Run a campaign (a name of the library or a file) into the run folder `out`, or resume it there.
+    """Run a campaign (a name in the library, or a file) in the run folder `out`, or resume it there.
 
-    What has a result is not run again. A plan that is frozen in `out` is used as it is: choices that are not
-    given are the frozen ones. `workers` is the number of processes (0: this one alone), `engine` a name of
-    `mutator.engines.kinds` (None: the fastest that is worth it). With `reviewed` nothing runs that has no
-    approval. With `accept_versions` a run goes on with another Python or other packages than before, which it
-    notes. With `cluster` (the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file)
-    the workers of that cluster do the work, and `workers` only drive the checks before it. A scheduler that
-    others on the network can reach is refused, unless `insecure_network`. `progress` is called about twice a
-    second, from another thread.
+    Experiments that have a result are not rerun. If `out` holds a frozen plan, the run uses it; choices that
+    you do not give are the frozen ones.
 
-    `Run.summary` says what this call came to. Harness errors, a full disk or an interruption end in an
-    IncompleteRun warning; the same call then goes on. MutatorError for wrong input; CheckFailed when
-    something is not approved, and when the checks before the campaign or the equivalence check fail.
+    * `workers`: number of processes; 0: only this one.
+    * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
+    * `reviewed`: refuse to run mutants without an approval.
+    * `accept_versions`: resume with another Python or other packages than before, and note it.
+    * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. The
+      workers of that cluster run the experiments; `workers` only serve the checks before.
+    * `insecure_network`: accept a scheduler that others on the network can reach.
+    * `progress`: called about twice a second, from another thread.
+
+    `Run.summary` describes the result of this call. Harness errors, a full disk or an interruption end in an
+    IncompleteRun warning; the same call then resumes the run. MutatorError for invalid input; CheckFailed if
+    an approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
     check_whole("workers", workers)
     if choices is not None:
@@ -76,4 +79,4 @@ def _what_is_left(summary: Summary) -> str:
         parts.append(summary.problem)
     if summary.interrupted:
         parts.append("interrupted")
-    return "; ".join(parts) + "; the same call goes on"
+    return "; ".join(parts) + "; the same call resumes the run"

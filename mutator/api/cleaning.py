@@ -1,4 +1,4 @@
-"""What `mutator clean` calls: a run folder is deleted whole, or left alone."""
+"""Deletion of run folders, for `mutator clean`: completely, or not at all."""
 
 from mutator.store.cleaning import check
 from mutator.store.cleaning import clean as delete

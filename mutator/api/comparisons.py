@@ -1,4 +1,4 @@
-"""Two runs of the same faults compared, as pandas frames."""
+"""Comparison of two runs of the same faults, as pandas frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from mutator.errors import MutatorError
 if TYPE_CHECKING:
     import pandas as pd
 
-SHOWN = 3  # tables that a notebook shows: how they ended, what changed, rates
+SHOWN = 3  # tables shown in a notebook: endings, changes, rates
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunComparison:
-    """Two runs, matched experiment by experiment; `comparison` has all that is known of the pairs."""
+    """Two runs, matched experiment by experiment; `comparison` has all details."""
 
     comparison: Comparison  #: all that is known of the pairs
 
@@ -46,45 +46,47 @@ class RunComparison:
 
     @property
     def files_text(self) -> str:
-        """Which of the target's files differ, in words."""
+        """A text that says which of the target's files differ."""
         return pages.files_text(self.comparison)
 
     @property
     def not_compared(self) -> dict[str, int]:
-        """Why experiments could not be compared, and how many."""
+        """Reasons why experiments could not be compared, with counts."""
         return dict(pages.reasons(self.comparison))
 
     @property
     def changes(self) -> dict[str, int]:
-        """How many pairs show each kind of change."""
+        """Number of pairs with each kind of change."""
         return {change.value: len(self.comparison.having(change)) for change in Change}
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":
-        """A row for each experiment that both runs have; columns of the runs end in `_a` and `_b`.
+        """One row for each experiment that both runs have; columns of the runs end in `_a` and `_b`.
 
-        The columns of pairs.csv: ids, fault, scenario, method, trigger, `changes` (as in `Gate`, with
-        semicolons between them), endings, and times in s of simulation since its start.
+        The columns are those of pairs.csv: ids, fault, scenario, method, trigger, `changes` (as in `Gate`,
+        separated by semicolons), endings, and times in s since the start of the simulation.
         """
         return _frame(self.comparison.pairs)
 
     @cached_property
     def changed(self) -> "pd.DataFrame":
-        """Those of them whose result changed, new hazards first."""
+        """The rows of `pairs` whose result changed, new hazards first."""
         return _frame(self.comparison.changed)
 
     @cached_property
     def tables(self) -> "dict[str, pd.DataFrame]":
         """The tables by name: endings, changes, and rates and times with paired statistics.
 
-        A share of n is five columns: count, of, rate and both ends of its interval.
+        A share takes five columns: count, of, rate and both ends of its interval.
         """
         return {sheet.name: sheet.frame() for sheet in self.comparison.sheets}
 
     def findings(self, gates: Sequence[Gate | str]) -> tuple[Finding, ...]:
-        """The experiments that a gate fails on, in the order of the gates: `("new-hazard", "severity:S2")`.
+        """Return the experiments that fail a gate, in the order of `gates`, e.g. `("new-hazard",
+        "severity:S2")`.
 
-        MutatorError for an unknown gate, and for one of severity where a run has no classes."""
+        MutatorError for an unknown gate, and for a severity gate if a run has no severity classes.
+        """
         known = [gate.value for gate in Gate]
         if strangers := [gate for gate in gates if gate not in known]:
             raise MutatorError(
@@ -93,18 +95,18 @@ class RunComparison:
         return comparing.findings(self.comparison, [Gate(gate) for gate in gates])
 
     def write(self, out: str | Path | None = None) -> pages.Written:
-        """Write page, Markdown and CSV into `out`; default: report/compare-<first run> of the second run."""
+        """Write page, Markdown and CSV into `out`; default: report/compare-<first run> in the second run."""
         a, b = self.comparison.a, self.comparison.b
         default = b.folder.path / "report" / f"compare-{a.name}"
         return pages.write(self.comparison, default if out is None else Path(out))
 
 
 def compare(a: Run | str | Path, b: Run | str | Path, *, only: str | None = None) -> RunComparison:
-    """Compare two runs, experiment by experiment, `a` being before and `b` after.
+    """Compare two runs, experiment by experiment: `a` is before, `b` after.
 
-    Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
-    `only` is a filter over what is known of them before running. MutatorError when none has a partner;
-    CheckFailed when the equivalence check of a run failed.
+    Experiments are matched by fault, value, scenario and trigger; target, reading and settings may differ.
+    `only` is a filter over the experiments' planned properties. MutatorError if no experiments match;
+    CheckFailed if the equivalence check of a run failed.
     """
     runs = [one if isinstance(one, Run) else load_run(one) for one in (a, b)]
     first, second = map(known_alerts_note, runs)

@@ -1,4 +1,4 @@
-"""One experiment to look at: what was injected, what became of it, golden against faulty."""
+"""One experiment: what was injected, the verdict, golden and faulty run."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class TraceFrames:
-    """Golden and faulty run as pandas frames: a column per channel, by time in s.
+    """Golden and faulty run as pandas frames: one column per channel, indexed by time in s.
 
-    `attrs["units"]` of a frame has the units of the channels that the manifest names.
+    `attrs["units"]` of a frame maps the channels that the manifest names to units.
     """
 
     golden: "pd.DataFrame"  #: the golden run
@@ -36,14 +36,14 @@ class TraceFrames:
 
     @property
     def difference(self) -> "pd.DataFrame":
-        """Faulty less golden, at the times that both runs have."""
+        """Faulty minus golden, at the times that both runs have."""
         times = self.golden.index.intersection(self.faulty.index)
         return self.faulty.loc[times].astype(float) - self.golden.loc[times].astype(float)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ExperimentResult(ABC):
-    """An experiment and its record; `record` is None before it was run."""
+    """An experiment and its record; `record` is None until the experiment has run."""
 
     experiment: Experiment  #: the experiment
     record: Record | None  #: its record; None before it has run
@@ -71,7 +71,7 @@ class ExperimentResult(ABC):
 
     @property
     def fault(self) -> Fault:
-        """What was injected."""
+        """The injected fault."""
         return self.experiment.fault
 
     @property
@@ -86,42 +86,43 @@ class ExperimentResult(ABC):
 
     @property
     def outcome(self) -> Outcome | None:
-        """What the fault did; None unless the run ended well."""
+        """The effect of the fault; None unless the run ended normally."""
         return self.record.outcome if self.record else None
 
     @property
     def status(self) -> Status | None:
-        """Whether the experiment itself worked; None before it was run."""
+        """Whether the experiment itself worked; None until it has run."""
         return self.record.status if self.record else None
 
     @property
     def ending(self) -> str:
-        """The outcome, or the status of what did not end well: `hazard`, `crashed`, `not run`."""
+        """The outcome, or the status if the run did not end normally: `hazard`, `crashed`, `not run`."""
         return str(self.outcome or self.status or "not run")
 
     @property
     def verdict(self) -> dict[str, Any]:
-        """What became of it, as plain data; times in s of simulation, None: did not happen."""
+        """The verdict as plain data; times in s of simulation, None: did not happen."""
         return verdict(self.record, self.scale) if self.record else {"status": None}
 
     @property
     @abstractmethod
     def scale(self) -> Scale | None:
-        """What makes a class of severity of its contact; None for a target without."""
+        """The scale that maps a contact to a severity class; None for a target without one."""
 
     @property
     @abstractmethod
     def patch(self) -> str:
-        """The whole patch, probe included."""
+        """The whole patch, including the probe."""
 
     @property
     def diff(self) -> str:
-        """The source diff for reading: without the probe, which every mutant gets."""
+        """The source diff without the probe, for reading."""
         return readable(self.patch)[0]
 
     def propagation(self) -> "pd.DataFrame":
-        """The channels that left golden, by name, the earliest first: component, role, unit, when first
-        (`t_first`, s) and by how much up to the end of the drive (`max_dev`). Empty before it was run."""
+        """Return the channels that differ from golden, earliest first: name (index), component, role, unit,
+        time of the first difference (`t_first`, s), largest difference up to the end of the drive
+        (`max_dev`). Empty until the experiment has run."""
         import pandas as pd
 
         facts = {name: (component, role, unit) for name, unit, role, component, _ in self._channels()}
@@ -131,7 +132,7 @@ class ExperimentResult(ABC):
         return pd.DataFrame(rows, columns=heads).set_index("channel")
 
     def plot(self) -> "Figure":
-        """Golden against faulty, a panel for each channel of the manifest, with marks for what happened."""
+        """Plot golden and faulty run, one panel for each channel of the manifest, with marks for events."""
         golden, faulty = self._load_traces()
         facts = describe(self.experiment)
         title = f"{facts['fault']}   {facts['scenario']}   {facts['trigger']}   [{self.id}]"
@@ -150,9 +151,9 @@ class ExperimentResult(ABC):
 
 
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
-    """A trace by time in s; `attrs["units"]` has the units of the channels that the manifest names.
+    """Return a trace as a frame by time in s; `attrs["units"]` has the units of the manifest's channels.
 
-    A channel with times of its own keeps its newest value.
+    A channel with its own times keeps its newest value.
     """
     import pandas as pd
 
@@ -166,7 +167,7 @@ def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
 
 
 def describe(experiment: Experiment) -> dict[str, Any]:
-    """What the experiment is, for people and as JSON."""
+    """Describe the experiment, for printing and as JSON."""
     fault, trigger = experiment.fault, experiment.trigger
     hold = fault.hold or trigger.hold
     return {
@@ -184,9 +185,9 @@ def describe(experiment: Experiment) -> dict[str, Any]:
 
 
 def verdict(record: Record, scale: Scale | None) -> dict[str, Any]:
-    """What became of it, for people and as JSON. Times in s of simulation; None: did not happen.
+    """Return the verdict, for printing and as JSON. Times in s of simulation; None: did not happen.
 
-    `largest_difference` is that of the whole run, `difference_in_drive` up to the end of the drive.
+    `largest_difference` covers the whole run, `difference_in_drive` only the time up to the end of the drive.
     """
     activation = record.activation
     return {

@@ -7,9 +7,9 @@ from mutator.report.history import History
 
 
 def write_history(folder: str | Path) -> History:
-    """Write HISTORY.md and history.html into a folder of run folders: what each of them found, and what
+    """Write HISTORY.md and history.html into a folder of run folders: the results of each run, and what
     changed from one run of a plan to the next. The run folders are only read.
 
-    MutatorError where the folder holds no run with results.
+    MutatorError if the folder holds no run with results.
     """
     return history.write_history(Path(folder))

@@ -1,4 +1,4 @@
-"""Small pieces of HTML that notebooks show."""
+"""HTML fragments for notebooks."""
 
 from collections.abc import Iterable
 from html import escape
@@ -9,18 +9,18 @@ _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 
 
 def facts_html(facts: Iterable[tuple[str, object]]) -> str:
-    """Names and values as a table of two columns; what is None is left out."""
+    """Return names and values as a table of two columns; leaves out None."""
     rows = [[name, str(value)] for name, value in facts if value is not None]
     return str(Table(heads=("", ""), rows=rows).as_html())
 
 
 def text_html(text: str) -> str:
-    """A paragraph."""
+    """Return a paragraph."""
     return f"<p>{escape(text)}</p>"
 
 
 def diff_html(patch: str) -> str:
-    """A unified diff with its lines in colours."""
+    """Return a unified diff with coloured lines."""
     return f"<pre>{''.join(map(_line, patch.splitlines()))}</pre>"
 
 

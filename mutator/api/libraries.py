@@ -1,4 +1,4 @@
-"""A library made, checked and analysed, and the machine that is to use it."""
+"""Create, check and analyse a library, and check the machine."""
 
 import os
 from collections.abc import Sequence
@@ -29,13 +29,14 @@ from mutator.workspace import Workspace
 
 
 def init_library(folder: str | Path, *, target: str | PathLike[str] | None = None) -> Path:
-    """Write a fault library to edit into a new or empty folder, which is returned.
+    """Write a fault library to edit into a new or empty folder, and return the folder.
 
-    With `target`, the folder of a controller's source or `installed:NAME`, it is a first library for that
+    `target` is a controller's source folder or `installed:NAME`. With it, write a first library for that
     controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
-    never imported. Without it, library and templates are copies of what ships with mutator.
-    MutatorError for a folder that holds anything, and for a target that is not there; MutatorWarning for a
-    target in which nothing looks like a controller.
+    never imported. Without `target`, copy the library and templates that ship with mutator.
+
+    MutatorError for a folder that is not empty and for a missing target; MutatorWarning if nothing in the
+    target looks like a controller.
     """
     if target is None:
         write_library(Path(folder))
@@ -45,24 +46,25 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
 
 
 def unfilled_places(folder: str | Path) -> list[MutatorError]:
-    """The places of a library's folder that are still to be filled in."""
+    """Return the places in a new library that you still have to fill in."""
     return list(unfilled(Path(folder)))
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:
-    """Write a target's manifest of an older schema anew, as one of today's; all that did not change stays.
+    """Rewrite a target's manifest of an older schema in the current one; unaffected lines stay.
 
-    None for a manifest of today's schema, which is left alone. `lost` of the answer are comments within what
-    had to be written anew. MutatorError for a file that is no manifest, which stays as it is.
+    Returns None for a current manifest, which stays unchanged. `lost` of the result lists comments inside
+    rewritten lines. MutatorError for a file that is not a manifest, which also stays unchanged.
     """
     upgrade = manifest_files.upgrade_manifest(Path(path))
     if upgrade is not None:
-        write_atomic(Path(path).resolve(), upgrade.text.encode())  # what a link leads to
+        write_atomic(Path(path).resolve(), upgrade.text.encode())  # keep a symbolic link
     return upgrade
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:
-    """Every problem of library, templates and target, in the order of the files; empty when all is well.
+    """Return every problem of library, templates and target, in the order of the files; empty if there is
+    none.
 
     `target` names a manifest; default: the library's only one.
     """
@@ -73,10 +75,10 @@ def check_library(workspace: WorkspaceLike = None, *, target: str | None = None)
 def find_places(
     where: str, workspace: WorkspaceLike = None, *, target: str | None = None
 ) -> list[ListedPlace]:
-    """Where faults can be injected in a file of the target, or (`FILE::FUNCTION`) in one of its functions:
-    line, anchor and fault models of each place, from the top of the file to its end.
+    """Return the places where faults can be injected in a file of the target, or in a function
+    (`FILE::FUNCTION`): line, anchor and fault models of each, from top to bottom.
 
-    MutatorError for a file in which no fault may be, and for a function that it does not have.
+    MutatorError for a file that must not get faults, and for an unknown function.
     """
     found = open_workspace(workspace)
     manifest = found.manifest(found.target_name(target))
@@ -92,13 +94,13 @@ def check_target(
     drive: bool = False,
     scenarios: Sequence[str] = (),
 ) -> list[Finding]:
-    """What a target and its faults have to tell before a campaign: what keeps them from being forked, and
-    draws that nothing uses.
+    """Check a target and its faults before a campaign: what keeps them off the fork engines, and draws that
+    nothing uses.
 
-    With `drive` golden runs are driven, of these `scenarios` (default: those of the library's campaigns, or
-    all), which tell whether the target is deterministic and the likely cause if it is not, statements of
-    faults and triggers that no run comes to, and canaries that do no harm. `target` names a manifest;
-    default: the library's only one. MutatorError for a library with problems, which `check_library` lists.
+    With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all).
+    The findings then say whether the target is deterministic, with the likely cause if not; which statements
+    of faults and triggers no run reaches; and which canaries do no harm. `target` names a manifest; default:
+    the library's only one. MutatorError for a library with problems, which `check_library` lists.
     """
     found = open_workspace(workspace)
     name = found.target_name(target)
@@ -111,7 +113,7 @@ def check_target(
 def check_hazard_analysis(
     workspace: WorkspaceLike = None, *, target: str | None = None
 ) -> list[MutatorError]:
-    """Every gap and contradiction of the hazard analysis, in the order of the files; empty: all is well.
+    """Return every gap and contradiction of the hazard analysis, in the order of the files.
 
     `target` names a manifest; default: the library's only one. MutatorError for a library without analysis.
     """
@@ -122,15 +124,15 @@ def check_hazard_analysis(
 
 
 def draw_control_structure(workspace: WorkspaceLike = None) -> str:
-    """The control structure of the hazard analysis as SVG. MutatorError for a library without analysis."""
+    """Draw the control structure of the hazard analysis as SVG; MutatorError for a library without one."""
     return draw(_analysis(workspace))
 
 
 def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
-    """Can this machine run campaigns? Looks at interpreter, packages, machine, library and target.
+    """Check whether this machine can run campaigns: interpreter, packages, machine, library and target.
 
-    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. That no
-    library is found is one of them; `workspace` may be the error that looking for it gave.
+    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. A missing
+    library is a finding too; `workspace` may be the error raised by the search for it.
     """
     if isinstance(workspace, MutatorError):
         return examine(workspace)
@@ -149,6 +151,6 @@ def _analysis(workspace: WorkspaceLike) -> Analysis:
             "no control_structure.yaml",
             where=found.library / "stpa",
             expected="a hazard analysis",
-            remedy="write one, as docs/explanation/hazard-analysis.md says; campaigns need none",
+            remedy="write one (see docs/explanation/hazard-analysis.md); campaigns do not need it",
         )
     return analysis

@@ -1,4 +1,4 @@
-"""Many mutants written to a folder: patches, optionally trees, and an index of them."""
+"""Writes many mutants to a folder: patches, optionally source trees, and an index."""
 
 import csv
 import fnmatch
@@ -45,8 +45,8 @@ def pairs_of_specs(
     seed: int | None = None,
     reading: str | None = None,
 ) -> list[Pair]:
-    """Every fault of the specs (names, globs over them, files) under every trigger; default: all contexts, or
-    `always` in a library without any."""
+    """Return every fault of the specs (names, globs, files) with every trigger; default: all contexts, or
+    `always` in a library without contexts."""
     made = [bench.trigger(text) for text in triggers]
     if not made:
         armed_after_s = bench.manifest.armed_after_s
@@ -59,24 +59,27 @@ def pairs_of_specs(
         pairs += [(fault, trigger) for fault in faults for trigger in made]
     if not pairs:
         raise MutatorError(
-            "no spec named", argument="specs", remedy="name specs (`mutator list specs`), or a `campaign`"
+            "no spec given",
+            argument="specs",
+            remedy="name specs (`mutator list specs` shows them) or a `campaign`",
         )
     return pairs
 
 
 def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> tuple[Bench, list[Pair]]:
-    """The campaign's target, and what is injected when in its experiments."""
+    """Return the campaign's target, and the fault and trigger of each of its experiments."""
     plan = make_plan(workspace, campaign, choices)
     return Bench.of(workspace, plan.campaign.target), [(e.fault, e.trigger) for e in plan.experiments]
 
 
 @dataclass(frozen=True, repr=False)
 class MutantSet:
-    """Faults under triggers for one target, chosen by specs or by a campaign; built when written."""
+    """Faults with triggers for one target, from specs, operators or a campaign; mutants are built when
+    written."""
 
     bench: Bench  #: workspace and target
     pairs: tuple[Pair, ...]  #: each fault with its trigger
-    told: str = ""  #: for mutants of operators: how many there are, and what was left out
+    told: str = ""  #: for operators: the number of mutants, and what was left out
 
     def __repr__(self) -> str:
         return f"<MutantSet: {counted(len(self), 'mutant')} of {self.bench.manifest.name}>"
@@ -95,7 +98,7 @@ class MutantSet:
         target: str | None = None,
         workspace: WorkspaceLike = None,
     ) -> "MutantSet":
-        """Every fault of the specs (names, globs, files) under every trigger; default: all contexts."""
+        """Choose every fault of the specs (names, globs, files) with every trigger; default: all contexts."""
         bench = Bench.of(workspace, target)
         return cls(bench, tuple(pairs_of_specs(bench, specs, triggers, seed=seed, reading=reading)))
 
@@ -108,7 +111,7 @@ class MutantSet:
         target: str | None = None,
         workspace: WorkspaceLike = None,
     ) -> "MutantSet":
-        """What mutation operators make of places in the source, under every trigger; default: `always`."""
+        """Choose mutants of mutation operators, with every trigger; default: `always`."""
         bench = Bench.of(workspace, target)
         faults, told = operator_faults(bench, choice)
         made = [bench.trigger(text) for text in triggers or ("always",)]
@@ -118,16 +121,16 @@ class MutantSet:
     def of_campaign(
         cls, campaign: str, *, choices: Choices | None = None, workspace: WorkspaceLike = None
     ) -> "MutantSet":
-        """What is injected when in the experiments of a campaign."""
+        """Choose the faults and triggers of a campaign's experiments."""
         bench, pairs = pairs_of_campaign(open_workspace(workspace), campaign, choices or Choices())
         return cls(bench, tuple(pairs))
 
     def write(
         self, out: str | Path, *, trees: bool = False, step: Callable[[], None] = lambda: None
     ) -> list[dict[str, str]]:
-        """Write patches, with `trees` whole trees, and index.csv into a new or empty folder.
+        """Write patches, index.csv and, with `trees`, whole source trees into a new or empty folder.
 
-        Returns the index: a row for each mutant. `step` is called after each pair.
+        Returns the index: one row for each mutant. `step` is called after each pair.
         """
         return write_mutants(self.bench, self.pairs, Path(out), trees=trees, step=step)
 
@@ -140,10 +143,9 @@ def write_mutants(
     trees: bool = False,
     step: Callable[[], None] = lambda: None,
 ) -> list[dict[str, str]]:
-    """Write `out`/patches, `out`/trees if wanted, and `out`/index.csv; returns the index.
+    """Write `out`/patches, `out`/index.csv and, with `trees`, `out`/trees; returns the index.
 
-    `out` must be new or empty, since old patches beside new ones would be taken for theirs. `step` is called
-    after each pair.
+    `out` must be new or empty, so that old and new patches do not mix. `step` is called after each pair.
     """
     make_folder(out)
     if any(out.iterdir()):
@@ -170,7 +172,7 @@ def write_mutants(
 
 
 def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
-    """The specs meant: a glob is matched against the library's names, anything else is taken as it is."""
+    """Expand globs over the names of the library's specs; pass anything else on."""
     for text in wanted:
         if not any(c in text for c in "*?["):
             yield text
@@ -184,7 +186,7 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
 
 
 def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
-    """Write one mutant below `out`; returns its line of the index."""
+    """Write one mutant below `out`, and return its row of the index."""
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
     (out / patch).write_bytes(mutant.patch_bytes)

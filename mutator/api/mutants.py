@@ -1,4 +1,4 @@
-"""A fault built into the target's source: its diff, its files, its tree."""
+"""A mutant: a fault built into the target's source, with its diff, files and tree."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +15,7 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class BuiltMutant:
-    """A fault under a trigger, built into a target. The same of all three has the same `id` everywhere."""
+    """A fault with a trigger, built into a target. The same three always have the same `id`."""
 
     fault: Fault  #: the fault that is built in
     trigger: Trigger  #: when it is active
@@ -35,21 +35,21 @@ class BuiltMutant:
 
     @property
     def patch(self) -> str:
-        """The whole patch, probe included; `patch -p1` applies it at the target's root."""
+        """The whole patch, including the probe; apply it with `patch -p1` at the target's root."""
         return self.mutant.patch
 
     @property
     def diff(self) -> str:
-        """The patch for reading: without the probe, which every mutant gets."""
+        """The patch without the probe, for reading."""
         return readable(self.patch)[0]
 
     @property
     def files(self) -> dict[str, bytes]:
-        """The whole content of each file that differs from the target's, by its path below the root."""
+        """The content of each file that differs from the target's, by path below the root."""
         return self.mutant.files
 
     def write(self, folder: str | Path) -> Path:
-        """Write the whole mutated source tree into a new or empty folder; returns the folder."""
+        """Write the whole mutated source tree into a new or empty folder, and return the folder."""
         place = Path(folder)
         make_folder(place)
         if any(place.iterdir()):
@@ -70,13 +70,15 @@ def build_mutant(
     target: str | None = None,
     workspace: WorkspaceLike = None,
 ) -> BuiltMutant:
-    """Build a fault into the target's source; nothing is run or written.
+    """Build a fault into the target's source, without running or writing anything.
 
-    `fault` is a Fault, a spec (`sensor/bias`), one of its variants (`sensor/bias/distance`), or a spec file;
-    of several values the middle one is taken, or `value` in the spec's unit. `trigger` is a Trigger, a
-    context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest;
-    default: the library's only one. MutatorError for a mistake in any of them, and for a place in the source
-    that is not found; InvalidMutant (a MutatorError) when the mutant does not compile.
+    `fault` is a Fault, a spec (`sensor/bias`), one of its variants (`sensor/bias/distance`), or a spec file.
+    It gets `value`, in the spec's unit, or else the middle one of the drawn values. `trigger` is a Trigger, a
+    context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest; default:
+    the library's only one.
+
+    MutatorError for a mistake in these, and if a place is not found in the source; InvalidMutant (a
+    MutatorError) if the mutant does not compile.
     """
     bench = Bench.of(workspace, target)
     chosen = bench.fault(fault, value=value, seed=seed, reading=reading)
@@ -84,6 +86,6 @@ def build_mutant(
 
 
 def built(bench: Bench, fault: Fault, trigger: Trigger) -> BuiltMutant:
-    """The mutant of a fault under a trigger; many of one bench share what was parsed."""
+    """Build the mutant of a fault with a trigger; mutants of one bench share parsed sources."""
     mutant = build(bench.manifest, bench.models, fault, trigger)
     return BuiltMutant(fault=fault, trigger=trigger, mutant=mutant, manifest=bench.manifest)

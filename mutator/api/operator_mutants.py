@@ -1,4 +1,4 @@
-"""Mutants without a spec: what mutation operators make of places in a target's source."""
+"""Mutants from mutation operators, without a spec."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from mutator.operators.names import operators_named
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorChoice:
-    """Which mutants of operators are meant.
+    """Chooses mutants of mutation operators.
 
-    `places` are `PATH::FUNCTION` or `PATH`, either with `*`, and `**` over folders. The golden run of
-    `scenario` with `seed` decides which lines count; without one all do. `sample` is how many are drawn, from
-    `seed`, of each operator in each function in proportion; without it, all.
+    `operators` are names such as `arithmetic`. `places` are `PATH::FUNCTION` or `PATH`, with `*`, and `**`
+    for nested folders. With `scenario`, only lines that its golden run with `seed` executes count. `sample`
+    mutants are drawn with `seed`, in proportion for each operator and function; default: all.
     """
 
     operators: Sequence[str]  #: names of mutation operators
@@ -31,9 +31,9 @@ class OperatorChoice:
 
 
 def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, ...], str]:
-    """The faults, in the order of files and lines, and in words how many there are and what was left out.
+    """Return the faults in the order of files and lines, and a text with their number and what was left out.
 
-    MutatorError for an unknown operator or place, and when nothing is left.
+    MutatorError for an unknown operator or place, and if no mutant is left.
     """
     check_whole("seed", choice.seed)
     if choice.sample is not None:
@@ -49,7 +49,7 @@ def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, 
         raise MutatorError(
             f"no mutant in {', '.join(choice.places)} ({found.told})",
             argument="in",
-            remedy="name other places or operators, or take lines that are not executed, too",
+            remedy="choose other places or operators, or include lines that are not executed",
         )
     drawn = sampled(found, choice.sample, choice.seed)
     told = (

@@ -1,4 +1,4 @@
-"""Campaigns: planned. Needs nothing of what reads a run, so a plan does not wait for reports to be loaded."""
+"""Plan campaigns. Imports nothing that reads runs, so that planning starts fast."""
 
 from pathlib import Path
 
@@ -16,22 +16,23 @@ def plan(
     choices: Choices | None = None,
     workspace: WorkspaceLike = None,
 ) -> Plan:
-    """Expand a campaign (a name of the library or a file) into its experiments; none is run.
+    """Expand a campaign (a name in the library, or a file) into its experiments, without running any.
 
-    With `out` the plan is frozen there: `run` with the same folder runs exactly these experiments. It is then
-    written seed by seed, and the experiments of a very large one are read when asked for.
-    MutatorError for a mistake in campaign or choices, when no experiment is left, and for a folder that holds
-    anything else.
+    With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments. It is
+    then written seed by seed, and the experiments of a very large plan are read on demand.
+
+    MutatorError for a mistake in campaign or choices, if no experiment is left, and for a folder with other
+    content.
     """
     found = open_workspace(workspace)
     if out is None:
         return make_plan(found, campaign, choices)
     planning = Planning(found, campaign, choices)
     folder, tally = freeze_and_tell(planning, Path(out), found)
-    return load_plan(folder, tally)  # knows what a run took, once one was driven here
+    return load_plan(folder, tally)  # knows the cost of a run, if one was made here
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:
-    """The variants of a plan that only the reference engine can run, and why."""
+    """Return the variants of a plan that only the reference engine can run, with the reasons."""
     faults = plan.tally.variants.values()
     return not_forked(workspace.manifest(plan.campaign.target), workspace.fault_models(), faults)

@@ -1,4 +1,4 @@
-"""Groups of mutants that differ only in values, and what reviewers decided about them."""
+"""Groups of mutants that differ only in values, and the reviewers' decisions about them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -22,7 +22,7 @@ from mutator.workspace import Workspace
 class ReviewedGroups:
     """Groups of mutants, new and changed ones first, and the decisions about them (`review`).
 
-    `options` of `mutator review` mean the same groups; the commands on a written page have them.
+    `options` are the options of `mutator review` that choose the same groups, for the commands on a page.
     """
 
     workspace: Workspace  #: the workspace whose review file holds the decisions
@@ -32,12 +32,12 @@ class ReviewedGroups:
 
     @property
     def undecided(self) -> tuple[Group, ...]:
-        """The groups that are new, or have changed since the decision about them."""
+        """The groups that are new or have changed since their decision."""
         return tuple(g for g in self.groups if self.review.state(g) in (State.NEW, State.CHANGED))
 
     @property
     def lacking(self) -> tuple[tuple[Group, str], ...]:
-        """What `run --require-reviewed` would refuse, and why: `missing, 12 experiments`."""
+        """The groups that `run --require-reviewed` refuses, and why, e.g. `missing, 12 experiments`."""
         return tuple(
             (group, f"{gate.reason(self.review, group)}, {gate.share(group)}")
             for group in self.review.in_turn(self.groups)
@@ -45,11 +45,11 @@ class ReviewedGroups:
         )
 
     def reread(self) -> "ReviewedGroups":
-        """The same groups with what is kept of them now."""
+        """Return the same groups with the decisions that are stored now."""
         return replace(self, review=load_decisions(self.workspace, self.review.target))
 
     def matching(self, only: str | None = None, exclude: str | None = None) -> "ReviewedGroups":
-        """Those for which the filters hold: expressions over what `facts` gives."""
+        """Return the groups that match the filters, which are expressions over the result of `facts`."""
         groups = self.groups
         for text, wanted in ((only, True), (exclude, False)):
             if text is not None:
@@ -58,50 +58,50 @@ class ReviewedGroups:
         return replace(self, groups=groups)
 
     def find(self, starts: Sequence[str]) -> list[Group]:
-        """The groups whose ids start so, each once; MutatorError for none or several of a start."""
+        """Return the groups whose ids start with `starts`; MutatorError unless each start fits one group."""
         found: dict[str, Group] = {}
         for start in starts:
             hits = [group for group in self.groups if group.id.startswith(start)]
             if len(hits) != 1 or not start:
                 raise MutatorError(
                     f"{len(hits)} groups start with '{start}'" if hits else f"no group '{start}'",
-                    expected="an id of `mutator review`, or the beginning of just one",
-                    remedy="give more of it" if hits else "name the campaign or the spec that it is of",
+                    expected="an id from `mutator review`, or a start that fits only one",
+                    remedy="write more of the id" if hits else "choose the group's campaign or spec",
                 )
             found[hits[0].id] = hits[0]
         return list(found.values())
 
     def approve(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
-        """Approve groups as they are now; the decision is written into the library."""
+        """Approve groups in their current state, and write the decision into the library."""
         return self._changed(groups, Kind.APPROVE, by, remark)
 
     def reject(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
-        """Reject groups as they are now; the decision is written into the library."""
+        """Reject groups in their current state, and write the decision into the library."""
         return self._changed(groups, Kind.REJECT, by, remark)
 
     def clear(self, groups: Sequence[Group], by: str, remark: str = "") -> "ReviewedGroups":
-        """Take the decisions about groups back; remarks and flags stay."""
+        """Withdraw the decisions about groups; remarks and flags stay."""
         return self._changed(groups, Kind.CLEAR, by, remark)
 
     def remark(self, groups: Sequence[Group], by: str, text: str) -> "ReviewedGroups":
-        """Leave a remark on groups."""
+        """Add a remark to groups."""
         return self._changed(groups, Kind.REMARK, by, text)
 
     def flag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
-        """Mark groups to be looked at again."""
+        """Flag groups for another look."""
         return self._changed(groups, Kind.FLAG, by)
 
     def unflag(self, groups: Sequence[Group], by: str) -> "ReviewedGroups":
-        """Take such marks off."""
+        """Remove flags."""
         return self._changed(groups, Kind.UNFLAG, by)
 
     def write_page(self, out: str | Path) -> Path:
-        """Write a page of all groups, complete in itself."""
+        """Write all groups to one self-contained HTML page."""
         write_page(Path(out), self.review, self.groups, self.options)
         return Path(out)
 
     def _changed(self, groups: Sequence[Group], kind: Kind, by: str, text: str = "") -> "ReviewedGroups":
-        """Conflict, and nothing written, where somebody else has said something since these were loaded."""
+        """Record changes; raises Conflict and writes nothing if others have changed these groups since."""
         changes = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
         seen = {group.id: self.review.revision(group.id) for group in groups}
         return replace(self, review=record(self.workspace, self.review.target, changes, seen))
@@ -116,10 +116,10 @@ def load_review(
     target: str | None = None,
     workspace: WorkspaceLike = None,
 ) -> ReviewedGroups:
-    """The groups of mutants of a campaign, of specs (names, globs, files), or of all the library.
+    """Load the groups of mutants of a campaign, of specs (names, globs, files), or of the whole library.
 
-    Every mutant is built, none is run. `target` names a manifest; default: the library's only one, and a
-    campaign's own. MutatorError for a campaign together with specs, and for a mistake in any of them.
+    Every mutant is built, none is run. `target` names a manifest; default: the library's only one, or the
+    campaign's. MutatorError for a campaign together with specs, and for mistakes in them.
     """
     if campaign and specs:
         raise MutatorError("together with specs", argument="campaign", expected="one or the other")
@@ -142,7 +142,7 @@ def load_review(
 
 
 def facts(review: Review, group: Group) -> dict[str, object]:
-    """What the filters know of a group; several of one kind stand with commas between them."""
+    """Return the columns that filters can use for a group; several values are separated by commas."""
     decision = review.decision(group.id)
     return {
         "group": group.id,
@@ -161,5 +161,5 @@ def facts(review: Review, group: Group) -> dict[str, object]:
 
 
 def reviewer_name(workspace: WorkspaceLike = None) -> str | None:
-    """What git calls who works here (`user.name`); None if it does not know."""
+    """Return git's `user.name`; None if it is not set."""
     return user_name(open_workspace(workspace))

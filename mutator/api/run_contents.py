@@ -1,4 +1,4 @@
-"""What a run folder holds, each part read when it is first asked for."""
+"""The contents of a run folder, each part read on first use."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,14 +23,14 @@ if TYPE_CHECKING:
 
 
 def from_here(path: Path) -> Path:
-    """A path as it is typed in the folder one is in."""
+    """Return a path as typed in the current folder."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunContents:
-    """A run folder, and the workspace that it is looked at with (None: found when needed)."""
+    """A run folder and its workspace (None: found when needed)."""
 
     folder: RunFolder  #: reads the files of the run folder
     given_workspace: Workspace | None = None  #: the workspace that was passed; None: found when needed
@@ -42,18 +42,18 @@ class RunContents:
 
     @cached_property
     def workspace(self) -> Workspace:
-        """Library, templates and target that the run is looked at with."""
+        """The library, templates and target to read the run with."""
         return self.given_workspace or Workspace.find()
 
     @cached_property
     def bench(self) -> Bench:
-        """The run's target in that workspace."""
+        """The run's target in the workspace."""
         return Bench.of(self.workspace, self.folder.head["target"])
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Campaign, target, seed, reading and choices; digests of the sources; what each stretch of work ran
-        with, under `stretches`."""
+        """Campaign, target, seed, reading and choices; digests of the sources; under `stretches`, the
+        versions and machine of each stretch of work."""
         head = self.folder.head
         keys = ("campaign", "target", "plan", "choices", "limits")
         return {key: head[key] for key in keys} | self.folder.provenance
@@ -70,44 +70,45 @@ class RunContents:
 
     @cached_property
     def experiments(self) -> dict[str, Experiment]:
-        """The planned experiments by id, in the plan's order."""
+        """The planned experiments by id, in plan order."""
         return {e.id: e for e in plan_file.read_all(self.path)}
 
     @cached_property
     def records(self) -> Mapping[str, Record]:
-        """The record of each experiment that has one, by id."""
+        """The records by experiment id."""
         return self.folder.records()
 
     @cached_property
     def results(self) -> "pd.DataFrame":
-        """A row per experiment that has a record, by experiment id: the columns of results.csv, typed.
+        """One row per experiment that has a record, by experiment id: the columns of results.csv, typed.
 
-        As `mutator.outcomes.reader.Results.frame` makes it; the table is brought up to date first.
+        The table is updated first.
         """
         return Results.up_to_date(self.path).frame()
 
     def propagation(self) -> "pd.DataFrame":
-        """A row for each channel of an experiment that left golden: the columns of propagation.parquet.
+        """Return one row for each channel of an experiment that differs from golden: the columns of
+        propagation.parquet.
 
-        The table is brought up to date first. MutatorError for a run of a version that recorded none.
+        The table is updated first. MutatorError for a run of an older version that did not record it.
         """
         return Results.up_to_date(self.path).propagation()
 
     @property
     def endings(self) -> dict[str, int]:
-        """How many experiments ended how: outcomes of those that ended well, statuses of the others."""
+        """Number of experiments by ending: the outcome of runs that ended normally, the status of others."""
         return counting.outcome_counts(self._texts)
 
     @property
     def harness_errors(self) -> dict[str, str]:
-        """Experiments that the harness failed at, and why; `mutator.run` tries them again."""
+        """Experiments at which the harness failed, with the reasons; `mutator.run` retries them."""
         texts = self._texts
         failed = texts[texts["status"] == Status.HARNESS_ERROR.value]
         return dict(zip(failed["experiment_id"], failed["detail"], strict=True))
 
     @property
     def verifiable(self) -> bool:
-        """Whether its content can be verified; runs of earlier schemas have no digests."""
+        """Whether the content can be verified; runs of older schemas have no digests."""
         return self.folder.verifiable
 
     @cached_property
@@ -116,12 +117,12 @@ class RunContents:
 
     @cached_property
     def ways(self) -> Ways | None:
-        """The ways of faults through its target; None where they are not known."""
+        """The paths of faults through the target; None if not known."""
         return ways_of(self.folder.head)
 
     @cached_property
     def traces(self) -> Traces:
-        """Traces that are kept in the run folder, and those that are driven when needed."""
+        """The traces kept in the run folder; others are made when needed."""
         return Traces(self.workspace, self.folder)
 
     def _workspace_if_any(self) -> Workspace | None:

@@ -1,4 +1,4 @@
-"""An experiment of a run folder: its traces, its patch, how far its fault got; driven again when asked."""
+"""An experiment of a run folder: its traces, patch and fault path, and how to rerun it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ class RunExperiment(ExperimentResult):
 
     @cached_property
     def patch(self) -> str:
-        """The whole patch, probe included: the kept one, or made now when it has not run yet."""
+        """The whole patch, including the probe: the kept one, or a new one if the experiment has not run."""
         kept = self.run.folder.read_patch(self.id, self.record)
         if kept is not None:
             return kept.decode("utf-8", "surrogateescape")
@@ -38,24 +38,26 @@ class RunExperiment(ExperimentResult):
 
     @property
     def scale(self) -> Scale | None:
-        """The scale of severity that the run was planned with."""
+        """The severity scale that the run was planned with."""
         return self.run.folder.scale
 
     def traces(self, *, exact: bool = False) -> TraceFrames:
-        """Golden and faulty run as pandas frames.
+        """Return golden and faulty run as pandas frames.
 
-        They are the experiment's series: the manifest's channels, at most 20 values a second (10 of what the
-        controller believes), to six digits; a value is the newest one at its time, so what lasts for
-        less may be missed. With `exact` it is driven again, which takes as long as one run: all channels in
-        every step. So is one that has no series (left out under the budget, or of an earlier version), whose
-        series is then kept. MutatorError when it has not run yet, and, where it is driven, when target,
-        templates or scenario have changed since, or another result comes out than the campaign's.
+        By default, they are the experiment's series: the manifest's channels, at most 20 values a second (10
+        for the controller's beliefs), to six digits. A value is the newest one at its time, so shorter events
+        may be missing. With `exact`, the experiment is rerun, which takes as long as one run, and the frames
+        have all channels in every step. An experiment without a series (over the budget, or from an older
+        version) is also rerun, and its series is then kept.
+
+        MutatorError if the experiment has not run. For a rerun, MutatorError if target, templates or scenario
+        have changed, or if the result differs from the campaign's.
         """
         if exact:
             trial = self.rerun(keep=True)
             if trial.same_as_record is False:
                 raise MutatorError(
-                    f"{self.id} driven again is not what the campaign found", where=self.run.path
+                    f"the rerun of {self.id} differs from the campaign's record", where=self.run.path
                 )
             return trial.traces()
         if self.record is None:
@@ -65,10 +67,10 @@ class RunExperiment(ExperimentResult):
         return TraceFrames(golden=trace_frame(golden, manifest), faulty=trace_frame(faulty, manifest))
 
     def rerun(self, *, keep: bool = False) -> Trial:
-        """Drive it again; `Trial.same_as_record` says whether the record is the campaign's.
+        """Rerun the experiment; `Trial.same_as_record` says whether the record equals the campaign's.
 
-        With `keep` its trace, its series and its plot stay in the run folder. MutatorError
-        when target, templates or scenario have changed since.
+        With `keep`, the trace, series and plot stay in the run folder. MutatorError if target, templates or
+        scenario have changed.
         """
         run, folder = self.run, self.run.folder
         temporary = None if keep else ScratchFolder("mutator-rerun-")
@@ -82,35 +84,36 @@ class RunExperiment(ExperimentResult):
             same_as_record=same if self.record else None,
             temporary=temporary,
         )
-        if keep and trial.save_plot(self.plot_file) and same:  # only what the record is of
+        if keep and trial.save_plot(self.plot_file) and same:  # only if it belongs to the record
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
             keep_series(folder.path, manifest, golden, faulty, single.record)
         return trial
 
     def film(self, shots: Sequence[Shot]) -> bool:
-        """Drive golden and faulty run again and write videos or stills of them; is the record the campaign's?
+        """Rerun golden and faulty, write videos or stills, and return whether the record equals the
+        campaign's.
 
-        MutatorError for a target that cannot be filmed, and a faulty run that left no film.
+        MutatorError for a target that cannot be filmed, and for a faulty run that left no film.
         """
         return Filming.of(self.run.workspace, self.run.folder).take(self.experiment, self.record, shots)
 
     @property
     def stretch(self) -> Stretch | None:
-        """What it was run with; None before it was run."""
+        """What the experiment was run with; None until it has run."""
         return self.run.folder.stretch_of(self.id)
 
     @property
     def plot_file(self) -> Path:
-        """Where the run folder keeps its plot."""
+        """Path of the plot in the run folder."""
         return self.run.path / "plots" / f"{self.id}.svg"
 
     @property
     def is_drawn(self) -> bool:
-        """Whether the run folder has its plot and its series, and that is not damaged."""
+        """Whether the run folder has the plot and an undamaged series."""
         return self.plot_file.exists() and SeriesFolder(self.run.path).is_readable(self.id)
 
     def not_run(self) -> MutatorError:
-        """What to say of an experiment that is only planned."""
+        """Return the error for an experiment that has not run."""
         campaign, out = self.run.folder.head["campaign"], from_here(self.run.path)
         return MutatorError(
             f"experiment {self.id} has not run yet",
@@ -120,8 +123,8 @@ class RunExperiment(ExperimentResult):
 
     @property
     def fault_path(self) -> FaultPath | None:
-        """How far its fault got along the control structure; None where that is not known, and for a fault
-        that was never active or a run without an outcome."""
+        """How far the fault propagated along the control structure; None if not known, if the fault was never
+        active, or without an outcome."""
         ways = self.run.ways
         return ways.path(self.experiment, self.record) if ways and self.record else None
 

@@ -1,4 +1,4 @@
-"""A run folder, and what can be made of it: report, pictures, exports, audit."""
+"""A run folder, and what you can make from it: report, stills, exports, audit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -43,31 +43,32 @@ if TYPE_CHECKING:
 
 
 def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
-    """The run folder at `path`, finished or not. Nothing is read before it is asked for.
+    """Open the run folder at `path`, finished or not. Content is read on first use.
 
-    `workspace` is what traces and new reports need: a Workspace, or the folder that holds the library;
-    default: found as on the command line, and only when needed. MutatorError when `path` is no run folder.
+    Traces and new reports need `workspace`: a Workspace, or the folder that holds the library; default: found
+    as on the command line, when needed. MutatorError if `path` is not a run folder.
     """
     return Run(RunFolder.open(Path(path)), None if workspace is None else open_workspace(workspace))
 
 
 def newest_run(root: Path) -> Path:
-    """The run folder in runs/, here or under `root`, that was used last; MutatorError if there is none."""
+    """Return the most recently used run folder in runs/, here or under `root`; MutatorError without any."""
     found = run_folders(root)
     if not found:
         raise MutatorError(
             "no run folder in runs/",
             argument="run",
-            remedy="name one: `run`, or make one: `mutator run quickstart --out runs/first`",
+            remedy="name one with `run`, or make one: `mutator run quickstart --out runs/first`",
         )
     return from_here(found[0])
 
 
 def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
-    """Merge the shards of a plan into the run folder `out`: the one that a single machine would have made.
+    """Merge the shards of a plan into the run folder `out`, with the same results as from a single machine.
 
-    MutatorError for shards that are not one plan's, whole and finished, and, unless `accept_versions`, for
-    some driven with another Python or other packages; CheckFailed when their fault-free runs differ.
+    MutatorError unless the shards are finished and make up one whole plan. MutatorError for shards that were
+    run with another Python or other packages, unless `accept_versions`. CheckFailed if their golden runs
+    differ.
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
@@ -77,7 +78,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(RunContents):
-    """A run folder, read when asked. `summary` is what `mutator.run` came to; None for a loaded run."""
+    """A run folder, read on demand. `summary` is the result of `mutator.run`; None for a loaded run."""
 
     #: the result of the call of `mutator.run` that returned it; None for a loaded run
     summary: Summary | None = None
@@ -97,44 +98,45 @@ class Run(RunContents):
 
     @cached_property
     def seal(self) -> str | None:
-        """One digest of everything that counts, computed now; None for a run that is not finished, or not
+        """One digest of everything that matters, computed now; None for a run that is unfinished or not
         verifiable."""
         return seal_of(self.folder)
 
     def counts(self) -> Table:
-        """How the experiments of each fault type ended."""
+        """Count how the experiments of each fault type ended."""
         texts = self._texts
         hazards, counts = counting.hazard_names(texts), counting.counts_by(texts, counting.kinds(texts))
         heads, rows = count_table(counts, "fault type", hazards, alerts=self.folder.has_alerts)
         return Table(heads=heads, rows=rows, right=range(1, len(heads)))
 
     def mutation_score(self) -> Sheet:
-        """What mutants of operators changed: shares of them with an actuator changed, a new alert, a hazard,
-        in total, by operator and by function. No lines for a run without such mutants."""
+        """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
+        alert or caused a hazard, in total, by operator and by function. Empty for a run without such
+        mutants."""
         texts = self._texts
         if not (texts["module"] == OPERATORS).any():
             return score_sheet(prepare(texts), {}, None)
         try:
             alerts = alerts_by_drive(self.fault_free())
-        except (MutatorError, KeyError):  # no target or golden runs here: no alert can be compared
+        except (MutatorError, KeyError):  # without target or golden runs, alerts cannot be compared
             alerts = None
         told = self.folder.head.get("operators", ())
         return score_sheet(prepare(texts), self.faults, alerts, told)
 
     def mutation_totals(self) -> Table:
-        """The score in total, in few columns. No rows for a run without mutants of operators."""
+        """Return the total mutation score, in few columns. Empty for a run without operator mutants."""
         return totals(self.mutation_score())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
-        """What the golden runs do by themselves: alerts, hazards, and how far each plotted channel goes."""
+        """Return the alerts and hazards of the golden runs, and the range of each plotted channel."""
         return fault_free_runs(self.folder, self.bench.manifest)
 
     def alerts_note(self) -> str:
-        """Which alerts the fault-free runs raise, too, as a sentence; empty if none."""
+        """Return a sentence on the alerts that golden runs also raise; empty if there are none."""
         return own_alerts(self.fault_free())
 
     def experiment(self, id: str) -> RunExperiment:
-        """The planned experiment whose id is `id` or starts so; MutatorError for none or several."""
+        """Return the planned experiment whose id starts with `id`; MutatorError for none or several."""
         check_type("id", id, str, "the id of an experiment, or the start of one")
         wanted = self.folder.find(id)
         return RunExperiment(experiment=self.experiments[wanted], record=self.records.get(wanted), run=self)
@@ -142,11 +144,10 @@ class Run(RunContents):
     def golden(
         self, scenario: str, changes: tuple[str, ...] | None = None, *, seed: int | None = None
     ) -> "pd.DataFrame":
-        """The fault-free run of a scenario: a column per channel, by time in s.
+        """Return the golden run of a scenario: one column per channel, by time in s.
 
-        `changes` of the scenario tell apart what was driven in several ways, `("alone",)`; default: those
-        of most experiments. `seed` is one of several; default: the first. MutatorError for one that was not
-        driven.
+        `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the one that most experiments
+        use. `seed` chooses one of several seeds; default: the first. MutatorError if there is no such run.
         """
         driven = [e.changes for e in self.experiments.values() if e.scenario == scenario]
         if changes is None and driven:
@@ -169,8 +170,8 @@ class Run(RunContents):
     def report(self, *, anew: bool = False) -> building.Report:
         """Write the report, Markdown and one HTML page, unless it is up to date.
 
-        `anew` writes it at any rate. No experiment is driven for it. Where no library is found, the results
-        stand alone.
+        `anew` always writes it. No experiment is rerun for it. Without a library, the report shows the
+        results only.
         """
         workspace = self._workspace_if_any()
         if not anew:
@@ -179,11 +180,11 @@ class Run(RunContents):
         return building.write(self.path, workspace)
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
-        """Drive the worst few experiments that see pictures again, and keep what the camera saw at the
-        activation, the first alert and the first hazard: the report shows it. At most ten experiments, one
-        of 20 that are planned, `workers` at a time, and none is begun after two minutes.
+        """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the
+        first hazard for the report. Takes one in 20 planned experiments and at most ten, `workers` at a time,
+        and starts none after two minutes.
 
-        Returns why the first one that has no pictures has none; empty if there is no such.
+        Returns the reason for the first experiment without stills; empty if all have stills.
         """
         notify = progress or (lambda _: None)
         return take_stills(self.workspace, self.folder, workers=workers, notify=notify)
@@ -197,10 +198,10 @@ class Run(RunContents):
         only: str | None = None,
         table: ExportedTable | str = ExportedTable.RESULTS,
     ) -> Path:
-        """Write the run for other tools; default: a file in exports/ of the run folder, which is returned.
+        """Export the run for other tools, and return the path; default: in exports/ of the run folder.
 
-        `failures` are the endings that JUnit shows as failures, `only` is a filter over the columns of the
-        results for MCAP, which is a folder of files, `table` what CSV and Parquet are of.
+        `failures` are the endings that JUnit shows as failures. `only` is a filter over the columns of the
+        results, for MCAP, which is a folder of files. `table` is the table for CSV and Parquet.
         """
         for name, value, kind in (("format", format, Format), ("table", table, ExportedTable)):
             if value not in (known := [one.value for one in kind]):
@@ -214,7 +215,7 @@ class Run(RunContents):
         return export(self.path, wanted, place, workspace=workspace, parts=parts)
 
     def check_equivalence(self) -> None:
-        """CheckFailed when a sample that was run again on the reference engine gave another result."""
+        """Raise CheckFailed if the equivalence check of the run failed."""
         equivalence.judge(self.folder, self.folder.records())
 
     def verify(self, *, rerun: int = 0, expect: str | None = None, repair: bool = False) -> Audit:
@@ -223,17 +224,17 @@ class Run(RunContents):
         return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:
-        """Delete the run folder; MutatorError while a command or its workers hold it, and when it holds what
+        """Delete the run folder; MutatorError if a command or its workers use it, or if it holds files that
         no run writes."""
         cleaning.clean(self.path)
 
     def finish_deletion(self) -> bool:
-        """Wait for a command that may be deleting the folder, and finish its work; whether it is gone."""
+        """Finish a deletion that another command has begun; returns whether the folder is gone."""
         return cleaning.finish_deletion(self.path)
 
 
 def known_alerts_note(run: Run) -> str:
-    """The run's `alerts_note`; empty, too, where its target or its golden runs cannot be read here."""
+    """Return the run's `alerts_note`; empty if its target or golden runs cannot be read here."""
     try:
         return run.alerts_note()
     except (MutatorError, KeyError):

@@ -1,4 +1,4 @@
-"""From what a user types to a workspace, a target, faults and triggers."""
+"""Resolves what a user types to a workspace, a target, faults and triggers."""
 
 import dataclasses
 import warnings
@@ -29,7 +29,7 @@ TriggerLike: TypeAlias = "Trigger | str | float"
 
 
 def open_workspace(given: WorkspaceLike) -> Workspace:
-    """The workspace that is given, at the root that is given, or found from the current folder."""
+    """Return the given workspace, the one at the given root, or the one found from the current folder."""
     if isinstance(given, Workspace):
         return given
     return Workspace.find(None if given is None else Path(given))
@@ -37,7 +37,7 @@ def open_workspace(given: WorkspaceLike) -> Workspace:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultChoice:
-    """Which faults of one spec are meant. `spec` is a name or a file; `value` replaces the drawn ones."""
+    """Chooses faults of one spec, a name or a file. `value` replaces the drawn values."""
 
     spec: str
     variant: str | None = None
@@ -46,7 +46,7 @@ class FaultChoice:
     reading: str | None = None
 
     def narrowed(self, spec: FaultSpec) -> FaultSpec:
-        """The spec with the chosen variant and value alone."""
+        """Return the spec with only the chosen variant and value."""
         variants = tuple(v for v in spec if self.variant in (None, v.name))
         if not variants:
             names = ", ".join(v.name for v in spec)
@@ -59,14 +59,14 @@ class FaultChoice:
 
 @dataclass(frozen=True)
 class Bench:
-    """A workspace with one of its targets: what faults are chosen for, built into and tried on."""
+    """A workspace with one of its targets."""
 
     workspace: Workspace
     manifest: TargetManifest
 
     @classmethod
     def of(cls, workspace: WorkspaceLike, target: str | None = None) -> "Bench":
-        """The bench of a target by name or manifest file; default: the library's only one."""
+        """Return the bench of a target by name or manifest file; default: the library's only one."""
         found = open_workspace(workspace)
         return cls(found, found.manifest(found.target_name(target)))
 
@@ -76,8 +76,11 @@ class Bench:
         return self.workspace.fault_models()
 
     def faults(self, choice: FaultChoice) -> tuple[Fault, ...]:
-        """The chosen faults in the spec's order, never none; a mistake in the spec is told at its line.
-        MutatorWarning for a chosen value that changes nothing, or that the spec does not declare."""
+        """Return the chosen faults, at least one, in the spec's order.
+
+        MutatorError for a mistake in the spec; MutatorWarning for a chosen value that changes nothing or is
+        outside the range that the spec declares.
+        """
         check_whole("seed", 0 if choice.seed is None else choice.seed)
         declared = self.workspace.spec(choice.spec)
         spec = choice.narrowed(declared)
@@ -91,13 +94,13 @@ class Bench:
     def fault(
         self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
     ) -> Fault:
-        """The fault that is given, or the middle one of the first variant that its name fits."""
+        """Return the given fault, or the middle one of the first variant that matches the name."""
         if isinstance(given, Fault):
             if value is not None or reading is not None:
                 raise MutatorError(
                     f"{given.label} together with a value or a reading",
                     argument="fault",
-                    expected="a fault as it is, or the name of a spec with them",
+                    expected="a fault alone, or the name of a spec with a value or a reading",
                 )
             return given
         spec, variant = _split(str(given))
@@ -105,9 +108,9 @@ class Bench:
         return one_of_each_variant(self.faults(choice))[0][0]
 
     def trigger(self, given: TriggerLike, armed_after_s: float | None = None) -> Trigger:
-        """The trigger that is given, or of a context (`C1`), a time in s, `always` or a condition.
+        """Return the given trigger, or one from a context (`C1`), a time in s, `always` or a condition.
 
-        Contexts, `always` and conditions count from `armed_after_s` on; default: the manifest's.
+        Contexts, `always` and conditions are armed after `armed_after_s`; default: the manifest's.
         """
         if armed_after_s is not None:
             check_number("armed_after_s", armed_after_s, least=0)
@@ -120,7 +123,8 @@ class Bench:
 
 
 def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
-    """The middle fault of each variant, and how many the variant has: they differ in their value alone."""
+    """Return the middle fault of each variant and the variant's number of faults, which differ only in
+    value."""
     groups: dict[str, list[Fault]] = {}
     for fault in faults:
         groups.setdefault(fault.spec, []).append(fault)
@@ -128,15 +132,15 @@ def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...
 
 
 def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
-    """The context tables of the library, in the order of their names."""
+    """Return the context tables of the library, sorted by name."""
     return tuple(map(workspace.context_table, workspace.context_tables))
 
 
 def find_trigger(
     workspace: Workspace, text: str, armed_after_s: float, variables: Collection[str]
 ) -> Trigger:
-    """A trigger from what was typed: a context (`C1`), a time in s (`10`), `always`, or a condition over
-    these variables."""
+    """Return the trigger for a context (`C1`), a time in s (`10`), `always`, or a condition over
+    `variables`."""
     tables = context_tables(workspace)
     named = [
         (table, row.id)
@@ -162,7 +166,7 @@ def find_trigger(
 
 
 def _split(name: str) -> tuple[str, str | None]:
-    """`sensor/bias/distance` is a variant of the spec `sensor/bias`; a file is a spec."""
+    """Split `sensor/bias/distance` into the spec `sensor/bias` and its variant; a file is a spec."""
     parts = name.split("/")
     if len(parts) == 3 and not name.endswith((".yaml", ".yml")):
         return "/".join(parts[:2]), parts[2]
@@ -170,7 +174,7 @@ def _split(name: str) -> tuple[str, str | None]:
 
 
 def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
-    """Warn of a value that somebody chose for these faults."""
+    """Warn about a chosen value that changes nothing or is outside the declared range."""
     idle = [fault.label for fault in faults if changes_nothing(fault, models)]
     if idle:
         warnings.warn(f"{', '.join(idle)} changes nothing", MutatorWarning, stacklevel=4)
@@ -183,7 +187,7 @@ def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault],
                 outside.append(f"{declared.name}/{variant.name}, {low:g} to {high:g}{unit}")
     if outside:
         warnings.warn(
-            f"value {value:g} is outside of what the spec declares: {'; '.join(outside)}",
+            f"value {value:g} is outside the range that the spec declares: {'; '.join(outside)}",
             MutatorWarning,
             stacklevel=4,
         )

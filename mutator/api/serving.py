@@ -1,4 +1,4 @@
-"""Reports, reviews and jobs in a browser, served to this machine alone."""
+"""A local server for reports, reviews and jobs."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,10 +20,11 @@ def serve_runs(
     workspace: WorkspaceLike = None,
 ) -> None:
     """Serve runs (run folders, or folders of them; default: runs/) and the library's reviews, until the
-    process is asked to end.
+    process is interrupted.
 
-    `ready` is called with the address, which holds a token: who has it may do what the user may. `at_once` is
-    how many jobs run beside each other. MutatorError for a missing folder, and for a port that is taken.
+    `ready` is called with the address, which contains a token: anybody with the token can do what the user
+    can. `at_once` is the number of jobs that run in parallel. MutatorError for a missing folder, and for a
+    port in use.
     """
     roots = tuple(map(Path, runs)) or (RUNS,)
     for root in roots:

@@ -1,4 +1,4 @@
-"""One fault, put in and driven once: outside of a campaign, or an experiment of a campaign again."""
+"""Runs one fault once, outside a campaign or as a rerun of a campaign's experiment."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,10 +20,10 @@ from mutator.targets.severity import Scale
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Trial(ExperimentResult):
-    """An experiment that was driven now, beside its golden run.
+    """An experiment that has just run, with its golden run.
 
-    `same_as_record` says of an experiment of a campaign whether its record is the campaign's, too; None:
-    there is none to compare with. The output is in `folder`; a temporary one lives as long as this object.
+    `same_as_record` says whether the record equals the campaign's; None: there is none to compare with. The
+    output is in `folder`; a temporary one lives as long as this object.
     """
 
     record: Record  #: the record of the run
@@ -36,12 +36,12 @@ class Trial(ExperimentResult):
 
     @property
     def patch(self) -> str:
-        """The whole patch, probe included; empty for a mutant that does not compile."""
+        """The whole patch, including the probe; empty for a mutant that does not compile."""
         return self.single.mutant.patch if self.single.mutant else ""
 
     @property
     def folder(self) -> Path:
-        """Where golden run (unless it is a campaign's), faulty run and patch are."""
+        """The folder of the golden run (unless it is a campaign's), the faulty run and the patch."""
         return self.single.faulty.parent
 
     @property
@@ -56,20 +56,20 @@ class Trial(ExperimentResult):
 
     @property
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
-        """Hazards (name, time in s) that the fault-free run reaches itself, so that they are not the fault's
-        doing; a campaign would refuse such a scenario. MutatorError when its record cannot be read."""
+        """Hazards (name, time in s) that the golden run also reaches, so the fault is not their cause. A
+        campaign refuses such a scenario. MutatorError if the golden run cannot be read."""
         _, judged = load_judged(self.manifest, self.single.golden)
         return tuple(sorted(judged.hazards, key=lambda hazard: hazard[1]))
 
     def traces(self) -> TraceFrames:
-        """Golden and faulty run as pandas frames; MutatorError when the faulty run left no trace."""
+        """Return golden and faulty run as pandas frames; MutatorError if the faulty run left no trace."""
         golden, faulty = self._load_traces()
         return TraceFrames(
             golden=trace_frame(golden, self.manifest), faulty=trace_frame(faulty, self.manifest)
         )
 
     def save_plot(self, path: Path) -> Path | None:
-        """Write `plot()` to an .svg or .png; None when the faulty run left no trace."""
+        """Write `plot()` to an .svg or .png; returns None if the faulty run left no trace."""
         if not self.has_trace:
             return None
         save(self.plot(), [path])
@@ -103,13 +103,14 @@ def try_fault(
     workspace: WorkspaceLike = None,
     out: str | Path | None = None,
 ) -> Trial:
-    """Put one fault in and drive twice: fault-free and faulty.
+    """Inject one fault and run the scenario twice: fault-free and faulty.
 
-    `fault` and `trigger` are given as for `build_mutant`; contexts, `always` and conditions count from
-    `armed_after_s` on (default: the manifest's). `scenario` is a name or a file. Output goes to a folder of
-    its own in `out`; default: a temporary one, which goes with the Trial.
-    MutatorError for a mistake in what is given, CheckFailed when the golden run does not end well. A fault
-    that crashes the controller is a result, and so is a harness error: see `Trial.status`.
+    `fault` and `trigger` are as for `build_mutant`; contexts, `always` and conditions are armed after
+    `armed_after_s` (s; default: the manifest's). `scenario` is a name or a file. Output goes to a new folder
+    in `out`; default: a temporary folder, deleted with the Trial.
+
+    MutatorError for a mistake in the arguments, CheckFailed if the golden run fails. A crash of the
+    controller or a harness error is a result: see `Trial.status`.
     """
     bench = Bench.of(workspace, target)
     file = bench.workspace.scenario(scenario)
@@ -136,7 +137,7 @@ def trial_of(
     same_as_record: bool | None = None,
     temporary: ScratchFolder | None = None,
 ) -> Trial:
-    """The trial of a single run."""
+    """Return the trial of a single run."""
     return Trial(
         experiment=single.experiment,
         record=single.record,

@@ -1,4 +1,4 @@
-"""The worst results of a run, those that a filter accepts."""
+"""The worst results of a run, optionally filtered."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -9,15 +9,17 @@ from mutator.outcomes.ranking import places
 from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import Row, lines_of, row_from
 
-_BATCH = 10_000  # rows that are filtered at a time
+_BATCH = 10_000  # rows filtered at a time
 
 
 def worst_results(run: Path, only: str | None = None, limit: int | None = None) -> tuple[list[Row], int]:
-    """The rows of a run folder, the worst first, at most `limit`; of those for which the filter `only` over
-    the columns of its results holds (`severity >= "S2" and not alerts`), and how many these are. The table is
-    brought up to date first; MutatorError for a filter that does not fit it."""
+    """Return at most `limit` results of a run folder, worst first, and the number of all that match.
+
+    `only` is a filter over the columns of the results (`severity >= "S2" and not alerts`). The table is
+    updated first. MutatorError for an invalid filter.
+    """
     texts = Results.up_to_date(run).texts()
-    order = places(texts).argsort().tolist()  # of all: those that are left keep their order
+    order = places(texts).argsort().tolist()  # of all rows; filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(texts.columns))
         batches = range(0, len(texts), _BATCH)
@@ -28,7 +30,7 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
 
 
 def _typed(line: Mapping[str, str]) -> dict[str, object]:
-    """Cells as a filter compares them: numbers as numbers, nothing as None."""
+    """Convert cells for a filter: numbers to numbers, empty cells to None."""
     return {name: _value(name, text) if text else None for name, text in line.items()}
 
 
@@ -37,5 +39,5 @@ def _value(name: str, text: str) -> object:
         return text
     try:
         return float(text)
-    except ValueError:  # a fault's value may be a word
+    except ValueError:  # a fault's value may be text
         return text

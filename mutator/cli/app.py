@@ -1,4 +1,4 @@
-"""`mutator`: the verbs put together, and what becomes of an error."""
+"""The program `mutator`: collects the verbs and reports errors."""
 
 import errno
 import io
@@ -47,10 +47,10 @@ from mutator.errors import (
 
 EXIT_INTERRUPTED = 130
 EXIT_CODES = {
-    EXIT_OK: "fine",
+    EXIT_OK: "success",
     EXIT_CHECK_FAILED: "a check failed",
     EXIT_WRONG_INPUT: "wrong input",
-    EXIT_HARNESS_ERRORS: "harness errors or experiments left",
+    EXIT_HARNESS_ERRORS: "harness errors or unfinished experiments",
     EXIT_INTERRUPTED: "interrupted",
 }
 THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -58,7 +58,7 @@ THE_MACHINE_SAYS_NO = {errno.EACCES, errno.EPERM, errno.EROFS}
 GROUPS = (
     ("Look around", ("list", "places", "init", "upgrade", "stpa", "check", "doctor", "cache")),
     ("One fault", ("try", "diff", "generate")),
-    ("Before they run", ("review",)),
+    ("Before a campaign", ("review",)),
     ("Campaigns", ("plan", "run", "merge", "report", "clean")),
     ("After a campaign", ("compare", "export", "verify")),
     ("One experiment", ("show", "rerun")),
@@ -66,23 +66,23 @@ GROUPS = (
 )
 EXAMPLES = f"""\b
 Examples:
-  mutator list                                    what the library holds
-  mutator try radar/chaff --scenario S1           one fault: diff, verdict, plot
-  mutator run quickstart --out runs/first         a campaign, resumed by the same command
-  mutator show 3f9a                               one of its experiments, by the start of its id
+  mutator list                                    show what the library contains
+  mutator try radar/chaff --scenario S1           try one fault: diff, verdict, plot
+  mutator run quickstart --out runs/first         run or resume a campaign
+  mutator show 3f9a                               show one experiment by the start of its id
 
 \b
 Exit codes: {", ".join(f"{code} {meaning}" for code, meaning in EXIT_CODES.items())}.
-Library, templates and target are those of an option, before or after the command; of the environment;
-of the nearest folder upward with a fault_library/; else those that ship with mutator.
+mutator looks for the library, templates and target in this order: options (before or after the command),
+environment variables, the nearest parent folder with a fault_library/, the copies that ship with mutator.
 """
 
 
 class Verbs(TyperGroup):
-    """The group of verbs, listed by what one does with them."""
+    """The verbs, grouped by purpose in the help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """One section of the help for each group of verbs."""
+        """Write one section of the help for each group of verbs."""
         for title, names in GROUPS:
             rows = [(name, self.commands[name].get_short_help_str(90)) for name in names]
             with formatter.section(title):
@@ -115,7 +115,7 @@ def start(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Put faults into a driving controller, drive it, and see what they did."""
+    """Inject faults into a driving controller, simulate it, and see the effects."""
     ctx.obj = Place(root=root, library=library, templates=templates, target=target)
 
 
@@ -139,8 +139,8 @@ for module in (
 
 
 def program() -> int:
-    """The program `mutator`. Where experiments are left it ends at once: a library that found no memory while
-    it was loaded may crash as the interpreter unloads it."""
+    """Run the program `mutator`. With unfinished experiments it exits at once: a library that ran out of
+    memory while loading may crash when the interpreter unloads it."""
     code = main()
     if code == EXIT_HARNESS_ERRORS:
         sys.stdout.flush()
@@ -150,22 +150,22 @@ def program() -> int:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line; returns its exit code and never lets a user's mistake end in a traceback."""
+    """Run one command line and return its exit code. A user's mistake never ends in a traceback."""
     _open_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # like standard error: what cannot be shown is told
+        sys.stdout.reconfigure(errors="backslashreplace")  # as on standard error
     try:
         code = _answer(sys.argv[1:] if argv is None else argv)
-        sys.stdout.flush()  # now, for at the interpreter's end a closed pipe would be an error
-    except BrokenPipeError:  # who read the output has seen enough
+        sys.stdout.flush()  # now: when the interpreter exits, a closed pipe would be an error
+    except BrokenPipeError:  # the reader has closed the pipe
         discard(sys.stdout)
         return EXIT_OK
     return code
 
 
 def _open_streams() -> None:
-    """Discard what goes to closed standard streams: else a file that is opened gets the number of one, and
-    the words that were meant for it."""
+    """Replace closed standard streams by null devices. Otherwise a new file could get a standard stream's
+    number, and its text."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             file = os.open(os.devnull, os.O_RDWR)
@@ -177,11 +177,11 @@ def _open_streams() -> None:
 
 
 def _answer(words: Sequence[str]) -> int:
-    """Run one command line, and show what ends it early; BrokenPipeError when nobody reads its output."""
+    """Run one command line and report errors; raises BrokenPipeError when nobody reads the output."""
     try:
-        # Not `app()`: it would answer errors, interruptions and closed pipes in its own way.
+        # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = get_command(app)
-        if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks what fits
+        if "_MUTATOR_COMPLETE" in os.environ:  # a shell asks for completions
             command.main(prog_name="mutator")
         with (
             _warnings_in_one_line(),
@@ -192,7 +192,7 @@ def _answer(words: Sequence[str]) -> int:
         return EXIT_OK
     except typer.Exit as e:
         return e.exit_code
-    except SystemExit as e:  # completion ends so
+    except SystemExit as e:  # from completion
         return int(e.code or 0)
     except MutatorError as e:
         show_error(e)
@@ -212,7 +212,7 @@ def _answer(words: Sequence[str]) -> int:
 
 
 def _known(error: Exception) -> MutatorError | None:
-    """What a user can mend of an error that came from the machine."""
+    """Turn an error of the machine that the user can fix into a MutatorError."""
     where = getattr(error, "filename", None)
     if is_disk_full(error):
         return disk_full(where)
@@ -227,15 +227,15 @@ def _known(error: Exception) -> MutatorError | None:
 
 def _no_text(characters: str) -> MutatorError:
     return MutatorError(
-        f"{characters!a}, which is no text in this environment",
-        expected="names in UTF-8, and an environment that says so",
-        remedy="set LC_ALL=C.UTF-8, or PYTHONUTF8=1; or use other names",
+        f"{characters!a} cannot be encoded in this environment",
+        expected="names in UTF-8 and a UTF-8 locale",
+        remedy="set LC_ALL=C.UTF-8 or PYTHONUTF8=1, or use other names",
     )
 
 
 @contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
-    """Within it, the harness's own warnings are a line of standard error each."""
+    """Print each of the harness's warnings as one line on standard error."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 
@@ -261,7 +261,7 @@ def _usage(error: typer.TyperException) -> int:
 
 def _defect() -> int:
     _say(traceback.format_exc().rstrip())
-    _say("this is a defect of mutator, not of your input; please report it with the lines above")
+    _say("this is a defect of mutator, not of your input; please report it together with the lines above")
     return EXIT_HARNESS_ERRORS
 
 

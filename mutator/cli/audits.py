@@ -1,4 +1,4 @@
-"""`verify`: does a run folder hold what was found, and does it all follow?"""
+"""`verify`: audit a run folder."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +14,7 @@ from mutator.errors import EXIT_CHECK_FAILED
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("verify", epilog=EXAMPLES)(verify)
 
 
@@ -29,22 +29,23 @@ Examples:
 @with_place
 def verify(
     run: Annotated[Path, typer.Argument(metavar="DIR", help="A run folder.", autocompletion=completion.runs)],
-    rerun: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Drive N experiments, drawn by lot, again.")
-    ] = 0,
+    rerun: Annotated[int, typer.Option(metavar="N", min=0, help="Rerun N randomly drawn experiments.")] = 0,
     expect: Annotated[
-        str | None, typer.Option(metavar="SEAL", help="The seal that the run must have, 64 hex digits.")
+        str | None, typer.Option(metavar="SEAL", help="The expected seal, 64 hex digits.")
     ] = None,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Put what is damaged aside; the same `run` then fills the gap.")
+        bool,
+        typer.Option(
+            "--repair", help="Set damaged parts aside; `run` with the same folder then redoes them."
+        ),
     ] = False,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Audit a run folder, wherever it comes from: one page to keep.
+    """Audit a run folder and print one page to keep.
 
-    Exit code 1 if anything is not as it was written, or does not follow from plan and sources.
+    Exit code 1 if anything was changed or does not follow from the plan and the sources.
     """
     terminal = Terminal(as_json)
     with terminal.wait("verifying"):

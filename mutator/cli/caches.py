@@ -1,4 +1,4 @@
-"""`cache`: what is kept from one command to the next."""
+"""`cache`: list and delete what is cached between commands."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("cache", epilog=EXAMPLES)(cache)
 
 
@@ -37,18 +37,17 @@ def cache(
     most: Annotated[
         str | None,
         typer.Option(
-            "--max", metavar="SIZE", help="Delete the least recently used entries until it is no larger."
+            "--max", metavar="SIZE", help="Delete the least recently used entries down to this size."
         ),
     ] = None,
-    clear: Annotated[bool, typer.Option("--clear", help="Delete all of it.")] = False,
+    clear: Annotated[bool, typer.Option("--clear", help="Delete everything.")] = False,
     as_json: Json = False,
 ) -> None:
-    """List what is cached on this machine, and delete what is too much.
+    """List or delete what is cached on this machine.
 
-    Passed checks of campaigns are kept for other run folders, pictures and detections of a target for its
-    other runs, which lines golden runs execute, what image effects look like, and which finished runs were
-    verified. It lies below XDG_CACHE_HOME, or in ~/.cache. Results never depend on it; without it runs take
-    longer.
+    The cache holds passed checks of campaigns, the target's frames and detections, which lines golden runs
+    execute, previews of image effects, and which finished runs were verified. It is in XDG_CACHE_HOME, or in
+    ~/.cache. Results never depend on it; without it, runs take longer.
     """
     if path + clear + (most is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")
@@ -73,11 +72,11 @@ def cache(
 
 
 def parse_size(text: str) -> int:
-    """Bytes of a size as people write it: 2GB, 500 MB, 0; MutatorError for anything else."""
+    """Return the number of bytes of a size such as 2GB, 500 MB or 0; MutatorError for anything else."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
     if not found:
         raise MutatorError(
-            f"size '{text}'", expected="a number of B, kB, MB, GB or TB", remedy="write it like 2GB"
+            f"size '{text}'", expected="a number of B, kB, MB, GB or TB", remedy="write e.g. 2GB"
         )
     return int(float(found[1]) * _UNITS[(found[2] or "B").upper()])
 

@@ -1,4 +1,4 @@
-"""`plan` and `run`: campaigns."""
+"""`plan` and `run`: plan and run campaigns."""
 
 import shlex
 import sys
@@ -45,16 +45,16 @@ CampaignName = Annotated[
     str,
     typer.Argument(
         metavar="CAMPAIGN",
-        help="A campaign of the library, or a campaign file.",
+        help="Name of a campaign in the library, or a campaign file.",
         autocompletion=completion.campaigns,
     ),
 ]
 
-ONE_PER_CORE = "Default: one for each usable core."
+ONE_PER_CORE = "Default: one per usable core."
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("plan", epilog=PLAN_EXAMPLES)(plan)
     app.command("run", epilog=RUN_EXAMPLES)(run)
 
@@ -72,7 +72,7 @@ def plan(
     out: OutRun,
     workers: Annotated[
         int | None,
-        typer.Option("-n", "--workers", min=1, help=f"Expect a run with so many. {ONE_PER_CORE}"),
+        typer.Option("-n", "--workers", min=1, help=f"Estimate for this many workers. {ONE_PER_CORE}"),
     ] = None,
     only: Only = None,
     exclude: Exclude = None,
@@ -83,9 +83,9 @@ def plan(
     *,
     place: Place,
 ) -> None:
-    """Freeze a campaign's experiments without running any.
+    """Fix a campaign's experiments without running any.
 
-    Also says the expected time and disk. `run` with the same folder then runs exactly these.
+    Prints the expected time and disk space. `run` with the same folder then runs exactly these experiments.
     """
     from mutator.api.plans import not_forkable
 
@@ -157,7 +157,7 @@ Examples:
   mutator run paper --out runs/paper --cluster tls://10.0.0.5:8786
   mutator run quickstart --out runs/s1 --only 'scenario == "S1" and method == "guided"'
 
-Interrupted or killed, the same command goes on where it stopped.
+The same command resumes an interrupted or killed run.
 """
 
 
@@ -168,7 +168,7 @@ def run(
     workers: Annotated[
         int | None,
         typer.Option(
-            "-n", "--workers", min=0, help=f"Worker processes; 0: this process alone. {ONE_PER_CORE}"
+            "-n", "--workers", min=0, help=f"Worker processes; 0: only this process. {ONE_PER_CORE}"
         ),
     ] = None,
     only: Only = None,
@@ -181,7 +181,9 @@ def run(
     engine: Engine = None,
     reviewed: Annotated[
         bool,
-        typer.Option("--require-reviewed", help="Run nothing that `mutator review` has no approval of."),
+        typer.Option(
+            "--require-reviewed", help="Refuse to run unless `mutator review` approved every mutant."
+        ),
     ] = False,
     accept_versions: AcceptVersions = False,
     cluster: Cluster = None,
@@ -189,15 +191,15 @@ def run(
     stills: Annotated[
         bool,
         typer.Option(
-            help="Drive the worst experiments that see pictures again, for stills in the report: one of 20, "
-            "at most ten, and about two minutes."
+            help="Rerun the worst camera experiments for stills in the report: one in 20, at most ten, "
+            "about two minutes."
         ),
     ] = True,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Run or resume a campaign; ends with its table and report."""
+    """Run or resume a campaign; print its results and write its report."""
     from mutator.cli.progress import campaign_progress
 
     terminal = Terminal(as_json)
@@ -207,7 +209,7 @@ def run(
     workers = usable_cores() if workers is None else workers
     try:
         with campaign_progress(terminal) as notify, warnings.catch_warnings():
-            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` says it in full
+            warnings.simplefilter("ignore", mutator.IncompleteRun)  # `_print_end` reports it
             made = mutator.run(
                 campaign,
                 out,
@@ -225,7 +227,7 @@ def run(
                 _take_stills(terminal, made, notify, workers)
             written = _report(out, made, notify)
     except KeyboardInterrupt:
-        raise typer.Abort(f"interrupted; what finished is kept; go on: {resume_command()}") from None
+        raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
     assert made.summary is not None  # it has just run
     _print_end(terminal, out, made, made.summary, written)
     if made.summary.exit_code:
@@ -233,9 +235,9 @@ def run(
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
-    """Pictures for the report; a run is no worse for lack of them."""
+    """Take stills for the report; without them the run still succeeds."""
     if problem := run.take_stills(notify, workers=workers):
-        terminal.note(f"no pictures of {problem}")
+        terminal.note(f"no stills of {problem}")
 
 
 def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
@@ -245,11 +247,11 @@ def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
     notify(mutator.Progress(stage="report"))
     try:
         return run.report()
-    except MutatorError:  # nobody holds the folder any more: `clean` may have come
+    except MutatorError:  # the folder is no longer locked: `clean` may have deleted it
         if not run.finish_deletion():
             raise
         raise MutatorError(
-            "deleted by another command while its report was written",
+            "another command deleted the folder while its report was written",
             where=out,
             remedy="run the campaign again",
         ) from None
@@ -258,7 +260,7 @@ def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
 def _print_end(
     terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "Report | None"
 ) -> None:
-    """The end of a run: table, report, and what is left to do."""
+    """Print the results, the report's path, and what is unfinished."""
     report = (
         [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
     )
@@ -282,16 +284,16 @@ def _print_end(
         terminal.say(f"seal: {summary.seal}")
     if summary.harness_errors:
         terminal.say(
-            f"{len(summary.harness_errors)} harness errors, in no count; the same command tries them again:"
+            f"{len(summary.harness_errors)} harness errors, not counted; the same command retries them:"
         )
         for name, detail in summary.harness_errors[:5]:
             terminal.say(f"  {name}: {detail}", style="red")
     if summary.problem:
         terminal.complain(summary.problem)
     if summary.interrupted or summary.done < summary.planned:
-        terminal.say(f"go on: {resume_command()}", style="bold", whole=True)
+        terminal.say(f"resume: {resume_command()}", style="bold", whole=True)
 
 
 def resume_command() -> str:
-    """The command line that goes on: the same one."""
+    """Return the command that resumes the run, which is the same one."""
     return shlex.join(["mutator", *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""`compare`: two runs of the same faults, and a gate on what got worse."""
+"""`compare`: compare two runs of the same faults, with a gate on changes for the worse."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -15,15 +15,15 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 if TYPE_CHECKING:
     from mutator.comparison.comparison import Comparison, Finding
 
-NAMED = 20  # experiments that the terminal names; the written comparison has all
+NAMED = 20  # experiments named in the terminal; the written comparison has all
 GATES = (
     "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
-    "unmatched, severity:CLASS (S0 to S3: a contact of that class or a worse one, and milder or none before)"
+    "unmatched, severity:CLASS (S0 to S3: a contact of that class or worse, after a milder one or none)"
 )
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("compare", epilog=EXAMPLES)(compare)
 
 
@@ -34,8 +34,8 @@ Examples:
   mutator compare runs/main runs/change --fail-on new-hazard,new-crash,harness-error
   mutator compare runs/main runs/change --fail-on severity:S2
 
-With --fail-on, exit code 1 if anything of that kind is found (each is named), else 3 if experiments have no
-result in a run, for then nobody can say that nothing got worse.
+With --fail-on, the exit code is 1 if anything of that kind is found (each is named). Otherwise it is 3 if
+experiments lack a result in either run, because the comparison is then incomplete.
 """
 
 
@@ -43,27 +43,32 @@ def compare(
     run_a: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN_A", help="A run folder: before, or the one.", autocompletion=completion.runs
+            metavar="RUN_A",
+            help="The first run folder, e.g. before a change.",
+            autocompletion=completion.runs,
         ),
     ],
     run_b: Annotated[
         Path,
-        typer.Argument(metavar="RUN_B", help="Another: after, or the other.", autocompletion=completion.runs),
+        typer.Argument(
+            metavar="RUN_B", help="The second run folder, e.g. after it.", autocompletion=completion.runs
+        ),
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="DIR", help="Where to write; default: RUN_B/report/compare-<RUN_A>."),
+        typer.Option("--out", metavar="DIR", help="Where to write. Default: RUN_B/report/compare-<RUN_A>."),
     ] = None,
     only: Only = None,
     fail_on: Annotated[
-        list[str] | None, typer.Option("--fail-on", metavar="KIND,...", help=f"Kinds: {GATES}.")
+        list[str] | None,
+        typer.Option("--fail-on", metavar="KIND,...", help=f"Fail on these changes: {GATES}."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Compare two runs, experiment by experiment.
 
-    Experiments are matched by fault, value, scenario and trigger, whatever the target, reading or setting;
-    what got better, worse, newly hazardous, with paired statistics; a page, a table and CSV are written.
+    Matches experiments by fault, value, scenario and trigger; target, reading and settings may differ.
+    Reports what got better, worse or newly hazardous, with paired statistics. Writes a page, a table and CSV.
     """
     terminal = Terminal(as_json)
     gates = _gates(fail_on or [])
@@ -132,7 +137,7 @@ def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") 
 def _judge(
     terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
 ) -> None:
-    """The gate: exit 1 at what it fails on, 3 when results are missing."""
+    """Apply the gate: exit with 1 on a finding, with 3 when results are missing."""
     for finding in failing[:NAMED]:
         terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
     if more := failing[NAMED:]:

@@ -1,7 +1,6 @@
-"""What a shell completes when one presses Tab: names of the library, run folders, ids of experiments.
+"""Shell completion of names in the library, run folders and experiment ids.
 
-A shell asks with every key press, so only names of files are looked at, and the plan of one run as text.
-Where nothing fits, the shell completes files by itself.
+It must be fast, so it reads only file names, and the plan of one run as text.
 """
 
 import csv
@@ -18,7 +17,7 @@ Completer = Callable[[typer.Context, str], list[str]]
 
 
 def names_in(folder: str) -> Completer:
-    """Completes the names of the library's files in this folder."""
+    """Return a completer for the names of the library's files in this folder."""
 
     def complete(ctx: typer.Context, incomplete: str) -> list[str]:
         return _starting(library_files(_library(ctx), folder), incomplete)
@@ -33,29 +32,29 @@ targets = names_in("targets")
 
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Completes the run folders in runs/, as one types them."""
+    """Complete the run folders in runs/."""
     return _starting(map(_from_here, run_folders(_library(ctx).parent)), incomplete)
 
 
 def experiments(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Completes the ids of experiments of the run that is named, or of the newest one."""
+    """Complete the experiment ids of the named run, or of the newest one."""
     folders = [Path(run)] if (run := ctx.params.get("run")) else run_folders(_library(ctx).parent)[:1]
     return [name for folder in folders for name in _starting(_ids(folder), incomplete)]
 
 
 def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Completes either."""
+    """Complete names of specs and ids of experiments."""
     return specs(ctx, incomplete) + experiments(ctx, incomplete)
 
 
 def _library(ctx: typer.Context) -> Path:
-    """The library that the options before or after the verb name, or the environment."""
+    """Return the library that the options before or after the verb, or the environment, name."""
     given: dict[str, Any] = {}
     for one in (ctx.find_root(), ctx):
         given |= {name: one.params.get(name) for name in ("root", "library") if one.params.get(name)}
     try:
         return library_folder(**given)
-    except MutatorError:  # what ships cannot be unpacked
+    except MutatorError:  # the shipped library cannot be unpacked
         return Path("fault_library")
 
 

@@ -1,6 +1,6 @@
-"""How the command line speaks: Rich in a terminal, plain text in a pipe, JSON where a program reads.
+"""Output of the command line: Rich in a terminal, plain text in a pipe, JSON for programs.
 
-Rich is imported when the first line is printed, so `--help` and shell completion do not pay for it.
+Rich is imported when the first line is printed, so `--help` and shell completion stay fast.
 """
 
 import codecs
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
-PIPE_COLUMNS = 100  # of lines that no terminal shows, unless COLUMNS says otherwise
+PIPE_COLUMNS = 100  # line width outside a terminal, unless COLUMNS is set
 
 STYLES = {
     "ok": "green",
@@ -43,7 +43,7 @@ STYLES = {
 
 @dataclass
 class Terminal:
-    """Standard output and standard error of one command. With `as_json` only `emit` writes to the output."""
+    """Standard output and standard error of a command. With `as_json`, only `emit` writes to the output."""
 
     as_json: bool = False
 
@@ -56,22 +56,22 @@ class Terminal:
         return _console(stderr=True)
 
     def say(self, text: str = "", style: str | None = None, *, whole: bool = False) -> None:
-        """Lines of text, folded; `whole`: as they are, as of a command that one copies."""
+        """Print text, folded; with `whole`, unfolded, e.g. for a command to copy."""
         if not self.as_json:
             _print(self.out, text, style, whole=whole)
 
     def note(self, text: str) -> None:
-        """A remark beside the result: to standard error, so that a pipe gets the result alone."""
+        """Print a remark to standard error, so that a pipe gets only the result."""
         with remarking():
             _print(self.err, text, "dim")
 
     def complain(self, text: str) -> None:
-        """What went wrong, to standard error."""
+        """Print an error to standard error."""
         with remarking():
             _print(self.err, f"error: {text}", "bold red")
 
     def emit(self, data: Any) -> None:
-        """The result as one JSON document; numbers JSON does not know (infinity, nan) become null."""
+        """Print the result as one JSON document; infinity and NaN become null."""
         is_narrow = codecs.lookup(sys.stdout.encoding).name != "utf-8"
         json.dump(_jsonable(data), sys.stdout, indent=2, ensure_ascii=is_narrow, allow_nan=False)
         sys.stdout.write("\n")
@@ -84,7 +84,7 @@ class Terminal:
         right: Sequence[int] = (),
         total: bool = False,
     ) -> None:
-        """A table; columns in `right` are numbers; with `total` the last row is set apart."""
+        """Print a table; columns in `right` are right-aligned; with `total`, the last row is set apart."""
         cells = [[_cell(c) for c in row] for row in rows]
         if self.as_json:
             return
@@ -94,7 +94,7 @@ class Terminal:
             self.say(Table(heads=heads, rows=cells, right=right).as_text(), whole=True)
 
     def diff(self, patch: str) -> None:
-        """A unified diff, coloured in a terminal; elsewhere its very bytes, for `patch`."""
+        """Print a unified diff: coloured in a terminal, byte for byte elsewhere, for `patch`."""
         if self.as_json:
             return
         if not self.out.is_terminal:
@@ -111,7 +111,7 @@ class Terminal:
 
     @contextmanager
     def wait(self, text: str) -> Iterator[None]:
-        """Tell that something takes a moment, and for how long by now."""
+        """Show a spinner and the elapsed time."""
         if self.as_json or not self.err.is_terminal:
             yield
             return
@@ -124,7 +124,7 @@ class Terminal:
 
     @contextmanager
     def count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
-        """A progress bar over `total` equal steps; yields what to call after each."""
+        """Show a progress bar of `total` equal steps; yields the function to call after each step."""
         if self.as_json or not self.err.is_terminal:
             yield lambda: None
             return
@@ -141,7 +141,7 @@ class Terminal:
             yield lambda: progress.advance(task)
 
 
-# options that are not named like the argument of the API that they stand for
+# options whose name differs from the API's argument
 _OPTIONS = {
     "armed_after_s": "--armed-after",
     "gates": "--fail-on",
@@ -156,13 +156,12 @@ _OPTIONS = {
 
 
 def option(argument: str) -> str:
-    """The option of the command line that stands for an argument of the API."""
+    """Return the command-line option for an argument of the API."""
     return _OPTIONS.get(argument) or "--" + argument.replace("_", "-")
 
 
 def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
-    """The error as the command line says it: options where the API names its arguments; `own` are those that
-    the command names in its own way."""
+    """Return the error with options in place of API arguments; `own` holds the command's exceptions."""
     if error.argument is None:
         return error
 
@@ -175,7 +174,7 @@ def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType(
 
 
 def show_error(error: MutatorError) -> None:
-    """An error of the user's, in one piece: place, what was got, expected, what to do."""
+    """Print a user's error: place, what was found, what was expected, what to do."""
     terminal, error = Terminal(), with_options(error)
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
     terminal.complain(f"{place}: {error.got}" if place else error.got)
@@ -186,7 +185,7 @@ def show_error(error: MutatorError) -> None:
 
 
 def error_text(error: MutatorError) -> str:
-    """An error as one of several: one line, its file as the user would type it."""
+    """Return an error as one line, with the file as the user would type it."""
     error = with_options(error)
     where = short_path(error.where) or None
     return str(
@@ -213,7 +212,7 @@ def _rich_table(
 
 
 def short_path(where: str | Path | None) -> str:
-    """A path as the user would type it: relative when it lies below the current folder."""
+    """Return a path as the user would type it: relative if it lies below the current folder."""
     if not where:
         return ""
     path = Path(where)
@@ -225,7 +224,7 @@ def short_path(where: str | Path | None) -> str:
 
 @contextmanager
 def remarking() -> Iterator[None]:
-    """Within it, standard error is written to. That nobody can read it is no reason to stop a command."""
+    """Ignore failures to write to standard error: they must not stop a command."""
     try:
         yield
     except OSError:
@@ -233,7 +232,7 @@ def remarking() -> Iterator[None]:
 
 
 def discard(stream: TextIO) -> None:
-    """Drop what is still buffered in a standard stream, and all that will be written to it."""
+    """Drop what is buffered in a standard stream and everything written to it later."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, stream.fileno())
     os.close(nowhere)
@@ -243,23 +242,23 @@ def _console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
     class Piped(Console):
-        """Says when nobody reads any more, as other files do, instead of leaving with 1."""
+        """A console that raises BrokenPipeError, as other files do, instead of exiting with 1."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return Piped(stderr=stderr, highlight=False, emoji=False)  # `:x:` in a text is no picture
+    return Piped(stderr=stderr, highlight=False, emoji=False)  # keep `:x:` as text
 
 
 def _print(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
-    """Print text without markup, folded unless it stays `whole`."""
+    """Print text without markup, folded unless `whole`."""
     if not whole:
         text = folded(text, console.width if console.is_terminal else _columns())
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def _columns() -> int:
-    """How wide a line is that goes into a pipe or a file."""
+    """Return the line width for a pipe or a file."""
     told = os.environ.get("COLUMNS", "")
     return int(told) if told.isdecimal() and int(told) else PIPE_COLUMNS
 
@@ -282,7 +281,7 @@ def _jsonable(value: Any) -> Any:
 
 
 def _diff_style(line: str) -> str:
-    """Rich style of one line of a unified diff."""
+    """Return the Rich style of one line of a unified diff."""
     if line.startswith(("+++", "---", "diff ", "index ", "new file")):
         return "bold"
     if line.startswith("@@"):

@@ -1,4 +1,4 @@
-"""One experiment printed: what was injected, what happened when, what became of it."""
+"""Prints one experiment: what was injected, what happened when, the verdict."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -26,14 +26,14 @@ _TIMES = {
 
 
 def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
-    """The one experiment whose id starts with `prefix` in `run`, or in the newest run."""
+    """Find the only experiment whose id starts with `prefix`, in `run` or in the newest run."""
     return load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(prefix)
 
 
 def list_worst(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
-    """The worst results of `run`, or of the newest run, as a table, those that the filter accepts."""
+    """Print a table of the worst results in `run`, or in the newest run, that match the filter."""
     folder = run or newest_run(workspace.library.parent)
     found, count = worst_results(load_run(folder).path, only, limit)
     rows = [_line(row) for row in found]
@@ -46,7 +46,7 @@ def list_worst(
 
 
 def _line(row: "Row") -> dict[str, object]:
-    """A line of that table."""
+    """Return one row of that table."""
     return {
         "experiment": row.experiment_id,
         "ending": row.ending,
@@ -61,7 +61,7 @@ def _line(row: "Row") -> dict[str, object]:
 
 
 def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -> None:
-    """Heading, what was asked for, and the diff."""
+    """Print what was injected, and the diff."""
     facts = describe(experiment)
     width = max(len(name) for name in facts)
     for name, value in facts.items():
@@ -74,8 +74,8 @@ def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -
 
 
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
-    """The verdict of an experiment that ran and a table of what happened when, counted from the activation;
-    differences from golden are those up to the end of the drive."""
+    """Print the verdict of an experiment that ran, and its events with times from the activation. Differences
+    from golden count up to the end of the drive."""
     record = result.record
     assert record is not None
     ending = record.outcome.value if record.outcome else record.status.value
@@ -106,7 +106,7 @@ def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
 
 
 def print_path(terminal: Terminal, found: "RunExperiment") -> None:
-    """How far the fault got, in two lines."""
+    """Print how far the fault propagated, in two lines."""
     if (path := found.fault_path) is None:
         return
     terminal.say(f"path: {' > '.join(map(_stage, path.stages))}")
@@ -115,7 +115,7 @@ def print_path(terminal: Terminal, found: "RunExperiment") -> None:
 
 
 def _stage(stage: "Stage") -> str:
-    """`brakes reached 3.50 s`; what an injected component records may have changed by feedback alone."""
+    """Return e.g. `brakes reached 3.50 s`; no time for an injected component, which feedback may change."""
     what = f"{stage.component} {stage.state.value}"
     if stage.state.value == "injected":
         return what
@@ -141,7 +141,7 @@ def _events(record: "Record") -> list[tuple[float, str]]:
 
 
 def show_trial(terminal: Terminal, trial: "Trial") -> None:
-    """Everything about an experiment that was just run alone; its plot goes beside its traces."""
+    """Print everything about an experiment that `try` has just run; writes its plot next to its traces."""
     with terminal.wait("drawing"):
         drawn = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
@@ -153,7 +153,7 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)
-        terminal.say(f"the fault-free run reaches {reached} itself: that need not be the fault's doing")
+        terminal.say(f"the fault-free run also reaches {reached}: the fault may not be the cause")
     if trial.log.strip() and trial.record.detail:
         terminal.say("last lines of the run:")
         terminal.say(trial.log.strip(), whole=True)

@@ -20,20 +20,20 @@ DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("show", epilog=SHOW_EXAMPLES)(show)
     app.command("rerun", epilog=RERUN_EXAMPLES)(rerun)
 
 
 SHOW_EXAMPLES = """\b
 Examples:
-  mutator show 3f9a                          of the newest run in runs/
+  mutator show 3f9a                          an experiment of the newest run in runs/
   mutator show 3f9a --run runs/first --no-plot
-  mutator show                               the ten worst
+  mutator show                               the ten worst experiments
   mutator show --only 'severity >= "S2"' --limit 30
   mutator show 3f9a --patch | (cd target && patch -p1)
-  mutator show 3f9a --video 3f9a.mp4         drives both runs again, with a film
-  mutator show 3f9a --still 14.5             a picture of it, for the report
+  mutator show 3f9a --video 3f9a.mp4         rerun golden and faulty, and film them
+  mutator show 3f9a --still 14.5             one frame of the film, for the report
   mutator show 3f9a --still 14.5=early.png --still 20=late.png
 """
 
@@ -44,40 +44,40 @@ def show(
         str | None,
         typer.Argument(
             metavar="[EXPERIMENT]",
-            help="Id of an experiment, or the start of one; without it, the worst are listed.",
+            help="Id of an experiment, or its start. Default: list the worst.",
             show_default=False,
             autocompletion=completion.experiments,
         ),
     ] = None,
     run: Run = None,
     plot: Annotated[
-        bool, typer.Option(help="Draw golden against faulty (drives it again if no trace was kept).")
+        bool, typer.Option(help="Plot golden and faulty (reruns the experiment if no trace was kept).")
     ] = True,
     video: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Film golden beside faulty: a .mp4 or .gif.")
+        Path | None, typer.Option(metavar="FILE", help="Film golden next to faulty: a .mp4 or .gif.")
     ] = None,
     still: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="T=FILE", help="One picture of that film, at T seconds: a .png or .jpg. May be repeated."
+            metavar="T=FILE", help="One frame of that film, at T seconds: a .png or .jpg; repeatable."
         ),
     ] = None,
     only: Annotated[
         str | None,
-        typer.Option(metavar="EXPR", help="List only those for whose results this holds: 'delta_v > 5'."),
+        typer.Option(metavar="EXPR", help="List only experiments whose results match, e.g. 'delta_v > 5'."),
     ] = None,
-    limit: Annotated[int, typer.Option(min=1, help="List so many.")] = 10,
+    limit: Annotated[int, typer.Option(min=1, help="List this many.")] = 10,
     patch_alone: Annotated[
         bool,
-        typer.Option("--patch", help="Print its whole patch, probe included, and nothing else."),
+        typer.Option("--patch", help="Print only the whole patch, including the probe."),
     ] = False,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Show diff, times, verdict, plot of golden against faulty; or watch them.
+    """Show an experiment: diff, times, verdict, plot, film.
 
-    Without an experiment the worst of a run are listed: by class of severity and delta-v, then by margin.
+    Without an experiment, lists the worst of a run, by severity class, delta-v and margin.
     """
     from mutator.cli import experiment_view
 
@@ -103,7 +103,7 @@ def show(
 
 
 def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
-    """The experiment for JSON, without its films."""
+    """Return the experiment as JSON data, without its films."""
     from mutator.api.experiment_results import describe
 
     facts = {**describe(found.experiment), **found.verdict, "patch": patch}
@@ -113,7 +113,7 @@ def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, 
 
 
 def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
-    """The experiment for people, without its pictures."""
+    """Print the experiment, without plot and films."""
     from mutator.cli import experiment_view
 
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -125,14 +125,14 @@ def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
     if found.stretch:
         terminal.say(f"run with: {found.stretch}")
     if not found.run.verifiable:
-        terminal.say("not verifiable: an earlier version of mutator wrote this run, without digests")
+        terminal.say("not verifiable: an older version of mutator wrote this run, without digests")
 
 
 def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
-    """The experiment's plot: the kept one, or one made now."""
+    """Return the path of the experiment's plot; draw it if it was not kept."""
     if found.is_drawn:
         return found.plot_file
-    with terminal.wait("no trace was kept: driving it again"):
+    with terminal.wait("no trace was kept: rerunning"):
         trial = found.rerun(keep=True)
     if trial.same_as_record is False:
         terminal.note(DIFFERS)
@@ -140,12 +140,12 @@ def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
 
 
 def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills: list[str]) -> list[Path]:
-    """Write the video and the stills that are wanted; returns their paths."""
+    """Write the video and the stills; returns their paths."""
     shots = [_still(text, found) for text in stills]
     shots += [mutator.Shot(out=video)] if video else []
     if not shots:
         return []
-    with terminal.wait("driving it again with a film"):
+    with terminal.wait("rerunning and filming"):
         same = found.film(shots)
     if not same:
         terminal.note(DIFFERS)
@@ -153,7 +153,7 @@ def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills
 
 
 def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
-    """The still of `T=FILE`, or of `T` alone: it is kept beside the plots, where the report finds it."""
+    """Parse `T=FILE`, or `T` alone, whose still goes next to the plots, where the report finds it."""
     t, named, name = text.partition("=")
     try:
         time = float(t)
@@ -169,8 +169,8 @@ def _still(text: str, found: "RunExperiment") -> "mutator.Shot":
 
 RERUN_EXAMPLES = """\b
 Examples:
-  mutator rerun 3f9a                    is the result the same again?
-  mutator rerun 3f9a --trace            the same, and keep its trace and plot, for the report's page, too
+  mutator rerun 3f9a                    compare the new result with the record
+  mutator rerun 3f9a --trace            also keep trace and plot, which the report's page then shows
 """
 
 
@@ -183,7 +183,7 @@ def rerun(
     *,
     place: Place,
 ) -> None:
-    """Drive one experiment again; is the result the same?
+    """Rerun one experiment and compare the result.
 
     Exit code 1 if the new record differs from the campaign's.
     """
@@ -192,7 +192,7 @@ def rerun(
 
     terminal = Terminal(as_json)
     found = experiment_view.find_experiment(place.workspace(), run, experiment)
-    with terminal.wait(f"driving {found.experiment.scenario} again"):
+    with terminal.wait(f"rerunning {found.experiment.scenario}"):
         trial = found.rerun(keep=trace)
     same, traces = trial.same_as_record, trial.single.faulty
     plot = found.plot_file if trace and trial.has_trace else None

@@ -1,4 +1,4 @@
-"""`export`: a run for other tools."""
+"""`export`: write a run for other tools."""
 
 from pathlib import Path
 from typing import Annotated
@@ -14,13 +14,13 @@ from mutator.exports import Format, Table
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("export", epilog=EXAMPLES)(export)
 
 
 EXAMPLES = """\b
 Examples:
-  mutator export runs/first --format mutation-elements   for the viewer of mutation testing reports
+  mutator export runs/first --format mutation-elements   for viewers of mutation testing reports
   mutator export runs/first --format junit --out junit.xml
   mutator export runs/first --format junit --failures hazard,crashed
   mutator export runs/first --format parquet --out first.parquet
@@ -35,32 +35,34 @@ def export(
     format: Annotated[Format, typer.Option(help="What to write.")],
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE", help="Where to; default: a file or folder in RUN/exports/."),
+        typer.Option(
+            "--out", metavar="FILE", help="Where to write. Default: a file or folder in RUN/exports/."
+        ),
     ] = None,
     failures: Annotated[
         str | None,
         typer.Option(
             metavar="ENDING,...",
-            help="JUnit: endings that are failures: hazard, sdc, masked, crashed, timeout. Default: none, "
-            "for a hazard is data.",
+            help="JUnit: endings that count as failures: hazard, sdc, masked, crashed, timeout. "
+            "Default: none.",
         ),
     ] = None,
     only: Annotated[
         str | None,
         typer.Option(
             metavar="EXPR",
-            help="MCAP: only experiments for which this holds, over the columns of the results, "
-            "e.g. 'outcome == \"hazard\"'.",
+            help="MCAP: only experiments whose result columns match, e.g. 'outcome == \"hazard\"'.",
         ),
     ] = None,
-    table: Annotated[Table, typer.Option(help="CSV and Parquet: the table.")] = Table.RESULTS,
+    table: Annotated[Table, typer.Option(help="CSV and Parquet: which table.")] = Table.RESULTS,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Write a run for other tools: mutation report, JUnit, CSV, Parquet, MCAP.
+    """Export a run: mutation report, JUnit, CSV, Parquet, MCAP.
 
-    MCAP is a file for each experiment: golden and faulty run as two sets of topics, with units, and events.
+    MCAP writes one file for each experiment, with events, units, and a set of topics each for the golden and
+    the faulty run.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace() if format is Format.MUTATION_ELEMENTS else None

@@ -20,7 +20,7 @@ EXPERIMENT_ID = re.compile(r"[0-9a-f]{4,16}")
 SpecName = Annotated[
     str,
     typer.Argument(
-        metavar="SPEC", help="A spec of the library, or a spec file.", autocompletion=completion.specs
+        metavar="SPEC", help="Name of a spec in the library, or a spec file.", autocompletion=completion.specs
     ),
 ]
 TriggerText = Annotated[
@@ -28,13 +28,13 @@ TriggerText = Annotated[
     typer.Option(
         "--trigger",
         metavar="WHEN",
-        help="A context (C1), a time in s (10), always, or a condition over what the target observes.",
+        help="A context (C1), a time in s (10), `always`, or a condition on observed values.",
     ),
 ]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("try", epilog=TRY_EXAMPLES)(try_spec)
     app.command("diff", epilog=DIFF_EXAMPLES)(diff)
     app.command("generate", epilog=GENERATE_EXAMPLES)(generate)
@@ -43,8 +43,8 @@ def register(app: typer.Typer) -> None:
 TRY_EXAMPLES = """\b
 Examples:
   mutator try radar/chaff --scenario S1 --trigger C2
-  mutator try radar/chaff -s S1 --value 40 --trigger 10   exactly 40 m, from 10 s on
-  mutator try my_fault.yaml --scenario S5               your own spec
+  mutator try radar/chaff -s S1 --value 40 --trigger 10   exactly 40 m, from 10 s
+  mutator try my_fault.yaml --scenario S5                 your own spec
 """
 
 
@@ -70,21 +70,18 @@ def try_spec(
         typer.Option(
             min=0,
             metavar="SECONDS",
-            help="Contexts and `always` count from then on; default: the manifest's.",
+            help="Arm contexts and `always` after this time. Default: the manifest's.",
         ),
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where diff, traces and plot go.")] = Path(
-        "runs/try"
-    ),
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder for patch, traces and plot.")
+    ] = Path("runs/try"),
     manifest: Manifest = None,
     as_json: Json = False,
     *,
     place: Place,
 ) -> None:
-    """Put one fault in, drive once: diff, verdict, plot.
-
-    The spec need not be in the library: a file will do.
-    """
+    """Inject one fault and run it once: diff, verdict, plot."""
     from mutator.api.selection import Bench, FaultChoice, one_of_each_variant
     from mutator.cli.experiment_view import show_trial
 
@@ -94,9 +91,9 @@ def try_spec(
     faults = bench.faults(choice)
     fault, _ = one_of_each_variant(faults)[0]
     if len(faults) > 1:
-        terminal.note(f"{fault.label}, one of {len(faults)} (choose by --variant, --value)")
+        terminal.note(f"{fault.label}, one of {len(faults)} (choose with --variant or --value)")
     when = bench.trigger(trigger, armed_after)
-    with terminal.wait(f"driving {scenario}, fault-free and faulty"):
+    with terminal.wait(f"running {scenario}, fault-free and faulty"):
         trial = mutator.try_fault(
             fault, scenario, when, seed=seed or 0, target=manifest, workspace=bench.workspace, out=out
         )
@@ -107,9 +104,9 @@ def try_spec(
 
 DIFF_EXAMPLES = """\b
 Examples:
-  mutator diff radar/chaff                        what the spec does to the source
+  mutator diff radar/chaff                        of a spec
   mutator diff my_fault.yaml --trigger C2 --patch | (cd target && patch -p1)
-  mutator diff 3f9a                               of an experiment of the newest run
+  mutator diff 3f9a                               of an experiment in the newest run
 """
 
 
@@ -119,7 +116,7 @@ def diff(
         str,
         typer.Argument(
             metavar="SPEC|EXPERIMENT",
-            help="A spec, a spec file, or an experiment.",
+            help="A spec, a spec file, or an experiment's id.",
             autocompletion=completion.specs_and_experiments,
         ),
     ],
@@ -130,7 +127,10 @@ def diff(
     reading: Reading = None,
     run: Run = None,
     patch: Annotated[
-        bool, typer.Option("--patch", help="The whole patch, probe included: `patch -p1` applies it.")
+        bool,
+        typer.Option(
+            "--patch", help="Print the whole patch, including the probe; apply it with `patch -p1`."
+        ),
     ] = False,
     manifest: Manifest = None,
     as_json: Json = False,
@@ -139,7 +139,7 @@ def diff(
 ) -> None:
     """Show what a fault changes in the source.
 
-    Of a spec, one diff for each of its variants, whose values share it.
+    For a spec, prints one diff for each variant. The values of a variant share its diff.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -167,7 +167,7 @@ def _print_diffs(terminal: Terminal, diffs: list[tuple[str, str, str]], *, whole
     if terminal.as_json:
         terminal.emit([{"fault": fault, "id": name, "patch": patch} for fault, name, patch in diffs])
     for fault, _, patch in diffs:
-        # `patch` skips what stands before a diff, so the heading may stay in a pipe.
+        # `patch` skips text before a diff, so the heading can stay in a pipe.
         terminal.say(f"# {fault}", style="bold", whole=True)
         text, note = (patch, "") if whole else readable(patch)
         terminal.diff(text)
@@ -179,11 +179,11 @@ OPERATORS = ", ".join(one.value for one in Operator)
 
 GENERATE_EXAMPLES = """\b
 Examples:
-  mutator generate radar/chaff --out mutants                     patches under every context
-  mutator generate 'radar/*' --out mutants --trees --trigger C2  whole trees too
+  mutator generate radar/chaff --out mutants                     patches for every context
+  mutator generate 'radar/*' --out mutants --trees --trigger C2  also whole source trees
   mutator generate --campaign quickstart --out mutants           the mutants of a campaign
   mutator generate --operators arithmetic,constant --in 'pkg/**::Car.*' -s S1 --out mutants
-                                                                 no spec: of these operators
+                                                                 mutation operators, without a spec
 """
 
 
@@ -192,24 +192,23 @@ def generate(
     specs: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="SPEC", help="Specs, globs over them, or spec files.", autocompletion=completion.specs
+            metavar="SPEC", help="Specs, globs of specs, or spec files.", autocompletion=completion.specs
         ),
     ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="A new or empty folder.")] = ...,  # type: ignore[assignment]
     campaign: Annotated[
-        str | None, typer.Option(help="The mutants of this campaign instead of specs.")
+        str | None, typer.Option(help="Use the mutants of this campaign instead of specs.")
     ] = None,
-    trees: Annotated[bool, typer.Option("--trees", help="Write each mutated source tree too.")] = False,
+    trees: Annotated[bool, typer.Option("--trees", help="Also write each mutated source tree.")] = False,
     triggers: Annotated[
         list[str] | None,
-        typer.Option(
-            "--trigger", metavar="WHEN", help="As for `try`; may be given again. Default: every context."
-        ),
+        typer.Option("--trigger", metavar="WHEN", help="As for `try`; repeatable. Default: every context."),
     ] = None,
     operators: Annotated[
         str | None,
         typer.Option(
-            metavar="NAMES", help=f"The mutants of these operators, without a spec: {OPERATORS}; or all."
+            metavar="NAMES",
+            help=f"Use mutation operators instead of specs: {OPERATORS}; or all.",
         ),
     ] = None,
     places: Annotated[
@@ -217,7 +216,7 @@ def generate(
         typer.Option(
             "--in",
             metavar="PLACE",
-            help="Where, with --operators: PATH::FUNCTION or PATH, with `*` and `**`; may be given again.",
+            help="With --operators: where, as PATH::FUNCTION or PATH, with `*` and `**`; repeatable.",
         ),
     ] = None,
     scenario: Annotated[
@@ -225,16 +224,16 @@ def generate(
         typer.Option(
             "--scenario",
             "-s",
-            help="With --operators: only lines that its golden run executes.",
+            help="With --operators: only lines that this scenario's golden run executes.",
             autocompletion=completion.scenarios,
         ),
     ] = None,
     all_lines: Annotated[
-        bool, typer.Option("--all-lines", help="With --operators: lines that no run executes, too.")
+        bool, typer.Option("--all-lines", help="With --operators: also lines that no run executes.")
     ] = False,
     sample: Annotated[
         int | None,
-        typer.Option(min=1, help="With --operators: draw so many, by operator and function, from --seed."),
+        typer.Option(min=1, help="With --operators: draw this many, by operator and function, from --seed."),
     ] = None,
     seed: Seed = None,
     reading: Reading = None,
@@ -243,7 +242,7 @@ def generate(
     *,
     place: Place,
 ) -> None:
-    """Write mutants as patches or trees, with an index."""
+    """Write mutants as patches or source trees, with an index."""
     terminal = Terminal(as_json)
     workspace = place.workspace()
     choice = _operator_choice(operators, places, scenario, all_lines, sample, seed, bool(specs or campaign))
@@ -273,7 +272,7 @@ def generate(
     terminal.say(f"{counted(len(index), 'mutant')} in {out}; the list of them is {out / 'index.csv'}")
     first = out / index[0]["patch"]
     root = mutants.bench.manifest.root
-    if mutants.bench.manifest.overlay is None:  # else a patch is of two folders
+    if mutants.bench.manifest.overlay is None:  # otherwise a patch spans two folders
         terminal.say(f"apply one: patch -p1 -d {short_path(root)} < {first}", whole=True)
 
 
@@ -286,14 +285,13 @@ def _operator_choice(
     seed: int | None,
     others: bool,
 ) -> "mutator.OperatorChoice | None":
-    """What the options of operators ask for, if anything; `others` says that specs or a campaign are named,
-    too."""
+    """Collect the operator options; None without any. `others`: specs or a campaign are named too."""
     if operators is None:
         if places or scenario or all_lines or sample is not None:
             raise MutatorError(
                 "--in, --scenario, --all-lines or --sample without --operators",
                 where="generate",
-                remedy=f"add --operators with some of {OPERATORS}, or `all`",
+                remedy=f"add --operators with any of {OPERATORS}, or `all`",
             )
         return None
     if others or not places or (scenario is None) is not all_lines:

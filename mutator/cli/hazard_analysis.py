@@ -1,4 +1,4 @@
-"""`stpa`: the hazard analysis as tables, its checks, and its control structure as a picture."""
+"""`stpa`: print the hazard analysis as tables, check it, and draw its control structure."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -18,14 +18,14 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  mutator stpa                       the analysis, and whether it is complete and without contradiction
-  mutator stpa --svg structure.svg   its control structure as a picture
-  mutator stpa --json                the same for a program
+  mutator stpa                       the analysis, its gaps and contradictions
+  mutator stpa --svg structure.svg   also a diagram of its control structure
+  mutator stpa --json                the analysis as JSON
 """
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("stpa", epilog=EXAMPLES)(stpa)
 
 
@@ -33,7 +33,7 @@ def register(app: typer.Typer) -> None:
 def stpa(
     manifest: Manifest = None,
     svg: Annotated[
-        Path | None, typer.Option("--svg", metavar="FILE", help="Draw the control structure.")
+        Path | None, typer.Option("--svg", metavar="FILE", help="Write a diagram of the control structure.")
     ] = None,
     as_json: Json = False,
     *,
@@ -41,7 +41,7 @@ def stpa(
 ) -> None:
     """Print and check the hazard analysis.
 
-    Exit code 1 if it has a gap or a contradiction; each is shown with its file and line.
+    Prints each gap or contradiction with its file and line; the exit code is then 1.
     """
     terminal = Terminal(as_json)
     workspace = place.workspace()
@@ -74,7 +74,7 @@ def _write(path: Path, text: str) -> None:
         path.write_text(text, encoding="utf-8")
     except OSError as e:
         raise MutatorError(
-            f"cannot be written ({e.strerror})", where=path, remedy="name another file"
+            f"cannot write the file ({e.strerror})", where=path, remedy="choose another file"
         ) from None
 
 
@@ -133,7 +133,7 @@ def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
 
 
 def _show_table(terminal: Terminal, table: "ContextTable") -> None:
-    """A context table: the trigger that each row makes, and what is hazardous there."""
+    """Print a context table: the trigger of each row, and what is hazardous there."""
     actions = list(table.rows[0].actions)
     heads = ["context", "trigger"]
     heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]
@@ -149,7 +149,7 @@ def _show_table(terminal: Terminal, table: "ContextTable") -> None:
 def _coverage(table: "ContextTable") -> str:
     found = table.coverage
     if found.beyond:
-        return f"whether they cover everything once could not be proved: {found.beyond}"
+        return f"cannot prove that they cover everything exactly once: {found.beyond}"
     return f"they cover everything exactly once: proved in {found.cells} cells"
 
 
@@ -169,7 +169,7 @@ def _section(
 
 
 def _data(analysis: "Analysis") -> dict[str, Any]:
-    """The analysis for a program; conditions have their constants put in."""
+    """Return the analysis as JSON data, with constants in conditions filled in."""
     hazards = analysis.hazards
     return {
         "accidents": hazards.accidents,

@@ -1,4 +1,4 @@
-"""`list`, `check`, `doctor`: what the library holds, whether it can be used, and whether this machine can."""
+"""`list`, `check`, `doctor`: show the library, check it against the target, check the machine."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Kind(StrEnum):
-    """What `list` can list."""
+    """The kinds of entries that `list` shows."""
 
     SPECS = "specs"
     SCENARIOS = "scenarios"
@@ -35,7 +35,7 @@ Table = tuple[list[str], list[dict[str, Any]]]
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("list", epilog=LIST_EXAMPLES)(list_library)
     app.command("check", epilog=CHECK_EXAMPLES)(check)
     app.command("doctor")(doctor)
@@ -44,14 +44,14 @@ def register(app: typer.Typer) -> None:
 LIST_EXAMPLES = """\b
 Examples:
   mutator list              everything
-  mutator list specs        the fault specs and how many faults each makes
-  mutator list --json       the same for a program
+  mutator list specs        the fault specs, with the number of faults in each
+  mutator list --json       everything as JSON
 """
 
 
 @with_place
 def list_library(
-    kind: Annotated[Kind | None, typer.Argument(help="Only this kind; default: all.")] = None,
+    kind: Annotated[Kind | None, typer.Argument(help="Only this kind. Default: all.")] = None,
     as_json: Json = False,
     *,
     place: Place,
@@ -84,7 +84,7 @@ def _campaigns(workspace: "Workspace") -> Table:
 
 
 def _files(files: Mapping[str, Path], key: str) -> Table:
-    """Files of the library by name, with what the value at `key` says about them, where they have one."""
+    """Return files of the library by name, with the description at `key`, if any."""
     from mutator.config.yaml_files import load
 
     rows: list[dict[str, Any]] = []
@@ -138,9 +138,9 @@ LISTS: dict[Kind, Callable[["Workspace"], Table]] = {
 CHECK_EXAMPLES = """\b
 Examples:
   mutator check                             library and templates against the target
-  mutator check --drive                     and what golden runs tell
-  mutator check --drive --scenario S1       of this scenario alone
-  mutator --target ~/openpilot check        the same library against another tree
+  mutator check --drive                     also golden runs
+  mutator check --drive --scenario S1       only the golden run of this scenario
+  mutator --target ~/openpilot check        the same library against another source tree
 """
 LEVEL_STYLES = {"ok": "green", "warning": "yellow", "failed": "red"}
 
@@ -150,14 +150,12 @@ def check(
     manifest: Manifest = None,
     drive: Annotated[
         bool,
-        typer.Option(
-            "--drive", help="Drive golden runs, too: is the target deterministic, what do they come to?"
-        ),
+        typer.Option("--drive", help="Also make golden runs: is the target deterministic, how do they end?"),
     ] = False,
     scenario: Annotated[
         list[str] | None,
         typer.Option(
-            help="Drive this scenario, again for more; default: those of the campaigns.",
+            help="With --drive: this scenario; repeatable. Default: the scenarios of the campaigns.",
             autocompletion=completion.scenarios,
         ),
     ] = None,
@@ -167,19 +165,19 @@ def check(
 ) -> None:
     """Check library, templates and anchors against the target.
 
-    Each problem is shown with its file and line. Without any, what keeps the target or its faults from the
-    engines that fork is told, and draws that nothing uses. Exit code 1 for a problem, and for a golden run or
-    canary that would keep a campaign from starting.
+    Prints each problem with its file and line. If there is none, lists what keeps the target or its faults
+    off the fork engines, and draws that nothing uses. Exit code 1 for a problem, or for a golden run or
+    canary that would stop a campaign from starting.
     """
     terminal = Terminal(as_json)
     if scenario and not drive:
-        raise MutatorError("scenarios without a drive", argument="scenario", remedy="add --drive")
+        raise MutatorError("scenarios without --drive", argument="scenario", remedy="add --drive")
     workspace = place.workspace()
     with terminal.wait("checking every spec in every reading"):
         problems = mutator.check_library(workspace, target=manifest)
     findings: list[Finding] = []
     if not problems:
-        with terminal.wait("driving golden runs" if drive else "loading the target"):
+        with terminal.wait("making golden runs" if drive else "loading the target"):
             findings = mutator.check_target(workspace, target=manifest, drive=drive, scenarios=scenario or ())
     if as_json:
         told = [{"file": p.where, "line": p.line, "problem": str(p)} for p in problems]
@@ -203,7 +201,7 @@ def check(
 
 
 def _say_finding(terminal: Terminal, finding: "Finding") -> None:
-    """A finding with its places below it, and what to do."""
+    """Print a finding, its places below it, and the remedy."""
     terminal.say(f"{finding.name}: {finding.found}", style=LEVEL_STYLES[finding.level])
     for one in finding.places:
         file = short_path(Path(one.file)) if Path(one.file).is_absolute() else one.file
@@ -213,15 +211,15 @@ def _say_finding(terminal: Terminal, finding: "Finding") -> None:
 
 
 def _line(text: str) -> str:
-    """The first sentence's worth of a description, on one line."""
+    """Return a description on one line."""
     return " ".join(text.split())
 
 
 @with_place
 def doctor(as_json: Json = False, *, place: Place) -> None:
-    """Can this machine run campaigns?
+    """Check whether this machine can run campaigns.
 
-    Looks at interpreter, packages, machine, library and target; exit code 1 if a campaign could not run.
+    Checks the interpreter, packages, machine, library and target. Exit code 1 if a campaign could not run.
     """
     terminal = Terminal(as_json)
     with terminal.wait("looking around"):

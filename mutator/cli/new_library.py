@@ -1,4 +1,4 @@
-"""`init` and `upgrade`: a new library to edit, and manifests brought up to date."""
+"""`init` and `upgrade`: create a library, and upgrade manifests."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,14 +13,14 @@ from mutator.errors import MutatorError
 
 INIT_EXAMPLES = """\b
 Examples:
-  mutator init faults                           a copy to edit, in faults/; its README has the first commands
+  mutator init faults                           a copy to edit; its README has the first commands
   mutator init faults --target ../controller    a first library for the controller in that folder
-  mutator init faults --target installed:NAME   for an installed package
+  mutator init faults --target installed:NAME   a first library for an installed package
 """
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("init", epilog=INIT_EXAMPLES)(init)
     app.command("upgrade")(upgrade)
 
@@ -29,17 +29,15 @@ def init(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A new or empty folder.")],
     tree: Annotated[
         str | None,
-        typer.Option(
-            "--target", metavar="TREE", help="The source of a controller: a folder, or installed:NAME."
-        ),
+        typer.Option("--target", metavar="TREE", help="A controller's source: a folder, or installed:NAME."),
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Write a fault library to edit.
 
-    With --target, a first library for that controller, whose source is read and never run: manifest, entry,
-    scenario, fault and campaign, with places to fill in. Without it, copies of the library and templates
-    that ship with mutator, for the controller that ships. In DIR and below, mutator uses them.
+    With --target, writes a first library for that controller: manifest, entry, scenario, fault and campaign,
+    with places to fill in. It reads the controller's source and never runs it. Without --target, copies the
+    library and templates that ship with mutator. In DIR and below, mutator uses the new library.
     """
     from mutator.api.libraries import unfilled_places
 
@@ -56,17 +54,17 @@ def init(
         held = f"fault_library/ with {counted(len(places), 'place')} to fill in,"
     if as_json:
         terminal.emit(told)
-    terminal.say(f"{short_path(folder)}: {held} and a README.md that says how to go on")
+    terminal.say(f"{short_path(folder)}: {held} and a README.md with the next steps")
 
 
 def upgrade(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="A target's manifest.")],
     as_json: Json = False,
 ) -> None:
-    """Write a manifest of an older schema in today's.
+    """Rewrite an older manifest in the current schema.
 
-    Lines that mean the same in both stay as they are. Comments within those that change are printed, so that
-    you can put them back.
+    Lines that mean the same stay unchanged. Comments inside rewritten lines are printed, so that you can put
+    them back.
     """
     terminal = Terminal(as_json)
     done = mutator.upgrade_manifest(file)
@@ -75,8 +73,8 @@ def upgrade(
             {"file": str(file), "upgraded": done is not None, "lost": list(done.lost) if done else []}
         )
     if done is None:
-        terminal.say(f"{short_path(file)}: nothing to do")
+        terminal.say(f"{short_path(file)}: up to date, nothing to do")
         return
-    terminal.say(f"{short_path(file)}: now of today's schema")
+    terminal.say(f"{short_path(file)}: upgraded to the current schema")
     for comment in done.lost:
         terminal.say(f"  left out: {comment}")

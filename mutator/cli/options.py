@@ -1,4 +1,4 @@
-"""Options that several verbs share, and the place (library, templates, target) they name."""
+"""Options that several verbs share, and the place (library, templates, target) that they name."""
 
 import dataclasses
 import functools
@@ -21,23 +21,25 @@ Json = Annotated[bool, typer.Option("--json", help="Print one JSON document inst
 Manifest = Annotated[
     str | None,
     typer.Option(
-        help="Name or file of the target's manifest; default: the library's only one.",
+        help="Name or file of the target's manifest. Default: the library's only manifest.",
         autocompletion=completion.targets,
     ),
 ]
-Seed = Annotated[int | None, typer.Option(min=0, help="Seed of drawn values and times.")]
+Seed = Annotated[int | None, typer.Option(min=0, help="Seed for drawn values and times.")]
 Reading = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="A reading that the library declares; default: its first."),
+    typer.Option(metavar="NAME", help="One of the library's readings. Default: the first."),
 ]
 Variant = Annotated[str | None, typer.Option(help="Only this variant of the spec.")]
-Value = Annotated[float | None, typer.Option(help="This value (in the spec's unit) instead of drawn ones.")]
+Value = Annotated[
+    float | None, typer.Option(help="Use this value, in the spec's unit, instead of drawn ones.")
+]
 Run = Annotated[
     Path | None,
     typer.Option(
         "--run",
         metavar="DIR",
-        help="The run folder; default: the newest in runs/.",
+        help="The run folder. Default: the newest in runs/.",
         autocompletion=completion.runs,
     ),
 ]
@@ -45,33 +47,32 @@ ExperimentId = Annotated[
     str,
     typer.Argument(
         metavar="EXPERIMENT",
-        help="Id of an experiment, or the start of one.",
+        help="Id of an experiment, or its start.",
         autocompletion=completion.experiments,
     ),
 ]
 Only = Annotated[
     str | None,
-    typer.Option(metavar="EXPR", help="Only experiments for which this holds, e.g. 'value > 100'."),
+    typer.Option(metavar="EXPR", help="Only experiments that match, e.g. 'value > 100'."),
 ]
-Exclude = Annotated[
-    str | None, typer.Option(metavar="EXPR", help="Leave out experiments for which this holds.")
-]
+Exclude = Annotated[str | None, typer.Option(metavar="EXPR", help="Leave out experiments that match.")]
 Limit = Annotated[
     int | None,
     typer.Option(
-        min=1, help="At most so many experiments, spread over the plan, guided and random ones in pairs."
+        min=1,
+        help="At most this many experiments, spread over the plan. Guided and random ones stay in pairs.",
     ),
 ]
 ShardOf = Annotated[
     str | None,
-    typer.Option("--shard", metavar="K/N", help="Run the K-th of N shares of the plan; see `merge`."),
+    typer.Option("--shard", metavar="K/N", help="Run share K of N of the plan; see `merge`."),
 ]
 SeriesMb = Annotated[
     int | None,
     typer.Option(
         min=0,
         metavar="N",
-        help="Keep at most so many MB of channels over time, those of the worst experiments first; 0: none. "
+        help="Keep at most this many MB of series (channels over time), worst experiments first; 0: none. "
         "Default: 500.",
     ),
 ]
@@ -80,26 +81,26 @@ Engine = Annotated[
     typer.Option(
         metavar="NAME",
         help="; ".join(f"{kind.name}: {kind.about}" for kind in ENGINES.values())
-        + f". The results are the same. Default: {FORK}, where that is possible and worth it.",
+        + f". The results are the same. Default: {FORK}, where possible and worthwhile.",
     ),
 ]
 AcceptVersions = Annotated[
     bool,
-    typer.Option("--accept-versions", help="Other versions of Python or packages will do; they are noted."),
+    typer.Option("--accept-versions", help="Accept other versions of Python or packages, and note them."),
 ]
 Cluster = Annotated[
     str | None,
     typer.Option(
         metavar="WHERE",
-        help="Have the workers of a Dask cluster do the work: a scheduler's address (tls://HOST:PORT), its "
-        "scheduler file (FILE.json), local:N, or a cluster file (FILE.yaml).",
+        help="Use the workers of a Dask cluster: the scheduler's address (tls://HOST:PORT), its scheduler "
+        "file (FILE.json), local:N, or a cluster file (FILE.yaml).",
     ),
 ]
 InsecureNetwork = Annotated[
     bool,
     typer.Option(
         "--insecure-network",
-        help="Use a scheduler that others on the network can reach: they can run code on its workers.",
+        help="Accept a scheduler that others on the network can reach: they can run code on its workers.",
     ),
 ]
 OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run folder.")]
@@ -107,7 +108,7 @@ OutRun = Annotated[Path, typer.Option("--out", metavar="DIR", help="The run fold
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where library, templates and target are, as far as options say; the environment says the rest."""
+    """The library, templates and target that options name; the environment supplies the rest."""
 
     root: Path | None = None
     library: Path | None = None
@@ -115,18 +116,18 @@ class Place:
     target: Path | None = None
 
     def workspace(self) -> "Workspace":
-        """The workspace found from here; MutatorError that tells how to name one."""
+        """Find the workspace; MutatorError if there is none."""
         return mutator.Workspace.find(self.root, self.library, self.templates, self.target)
 
     def over(self, other: "Place") -> "Place":
-        """This place, its gaps filled from `other`."""
+        """Return this place with its gaps filled from `other`."""
         mine = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(other, **{k: v for k, v in mine.items() if v is not None})
 
 
 Root = Annotated[
     Path | None,
-    typer.Option(metavar="DIR", help="Folder that holds fault_library/ and templates/ [env: MUTATOR_ROOT]."),
+    typer.Option(metavar="DIR", help="Folder with fault_library/ and templates/ [env: MUTATOR_ROOT]."),
 ]
 Library = Annotated[
     Path | None, typer.Option(metavar="DIR", help="The fault library [env: MUTATOR_LIBRARY].")
@@ -137,14 +138,14 @@ Templates = Annotated[
 Target = Annotated[
     Path | None,
     typer.Option(
-        metavar="DIR", help="The controller's source root, if not the manifest's [env: MUTATOR_TARGET]."
+        metavar="DIR", help="The controller's source root. Default: the manifest's [env: MUTATOR_TARGET]."
     ),
 ]
 PLACE_OPTIONS = {"root": Root, "library": Library, "templates": Templates, "target": Target}
 
 
 def with_place(verb: Callable[..., None]) -> Callable[..., None]:
-    """Give a verb that takes `place` the four options that name one, before or after the verb's name."""
+    """Add the four options of a place to a verb; users can write them before or after the verb's name."""
     signature = inspect.signature(verb, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "place"]
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)

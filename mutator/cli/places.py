@@ -1,4 +1,4 @@
-"""`places`: where in a file faults can be injected, in the words of a spec, and with which models."""
+"""`places`: list where in a file faults can be injected, and with which models."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
 PLACES_EXAMPLES = """\b
 Examples:
-  mutator places pkg/sensor.py                      every place of the file
-  mutator places pkg/sensor.py::Sensor.measure      those of one function
-  mutator places pkg/sensor.py --json               the same for a program
+  mutator places pkg/sensor.py                      every place in the file
+  mutator places pkg/sensor.py::Sensor.measure      only those in one function
+  mutator places pkg/sensor.py --json               the same as JSON
 """
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("places", epilog=PLACES_EXAMPLES)(list_places)
 
 
 @with_place
 def list_places(
     where: Annotated[
-        str, typer.Argument(metavar="FILE[::FUNCTION]", help="A file of the target, and a function in it.")
+        str, typer.Argument(metavar="FILE[::FUNCTION]", help="A file of the target, or one function in it.")
     ],
     manifest: Manifest = None,
     as_json: Json = False,
@@ -39,8 +39,8 @@ def list_places(
 ) -> None:
     """List where faults can be injected, and with which models.
 
-    Each line has an anchor as a spec writes it at `at`: a statement, a value that is changed where it
-    stands, a constant, or a default.
+    Each line shows an anchor as you write it in a spec at `at`: a statement, a value changed in place, a
+    constant, or a default.
     """
     terminal = Terminal(as_json)
     found = mutator.find_places(where, place.workspace(), target=manifest)
@@ -51,7 +51,7 @@ def list_places(
 
 
 def _print(terminal: Terminal, found: Sequence["ListedPlace"]) -> None:
-    """A table of the places; sets of models have letters, told at the end."""
+    """Print a table of the places, with a letter for each set of models, and then the key."""
     letters: dict[tuple[str, ...], str] = {}
     rows = []
     for one in found:
@@ -71,7 +71,7 @@ def _letter(number: int) -> str:
 
 
 def _yaml(at: Mapping[str, Any]) -> str:
-    """The anchor on one line of YAML, without the file, which is the same for all."""
+    """Return the anchor as one line of YAML, without the file."""
     told = {key: value for key, value in at.items() if key != "file"}
     import yaml
 

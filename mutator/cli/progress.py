@@ -1,4 +1,4 @@
-"""The progress of a campaign: a live bar in a terminal, now and then a line elsewhere."""
+"""The progress of a campaign: a live bar in a terminal, occasional lines elsewhere."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
-    """Yields what the campaign calls with its progress, from whatever thread."""
+    """Show progress; yields the function that the campaign calls, from any thread."""
     if terminal.err.is_terminal:
         with _live(terminal) as notify:
             yield notify

@@ -1,4 +1,4 @@
-"""What a reviewer says on the command line: approve, reject, clear, remark, flag, unflag."""
+"""The verbs of `review` that record decisions: approve, reject, clear, remark, flag, unflag."""
 
 import sys
 from collections.abc import Callable, Sequence
@@ -19,14 +19,16 @@ if TYPE_CHECKING:
 
 SomeGroups = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the starts of them; or none and --only."),
+    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or their starts; none with --only."),
 ]
-Yes = Annotated[bool, typer.Option("--yes", "-y", help="Do not ask whether all that --only finds is meant.")]
-Remark = Annotated[str, typer.Option(metavar="TEXT", help="Left as a remark on each group.")]
+Yes = Annotated[
+    bool, typer.Option("--yes", "-y", help="Do not ask before deciding all groups that --only finds.")
+]
+Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 
 def _deciding(kind: str, about: str) -> Callable[..., None]:
-    """The verb that approves, or the one that rejects."""
+    """Build `approve` or `reject`."""
 
     @with_place
     def verb(
@@ -54,10 +56,8 @@ def _deciding(kind: str, about: str) -> Callable[..., None]:
     return verb
 
 
-approve = _deciding(
-    "approve", "Approve groups as they are now: some by their ids, or all that a filter finds."
-)
-reject = _deciding("reject", "Reject groups as they are now: `run --require-reviewed` does not run them.")
+approve = _deciding("approve", "Approve groups in their current state, by id or by filter.")
+reject = _deciding("reject", "Reject groups in their current state: `run --require-reviewed` refuses them.")
 
 
 @with_place
@@ -74,7 +74,7 @@ def clear(
     *,
     place: Place,
 ) -> None:
-    """Take decisions back; remarks and flags stay."""
+    """Withdraw decisions; remarks and flags stay."""
     terminal, name = Terminal(as_json), reviewer(place, by)
     found = load(terminal, place, campaign, specs, reading, seed, manifest)
     _tell(terminal, found.clear(chosen := found.find(groups), name, remark), chosen)
@@ -83,7 +83,7 @@ def clear(
 @with_place
 def remark(
     groups: Groups,
-    text: Annotated[str, typer.Option("--text", metavar="TEXT", help="What is remarked, in one line.")],
+    text: Annotated[str, typer.Option("--text", metavar="TEXT", help="The remark, one line.")],
     by: By = None,
     campaign: Campaign = None,
     specs: Specs = None,
@@ -94,14 +94,14 @@ def remark(
     *,
     place: Place,
 ) -> None:
-    """Leave a remark on groups."""
+    """Add a remark to groups."""
     terminal, name = Terminal(as_json), reviewer(place, by)
     found = load(terminal, place, campaign, specs, reading, seed, manifest)
     _tell(terminal, found.remark(chosen := found.find(groups), name, text), chosen)
 
 
 def _flagging(flag: bool, about: str) -> Callable[..., None]:
-    """The verb that flags, or the one that takes flags off."""
+    """Build `flag` or `unflag`."""
 
     @with_place
     def verb(
@@ -125,36 +125,38 @@ def _flagging(flag: bool, about: str) -> Callable[..., None]:
     return verb
 
 
-flag = _flagging(True, "Mark groups to be looked at again.")
-unflag = _flagging(False, "Take such marks off.")
+flag = _flagging(True, "Flag groups for another look.")
+unflag = _flagging(False, "Remove flags.")
 
 
 def _chosen(
     found: "mutator.ReviewedGroups", verb: str, starts: Sequence[str] | None, only: str | None, *, yes: bool
 ) -> "Sequence[Group]":
-    """The groups that are meant; none when the answer to the question is no."""
+    """Return the chosen groups; none if the user does not confirm."""
     if bool(starts) == (only is not None):
         raise MutatorError(
             "groups together with --only" if starts else "neither groups nor --only",
             where=f"mutator review {verb}",
-            expected="the ids of groups, or a filter",
+            expected="either the ids of groups or --only",
         )
     if starts:
         return found.find(starts)
     chosen = found.matching(only).groups
     if not chosen:
-        raise MutatorError(f"no group for which {only}", argument="only", remedy="look: `mutator review`")
+        raise MutatorError(
+            f"no group matches {only}", argument="only", remedy="list the groups: `mutator review`"
+        )
     many = f"{counted(len(chosen), 'group')} ({review_view.counts(found.review, chosen)})"
     if not yes:
         if not sys.stdin.isatty():
-            raise MutatorError(many, argument="only", remedy=f"say --yes to {verb} them without being asked")
+            raise MutatorError(many, argument="only", remedy=f"add --yes to {verb} them without confirmation")
         if not typer.confirm(f"{verb} {many}?"):
             return ()
     return chosen
 
 
 def _tell(terminal: Terminal, found: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
-    """What is kept of these groups now."""
+    """Print the new state of these groups."""
     decided = found.review
     if terminal.as_json:
         terminal.emit([review_view.data(decided, group) for group in groups])

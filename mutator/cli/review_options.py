@@ -1,4 +1,4 @@
-"""Options that the verbs of `review` share, and what they choose: groups of mutants, and who speaks."""
+"""Options that the verbs of `review` share: which groups, and who reviews."""
 
 from collections.abc import Sequence
 from typing import Annotated
@@ -13,24 +13,22 @@ from mutator.review.columns import COLUMNS
 
 Campaign = Annotated[
     str | None,
-    typer.Option(metavar="NAME", help="What this campaign runs, with its readings and triggers."),
+    typer.Option(metavar="NAME", help="Only groups that this campaign runs, with its readings and triggers."),
 ]
 Specs = Annotated[
     list[str] | None,
-    typer.Option("--spec", metavar="SPEC", help="Only these specs, globs or spec files; may be repeated."),
+    typer.Option("--spec", metavar="SPEC", help="Only these specs, globs or spec files; repeatable."),
 ]
 OnlyGroups = Annotated[
     str | None,
-    typer.Option("--only", metavar="EXPR", help=f"Only groups for which this holds: {', '.join(COLUMNS)}."),
+    typer.Option("--only", metavar="EXPR", help=f"Only groups that match. Columns: {', '.join(COLUMNS)}."),
 ]
 ExcludeGroups = Annotated[
-    str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups for which this holds.")
+    str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups that match.")
 ]
-Groups = Annotated[
-    list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the starts of them.")
-]
+Groups = Annotated[list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or their starts.")]
 By = Annotated[
-    str | None, typer.Option("--by", metavar="NAME", help="Who has looked; default: git's user.name.")
+    str | None, typer.Option("--by", metavar="NAME", help="The reviewer. Default: git's user.name.")
 ]
 
 
@@ -43,7 +41,7 @@ def load(
     seed: int | None,
     manifest: str | None,
 ) -> "mutator.ReviewedGroups":
-    """The groups that the options choose, and what was said of them."""
+    """Load the groups that the options choose, with their decisions."""
     if campaign and specs:
         raise MutatorError("--campaign together with --spec", expected="one or the other")
     workspace = place.workspace()
@@ -59,15 +57,15 @@ def load(
 
 
 def reviewer(place: Place, by: str | None) -> str:
-    """Who speaks: the name that was given, or git's; MutatorError for nobody."""
+    """Return the reviewer: `by`, or git's user.name; MutatorError without either."""
     from mutator.api.reviews import reviewer_name
 
     name = reviewer_name(place.workspace()) if by is None else by
     if not name or not name.strip():
         raise MutatorError(
-            "no name",
+            "no reviewer",
             argument="by",
-            expected="who has reviewed",
-            remedy="give `by`, or tell git: `git config user.name NAME`",
+            expected="the reviewer's name",
+            remedy="add `by`, or set git's: `git config user.name NAME`",
         )
     return name

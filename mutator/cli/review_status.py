@@ -1,4 +1,4 @@
-"""`review status`: how far a review is, and what keeps a campaign from running."""
+"""`review status`: the progress of a review, and what a campaign lacks."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: str | None) -> None:
-    """Counts by state; what has changed, and what of it; what is flagged; what the campaign lacks."""
+    """Print counts by state, changed and flagged groups, and what the campaign lacks."""
     review = found.review
     if terminal.as_json:
         terminal.emit(_data(found))
@@ -22,7 +22,7 @@ def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: 
     counts = review_view.counts(review, found.groups)
     terminal.say(f"{short_path(review.path)}: {counted(len(found.groups), 'group')}: {counts}")
     if review.four_eyes:
-        terminal.say("four eyes: nobody approves what they changed last")
+        terminal.say("four eyes: nobody can approve what they changed last")
     if not campaign:
         told = [(group, review.describe(group)) for group in found.groups if review.changed(group)]
         _list(terminal, "changed since the decision", told)

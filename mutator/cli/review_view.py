@@ -1,4 +1,4 @@
-"""Groups of mutants shown: as a table, one by one with diff and values, and as data."""
+"""Prints groups of mutants: as a table, one by one with diff and values, or as data."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -13,12 +13,12 @@ if TYPE_CHECKING:
     from mutator.review.decisions import Review
 
 STYLES = {"new": "yellow", "changed": "bold yellow", "rejected": "bold red", "approved": "green"}
-ROWS = 24  # of values that a terminal is shown
+ROWS = 24  # of values shown in a terminal
 CONDITIONS = 6
 
 
 def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, Any]:
-    """A group for a program; `whole`: with its diff and values."""
+    """Return a group as JSON data; with `whole`, also its diff and values."""
     from mutator.api.reviews import facts as known
     from mutator.review.readable_groups import value_table
 
@@ -39,13 +39,13 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
 
 
 def counts(review: "Review", groups: Sequence["Group"]) -> str:
-    """How many groups are in which state, in words."""
+    """Return the number of groups in each state, as text."""
     found = Counter(review.state(group).value for group in groups)
     return ", ".join(f"{found[name]} {name}" for name in STYLES if found[name]) or "no groups"
 
 
 def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
-    """The table of groups, or all of it as data."""
+    """Print the groups as a table, or as JSON."""
     if terminal.as_json:
         terminal.emit([data(review, group) for group in groups])
         return
@@ -61,11 +61,11 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
     terminal.say(f"{counted(len(groups), 'group')}: {counts(review, groups)}")
     gone = review.entries.keys() - {group.id for group in groups}
     if gone:
-        terminal.note(f"{len(gone)} blocks are about groups that are not listed")
+        terminal.note(f"{len(gone)} blocks of the review file are about groups that are not listed")
 
 
 def _short(injection: str) -> str:
-    """`sonar.py Sonar.measure after_assign gap: offset(by)`: the file's name is enough in a table."""
+    """Shorten the file's path to its name: `sonar.py Sonar.measure after_assign gap: offset(by)`."""
     path, space, rest = injection.partition(" ")
     return path.rpartition("/")[2] + space + rest
 
@@ -75,7 +75,7 @@ def _when(group: "Group") -> str:
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """What was said of a group."""
+    """Print a group's state, decision, flag and remarks."""
     state, flag = review.state(group).value, review.flag(group.id)
     terminal.say(f"group {group.id}: {state}", style=STYLES[state])
     if decision := review.describe(group):
@@ -87,21 +87,21 @@ def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """What has changed of a group since it was decided."""
+    """Print what has changed in a group since its decision."""
     _print_head(terminal, review, group)
     terminal.say(f"  {group.what}", style="bold")
     terminal.say()
     if changes := review.changes(group):
         terminal.diff(changes)
     elif review.changed(group):
-        terminal.say("what was seen then is not kept")
+        terminal.say("what the reviewer saw then was not kept")
     else:
-        terminal.say("nothing has changed since" if review.decision(group.id) else "nobody has decided yet")
+        terminal.say("nothing has changed since" if review.decision(group.id) else "no decision yet")
     terminal.say()
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """One group: what it is, what was said of it, diff with holes, values, triggers."""
+    """Print one group: decision, injections, values, triggers, diff with holes."""
     from mutator.review.readable_groups import condition_lines, ranges, value_table
 
     _print_head(terminal, review, group)

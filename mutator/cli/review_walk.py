@@ -1,4 +1,4 @@
-"""`review walk`: one group after the other, a key for each."""
+"""`review walk`: review groups one by one, with one key each."""
 
 import sys
 from collections.abc import Callable
@@ -19,16 +19,16 @@ KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 def walk_through(
     terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], reviewer: Callable[[], str]
 ) -> None:
-    """Show every group that is new or changed and do what is answered; each decision is kept at once. Where
-    it cannot be, as somebody else has said something meanwhile, the question is asked again.
+    """Show each new or changed group, ask, and save each decision at once. If somebody else has decided in
+    the meantime, ask again.
 
-    MutatorError, before anything is made, when there is nobody to answer.
+    MutatorError if there is no terminal.
     """
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise MutatorError(
             "no terminal to ask in",
             where="mutator review walk",
-            remedy="decide by `mutator review approve GROUP... --by NAME`, or `reject`",
+            remedy="use `mutator review approve GROUP... --by NAME`, or `reject`",
         )
     by, found = reviewer(), load()
     waiting = list(enumerate(found.undecided, start=1))
@@ -56,7 +56,7 @@ def walk_through(
 
 
 def _asked(terminal: Terminal, where: str) -> str:
-    """The key that was pressed, once it is one of ours."""
+    """Ask until one of the keys is pressed, and return it."""
     choices = "  ".join(f"[{key}] {word}" for key, word in KEYS.items())
     while True:
         terminal.say(f"{where}:  {choices}", style="bold")

@@ -1,4 +1,4 @@
-"""`review`: mutants in groups that differ in values alone, looked at, approved or rejected."""
+"""`review`: review groups of mutants that differ only in values."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -28,37 +28,37 @@ if TYPE_CHECKING:
 
 EXAMPLES = """\b
 Examples:
-  mutator review                                   all of the library: new and changed groups first
-  mutator review --campaign quickstart             what one campaign runs
+  mutator review                                   the whole library, new and changed groups first
+  mutator review --campaign quickstart             only what one campaign runs
   mutator review --only 'state == "new" and match(file, "*radar*")'
   mutator review show 3f9a                         one group: diff with holes, values
-  mutator review show 3f9a --pictures DIR          what an image effect does to a picture, too
-  mutator review show 3f9a --changes               what has changed since it was decided
+  mutator review show 3f9a --pictures DIR          also what an image effect does to a frame
+  mutator review show 3f9a --changes               what has changed since the decision
   mutator review approve 3f9a 77c0 --by "A. Reviewer" --remark "limits are right"
   mutator review approve --only 'state == "new" and model == "offset"'
   mutator review remark 3f9a --text "why not below 10 m?"
   mutator review status --campaign quickstart      what is stale and why, what the campaign lacks
-  mutator review walk --by "A. Reviewer"           one after the other
+  mutator review walk --by "A. Reviewer"           all new and changed groups, one by one
   mutator review page --out review.html
 
 \b
-`mutator review` alone is `mutator review list`. What reviewers say is kept in fault_library/reviews/, for
-version control; `mutator run --require-reviewed` runs nothing but what is approved there.
+`mutator review` without a verb means `mutator review list`. Decisions are kept in fault_library/reviews/; put
+them under version control. `mutator run --require-reviewed` runs only mutants that are approved there.
 """
 
 
 class Verbs(TyperGroup):
-    """The verbs of `review`; without one it lists."""
+    """The verbs of `review`; the default is `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """What is no verb and no call for help belongs to `list`."""
+        """Insert `list` where neither a verb nor help is asked for."""
         if not args or (args[0].startswith("-") and args[0] not in ("-h", "--help")):
             args = ["list", *args]
         return super().parse_args(ctx, args)
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     reviews = typer.Typer(
         cls=Verbs, rich_markup_mode=None, epilog=EXAMPLES, context_settings={"max_content_width": 110}
     )
@@ -81,7 +81,7 @@ def register(app: typer.Typer) -> None:
 
 
 def review() -> None:
-    """Review generated diffs: approve or reject groups of mutants."""
+    """Review generated mutants: approve or reject groups of diffs."""
 
 
 @with_place
@@ -97,7 +97,7 @@ def list_groups(
     *,
     place: Place,
 ) -> None:
-    """List groups, new and changed ones first (what `review` alone does)."""
+    """List groups, new and changed ones first (the default)."""
     terminal = Terminal(as_json)
     found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
     review_view.print_list(terminal, found.review, found.groups)
@@ -111,7 +111,7 @@ def show(
     ] = False,
     pictures: Annotated[
         Path | None,
-        typer.Option(metavar="DIR", help="Write pictures before and after an image effect there, too."),
+        typer.Option(metavar="DIR", help="Also write frames before and after an image effect."),
     ] = None,
     campaign: Campaign = None,
     specs: Specs = None,
@@ -139,7 +139,7 @@ def show(
 def _write_pictures(
     terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
 ) -> dict[str, dict[str, str]]:
-    """Write them, and say which value each shows; the files by group."""
+    """Write them and print the value that each shows; returns the files by group."""
     from mutator.api.review_pictures import write_pictures
 
     with terminal.wait("drawing"):
@@ -148,7 +148,7 @@ def _write_pictures(
         terminal.say(short_path(Path(path)) + (f": {value}" if value else ""))
     for group in groups:
         if group.id not in written:
-            terminal.note(f"{group.id} has no pictures: it is no image effect in one place")
+            terminal.note(f"{group.id} has no pictures: it is not an image effect in a single place")
     return written
 
 
@@ -163,8 +163,8 @@ def status(
     *,
     place: Place,
 ) -> None:
-    """Say how far the review is: how many groups are in which state, what has changed since it was decided
-    and what of it, what is flagged, and with --campaign what keeps it from running."""
+    """Show the review's progress: groups by state, changes since the decision, flags. With --campaign, also
+    what the campaign lacks to run."""
     from mutator.cli.review_status import print_status
 
     terminal = Terminal(as_json)
@@ -185,7 +185,7 @@ def walk(
     *,
     place: Place,
 ) -> None:
-    """Show one new or changed group after the other, and ask."""
+    """Show new and changed groups one by one, and ask for a decision on each."""
     from mutator.cli.review_walk import walk_through
 
     terminal = Terminal()
@@ -211,7 +211,7 @@ def page(
     *,
     place: Place,
 ) -> None:
-    """Write a page of all groups, complete in itself, to look at and to copy commands from."""
+    """Write all groups to one self-contained page, with commands to copy."""
     terminal = Terminal(as_json)
     found = load(terminal, place, campaign, specs, reading, seed, manifest).matching(only, exclude)
     found.write_page(out)

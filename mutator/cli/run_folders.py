@@ -1,4 +1,4 @@
-"""`merge`, `report` and `clean`: what is done with run folders."""
+"""`merge`, `report` and `clean`: work with run folders."""
 
 import shlex
 import sys
@@ -21,20 +21,20 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verbs to the command line."""
+    """Register the verbs."""
     app.command("merge", epilog=MERGE_EXAMPLES)(merge)
     app.command("report", epilog=REPORT_EXAMPLES)(report)
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
 def show_counts(terminal: Terminal, run: "Run") -> None:
-    """The table of results by fault type, and how the experiments ended."""
+    """Print the results by fault type, and how the experiments ended."""
     counts = run.counts()
     terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
     score = run.mutation_totals()
     if score.rows:
         terminal.table(score.heads, score.rows, right=tuple(score.right))
-    with suppress(MutatorError):  # without a library nobody knows which alerts count
+    with suppress(MutatorError):  # only a library says which alerts count
         if note := run.alerts_note():
             terminal.say(note)
     if run.folder.stop_note:
@@ -59,7 +59,7 @@ def merge(
 ) -> None:
     """Merge the shards of a plan into one run folder.
 
-    It is the one that a single machine would have made: the same results, byte for byte.
+    The results are the same, byte for byte, as those of a run on a single machine.
     """
     terminal = Terminal(as_json)
     with terminal.wait("merging"):
@@ -77,7 +77,7 @@ REPORT_EXAMPLES = """\b
 Examples:
   mutator report runs/first
   mutator report /data/night --root ~/openpilot-faults
-  mutator report runs                            the history of the runs in a folder
+  mutator report runs                            history of all runs in a folder
 """
 
 
@@ -93,17 +93,17 @@ def report(
     *,
     place: Place,
 ) -> None:
-    """Write the report of a run, or the history of a folder of runs, and print its path.
+    """Write the report of a run, or the history of a folder of runs.
 
-    An unfinished run gets a report of what it has so far. What was published stands beside the results if
-    a library is found that cites it. Where the proof of the run failed, so does the command, after writing.
+    The report of an unfinished run covers the results so far. If the library cites published results, they
+    appear next to yours. If the run's equivalence check failed, the command writes the report and then fails.
     """
     terminal = Terminal(as_json)
     if not (run / "run.json").exists() and any(run.glob("*/run.json")):
         _history(terminal, run)
         return
     loaded = mutator.load_run(run, workspace=library_if_any(place))
-    with terminal.wait("writing the report"):  # it may drive a few experiments again
+    with terminal.wait("writing the report"):  # it may rerun a few experiments
         written = loaded.report(anew=True)
     if as_json:
         terminal.emit({"markdown": str(written.markdown), "page": str(written.page), "rows": written.rows})
@@ -126,7 +126,7 @@ def _history(terminal: Terminal, folder: Path) -> None:
 
 
 def library_if_any(place: Place) -> "Workspace | None":
-    """The workspace; None where none is named and none is found: a report can be written anywhere."""
+    """Find the workspace; None if no option names one and none is found, since a report needs none."""
     try:
         return place.workspace()
     except MutatorError:
@@ -150,8 +150,7 @@ def clean(
 ) -> None:
     """Delete run folders.
 
-    Only what a run wrote is deleted: a folder that holds anything else, a link, and a run under way are left
-    alone.
+    Refuses a folder that holds anything that the run did not write, a link, and a run in progress.
     """
     from mutator.api.cleaning import check, delete
 
@@ -160,7 +159,7 @@ def clean(
         check(run)
     if not yes:
         if not sys.stdin.isatty():
-            raise MutatorError("nobody to ask", remedy="say --yes to delete without being asked")
+            raise MutatorError("no terminal to ask for confirmation", remedy="add --yes to delete anyway")
         if not typer.confirm(f"delete {', '.join(map(short_path, runs))}?"):
             return
     for run in runs:

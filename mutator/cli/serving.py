@@ -16,14 +16,15 @@ EXAMPLES = """\b
 Examples:
   mutator serve                          the runs in runs/, and the library's reviews
   mutator serve runs/first /data/night --port 8123
-  mutator serve --no-browser             where there is none: open the printed address
+  mutator serve --no-browser             only print the address to open
 
-Only this machine can reach it, and only with the address that it prints. Ctrl-C ends it, and its jobs.
+The server accepts connections only from this machine, and only with the printed address. Ctrl-C stops the
+server and its jobs.
 """
 
 
 def register(app: typer.Typer) -> None:
-    """Add the verb to the command line."""
+    """Register the verb."""
     app.command("serve", epilog=EXAMPLES)(serve)
 
 
@@ -33,20 +34,20 @@ def serve(
         list[Path] | None,
         typer.Argument(
             metavar="RUNS",
-            help="Run folders, or folders of them; default: runs/.",
+            help="Run folders, or folders of run folders. Default: runs/.",
             autocompletion=completion.runs,
         ),
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0: any that is free.")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, max=16, help="So many jobs at a time.")] = 1,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="The port; 0: any free port.")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, max=16, help="Number of jobs at a time.")] = 1,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     *,
     place: Place,
 ) -> None:
-    """Show reports, review mutants, start jobs, in a browser."""
+    """Show reports, review mutants and start jobs in a browser."""
     if not all(map(find_spec, ("starlette", "uvicorn"))):
         raise MutatorError(
-            "no server is installed", expected="the extra `serve`", remedy="pip install 'mutator[serve]'"
+            "the server is not installed", expected="the extra `serve`", remedy="pip install 'mutator[serve]'"
         )
     from mutator.api.serving import serve_runs
 
@@ -54,11 +55,11 @@ def serve(
 
     def ready(address: str) -> None:
         terminal.say(address, whole=True)
-        terminal.note("Ctrl-C ends the server")
+        terminal.note("Ctrl-C stops the server")
         if browser:
             webbrowser.open(address)
 
     try:
         serve_runs(runs or (), port=port, at_once=jobs, ready=ready, workspace=place.workspace())
-    except KeyboardInterrupt:  # that is how one ends it
-        terminal.note("ended")
+    except KeyboardInterrupt:
+        terminal.note("stopped")

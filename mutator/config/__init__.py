@@ -1,4 +1,4 @@
-"""How YAML enters: strict files with a line for each value, units in keys, places in source code.
+"""Strict YAML files with a line number for each value, units in keys, and places in source code.
 
-What a particular file means (a fault spec, a manifest, a campaign) never lives here.
+What a particular file means (a fault spec, a manifest, a campaign) is defined elsewhere.
 """

@@ -1,4 +1,4 @@
-"""`where` of an injection: a condition over names of the target that chooses one instance among several."""
+"""The `where` of an injection: a condition that selects one instance among several."""
 
 import ast
 
@@ -12,9 +12,9 @@ _PLAIN = (
 
 
 def instance_condition(text: str) -> str:
-    """The condition as it is written into a mutant.
+    """Return the condition in the form in which it is written into a mutant.
 
-    ValueError unless it is made of names, attributes, items, constants, comparisons, `and`, `or` and `not`.
+    Only names, attributes, items, constants, comparisons, `and`, `or` and `not` are allowed; else ValueError.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval") if len(text) <= _LONGEST else None
@@ -27,6 +27,6 @@ def instance_condition(text: str) -> str:
 
 
 def names_of(text: str) -> frozenset[str]:
-    """The names that a condition asks for."""
+    """Return the names that a condition uses."""
     tree = ast.parse(text.strip(), mode="eval")
     return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))

@@ -1,4 +1,4 @@
-"""A place in the target as YAML writes it: `{file: ..., function: ..., after_assign: gap}`."""
+"""A place in the target as written in YAML: `{file: ..., function: ..., after_assign: gap}`."""
 
 import ast
 import keyword
@@ -10,30 +10,30 @@ from pydantic import Field
 from mutator.config.yaml_files import Keys, Source, StrictModel
 from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, Anchor, AnchorKind, FaultLocation
 
-PROBE_NAME = "_fi"  # reserved: the module that every mutant has and no target does (mutants/probe.py)
+PROBE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/probe.py)
 
 _NAMELESS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
 _ASSIGNMENTS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
-_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` says of a text that is none
+_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` raises
 
 
 class AtModel(StrictModel, title="A place"):
-    """Exactly one anchor is given. It must be found exactly once in the function, in statement position; if
-    there are several, the error lists them and `nth` chooses one. Names are as written in the source
+    """Give exactly one anchor. It must occur exactly once in the function, in statement position. If it
+    occurs several times, the error lists the places, and `nth` chooses one. Write names as in the source
     (`gap`, `self.angle`, `frames.extend`)."""
 
     file: str = Field(description="A file of the target, relative to its root.")
     function: str | None = Field(
         None,
-        description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`. Every anchor but "
-        "`constant` needs it.",
+        description="A qualified name: `measure`, `Sonar.measure`, `outer.<locals>.inner`. Required by every "
+        "anchor except `constant`.",
     )
     after_assign: str | None = Field(None, description="After the statement that assigns to this name.")
     before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
     after_call: str | None = Field(None, description="After the statement that calls this name.")
     before_call: str | None = Field(
-        None, description="Before the statement that calls this name; the statement a guard leaves out."
+        None, description="Before the statement that calls this name. A guard leaves out this statement."
     )
     before_return: str | None = Field(
         None, description="Before the `return` of this name; empty for a bare `return`."
@@ -41,44 +41,44 @@ class AtModel(StrictModel, title="A place"):
     entry: bool | None = Field(None, description="`true`: at the start of the function.")
     assigned_value: str | None = Field(
         None,
-        description="The value that is assigned to this name, wherever that stands (`if a: b = 1`, `:=`).",
+        description="The value assigned to this name, in any position (`if a: b = 1`, `:=`).",
     )
     return_value: str | None = Field(
-        None, description="The value that the `return` of this expression returns; empty for any."
+        None, description="The value of the `return` of this expression; empty for any `return`."
     )
     condition: str | None = Field(
         None,
-        description="What decides an `if`, a `while`, an `assert`, `x if ... else y` or what a comprehension "
-        "takes in; empty for any.",
+        description="The condition of an `if`, `while`, `assert`, `x if ... else y` or comprehension; empty "
+        "for any.",
     )
     argument: str | None = Field(
-        None, description="An argument of the call of this name; `which` says which, if it has several."
+        None, description="An argument of the call of this name; `which` chooses one of several."
     )
-    result: str | None = Field(None, description="What the call of this name gives, within an expression.")
+    result: str | None = Field(None, description="The result of the call of this name, within an expression.")
     value: str | None = Field(
-        None, description="The value of this expression, as written, spaces and quotes aside."
+        None, description="The value of this expression, as written; spaces and quotes do not matter."
     )
     constant: str | None = Field(
         None,
-        description="A constant of the module (`LIMIT`) or of a class (`PIController.GAIN`), the default of "
-        "a dataclass's field included. It is set while the fault is active, also where other modules have "
-        "imported it by name, and put back afterwards.",
+        description="A constant of the module (`LIMIT`) or of a class (`PIController.GAIN`), including the "
+        "default of a dataclass field. The fault sets it while active, also where other modules have "
+        "imported it by name, and restores it afterwards.",
     )
     default: str | None = Field(
         None,
-        description="The default of this parameter of the function, set while the fault is active.",
+        description="The default of this parameter; the fault sets it while active.",
     )
     which: str | int | None = Field(
-        None, description="Of an `argument`: its place in the call, from 1, or its keyword."
+        None, description="For `argument`: its position in the call, from 1, or its keyword."
     )
     nth: int | None = Field(
         None,
         ge=1,
-        description="Which of several hits, counted from 1; heads of blocks count after statements.",
+        description="Which of several matches, from 1; heads of blocks count after statements.",
     )
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:
-        """The location; errors point into `source` at `keys`."""
+        """Return the location; errors point at `keys` in `source`."""
         given = [kind for kind in AnchorKind if getattr(self, kind.value) not in (None, False)]
         if len(given) != 1:
             raise source.error(
@@ -101,7 +101,7 @@ class AtModel(StrictModel, title="A place"):
             raise source.error(
                 (*keys, "which"),
                 f"'{which}'",
-                expected="the place, from 1, or the keyword of an `argument`",
+                expected="the position, from 1, or the keyword of an `argument`",
                 remedy="correct it, or leave it out",
             )
         if kind in FIXED_ANCHORS and self.nth is not None:
@@ -116,14 +116,14 @@ class AtModel(StrictModel, title="A place"):
         return FaultLocation(path=self.file, function=function, anchor=anchor)
 
     def _function_of(self, kind: AnchorKind, source: Source, keys: Keys) -> str:
-        """The function, which a constant does not have."""
+        """Return the function; empty for a constant."""
         name = self.function
         if kind is AnchorKind.CONSTANT:
             if name is not None:
                 raise source.error(
                     (*keys, "function"),
-                    f"'{name}' beside a constant",
-                    expected="none: a constant is one of a module or class",
+                    f"'{name}' with a constant",
+                    expected="no function: a constant belongs to a module or class",
                     remedy="leave it out; write a class's constant as `constant: PIController.GAIN`",
                 )
             return ""
@@ -139,7 +139,7 @@ class AtModel(StrictModel, title="A place"):
 
 
 def as_written_at(location: FaultLocation) -> dict[str, Any]:
-    """The location as a spec writes it at `at`."""
+    """Return the location as written in a spec at `at`."""
     anchor = location.anchor
     found: dict[str, Any] = {"file": location.path}
     found |= {"function": location.function} if location.function else {}
@@ -150,7 +150,7 @@ def as_written_at(location: FaultLocation) -> dict[str, Any]:
 
 
 def _fits(kind: AnchorKind, name: str) -> bool:
-    """Whether an anchor of this kind can have the name."""
+    """Whether the name is valid for an anchor of this kind."""
     if kind is AnchorKind.DEFAULT and "." in name:
         return False
     if kind in VALUE_ANCHORS:
@@ -159,7 +159,7 @@ def _fits(kind: AnchorKind, name: str) -> bool:
 
 
 def is_expression(text: str) -> bool:
-    """Whether `text` is an expression of Python, without the probe."""
+    """Whether `text` is a Python expression without the probe."""
     try:
         tree = ast.parse(text.strip(), mode="eval")
     except _NO_PYTHON:
@@ -168,19 +168,18 @@ def is_expression(text: str) -> bool:
 
 
 def assignable(text: str) -> bool:
-    """Whether `text` is something to assign to that has nothing to calculate: names, attributes, items by a
-    constant or a name."""
+    """Whether `text` is an assignment target of names, attributes, and items by constant or name only."""
     try:
         node: ast.expr = ast.parse(text, mode="eval").body
         ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
     except _NO_PYTHON:
         return False
     whole = isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _is_chain(node)
-    return whole and text.isprintable()  # so on one line
+    return whole and text.isprintable()  # excludes line breaks
 
 
 def base_name(text: str) -> str:
-    """The first name of a chain."""
+    """Return the first name of a chain."""
     return re.split(r"[.\[\s]", text, maxsplit=1)[0]
 
 
@@ -202,6 +201,6 @@ def _is_constant(node: ast.expr) -> bool:
 
 
 def dotted_name(text: str) -> bool:
-    """Whether `text` is a chain of identifiers that are no keywords and not the probe's name."""
+    """Whether `text` is a chain of identifiers without keywords, and does not start with the probe's name."""
     parts = text.split(".")
     return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME

@@ -1,4 +1,4 @@
-"""Words for what pydantic found wrong with a file: value shown, what was expected, a remedy."""
+"""Turns pydantic's validation errors into texts: value found, value expected, remedy."""
 
 import types
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ _TYPES = {
 
 
 def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, str, tuple[str | int, ...]]:
-    """(got, expected, remedy, keys) for one validation problem of `model`."""
+    """Return (got, expected, remedy, keys) for one validation error of `model`."""
     keys, known = _place(model, tuple(problem["loc"]))
     key = next((str(k) for k in reversed(keys) if isinstance(k, str)), "")
     kind = problem["type"]
@@ -36,7 +36,7 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
             keys,
         )
     if kind == "missing":
-        return f"key '{keys[-1]}' is missing", "it here", f"add `{keys[-1]}: ...`", keys
+        return f"key '{keys[-1]}' is missing", f"`{keys[-1]}` here", f"add `{keys[-1]}: ...`", keys
     got = f"{shown(problem['input'])} for '{key}'"
     if kind == "value_error":
         return got, str(context.get("error", problem["msg"])), "correct the value", keys
@@ -49,8 +49,8 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
 
 
 def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
-    """The problem to tell first: a misspelt key, which also misses. Where a value may have several shapes, it
-    is of the shape that the value has."""
+    """Choose the error to report: a misspelt key before the missing key that it causes. If a value may have
+    several shapes, choose an error about the shape that it has."""
     shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
     inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}
     apt = [p for p in found if p["loc"] not in shapes or p["loc"][:-1] not in inside]
@@ -58,9 +58,9 @@ def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
 
 
 def _place(model: type[BaseModel], loc: tuple[str | int, ...]) -> tuple[tuple[str | int, ...], list[str]]:
-    """The keys of the file that lead to a problem of `model`, and the keys that are known beside the last.
+    """Return the path of keys to an error, and the valid keys next to the last one.
 
-    Of a value that may have several shapes, pydantic also names the shape: that is no key.
+    For a value with several possible shapes, pydantic's path also names the shape, which is not a key.
     """
     current: Any = model
     keys: list[str | int] = []
@@ -83,13 +83,13 @@ def _place(model: type[BaseModel], loc: tuple[str | int, ...]) -> tuple[tuple[st
 
 
 def _named(shape: Any, tag: str) -> bool:
-    """Whether pydantic calls a shape so: `list[str]`, or the name of a model."""
+    """Whether `tag` is pydantic's name of the shape: `list[str]`, or the name of a model."""
     name: str = (get_origin(shape) or shape).__name__
     return tag.partition("[")[0] == name
 
 
 def _shapes(annotation: Any) -> list[Any]:
-    """What `X`, `X | None`, `Annotated[X, ...]` or `X | Y` allow but None."""
+    """Return the types that `X`, `X | None`, `Annotated[X, ...]` or `X | Y` allow, without None."""
     if get_origin(annotation) is Annotated:
         return _shapes(get_args(annotation)[0])
     if get_origin(annotation) in (Union, types.UnionType):

@@ -1,4 +1,4 @@
-"""Units at the edge: a number in YAML carries its unit in its key (`offset_m`, `speed_mph`)."""
+"""Units of numbers in YAML, which stand in the key (`offset_m`, `speed_mph`)."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
-    """A unit: `suffix` as in keys, `symbol` as in tables, `factor` takes a number of it to SI (radians)."""
+    """A unit: `suffix` as in keys, `symbol` as in tables, `factor` converts to SI (radians for angles)."""
 
     suffix: str
     symbol: str
@@ -16,7 +16,7 @@ class Unit:
 
 _DEG = math.pi / 180
 
-# A unit is a factor and no more: degC and K differ by an offset, too, so neither is converted into the other.
+# Units only have factors. degC and K also differ by an offset, so they are not converted into each other.
 UNITS = {
     suffix: Unit(suffix=suffix, symbol=symbol, dimension=dimension, factor=factor)
     for suffix, symbol, dimension, factor in (
@@ -57,12 +57,12 @@ UNITS = {
     )
 }
 KNOWN = ", ".join(UNITS)
-_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # that the longest suffix has
+_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # of the longest suffix
 
 
 def split(key: str) -> tuple[str, Unit | None]:
-    """`offset_m` -> (`offset`, metre), `offset_per_m` -> (`offset`, 1/m): the longest suffix counts. A key
-    that ends in no unit is returned whole, with None."""
+    """Split `offset_m` into (`offset`, metre), and `offset_per_m` into (`offset`, 1/m): the longest suffix
+    wins. A key without a unit is returned whole, with None."""
     for words in range(_WORDS, 0, -1):
         stem, *parts = key.rsplit("_", words)
         suffix = "_".join(parts)
@@ -72,9 +72,9 @@ def split(key: str) -> tuple[str, Unit | None]:
 
 
 def convert(number: float, source: Unit, target: Unit) -> float:
-    """The same quantity in another unit of its dimension; ValueError when the dimensions differ."""
+    """Convert a number to another unit; ValueError if the dimensions differ."""
     if source.dimension != target.dimension:
-        raise ValueError(f"{source.symbol} is no unit of {target.dimension}")
+        raise ValueError(f"{source.symbol} is not a unit of {target.dimension}")
     if source.factor == target.factor:
         return float(number)
     return number * source.factor / target.factor

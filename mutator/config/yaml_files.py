@@ -1,7 +1,7 @@
-"""YAML at the edge: strict, with a line for every value, so that an error can point at its place.
+"""Reads YAML strictly, with a line for every value, so that errors can point at it.
 
-The dialect is the core of YAML 1.2: `true`/`false`, `null`, decimal numbers, strings; no tags, no anchors
-and aliases (a small file could unfold into gigabytes), one document a file, no key twice.
+The dialect is the core of YAML 1.2: `true`/`false`, `null`, decimal numbers and strings. It excludes tags,
+anchors and aliases (a small file could expand to gigabytes), several documents, and duplicate keys.
 """
 
 import re
@@ -23,7 +23,7 @@ Keys = tuple[str | int, ...]
 M = TypeVar("M", bound="StrictModel")
 
 MAX_BYTES = 1_000_000
-MAX_DEPTH = 40  # of lists and mappings in each other
+MAX_DEPTH = 40  # nested lists and mappings
 MAX_VALUES = 100_000  # keys, texts, numbers, lists and mappings
 _LINE_BREAK = re.compile(r"\r\n|[\r\n\x85\u2028\u2029]")
 _DIRECTIVE = re.compile(r"(?:\A\ufeff?|[\r\n\x85\u2028\u2029])%")
@@ -31,7 +31,7 @@ _SCHEMA = re.compile(r"([a-z_]+)/(\d{1,6})\Z")
 _CORE = {
     "bool": ("tTfF", r"true|True|TRUE|false|False|FALSE"),
     "null": ("~nN\0", r"~|null|Null|NULL|"),
-    "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # more is a float, and infinite if it is beyond these
+    "int": ("-+0123456789", r"[-+]?[0-9]{1,300}"),  # longer ones are floats, infinite if too large
     "float": (
         "-+.0123456789",
         r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?|[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)",
@@ -40,21 +40,21 @@ _CORE = {
 
 
 class StrictModel(BaseModel):
-    """Base of every file's shape: no unknown key, no silent change of a value's type."""
+    """Base of all file models: rejects unknown keys and does not convert types."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A parsed file and where its values stand: `lines` maps a path of keys to a line (from 1)."""
+    """A parsed file. `lines` maps a path of keys to its line (from 1)."""
 
     path: Path
     data: Any
     lines: dict[Keys, int]
 
     def line(self, keys: Keys) -> int | None:
-        """Line of the value at `keys`, or of the nearest thing around it."""
+        """Return the line of the value at `keys`, or of the nearest enclosing value."""
         for end in range(len(keys), -1, -1):
             if keys[:end] in self.lines:
                 return self.lines[keys[:end]]
@@ -63,12 +63,12 @@ class Source:
     def error(
         self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
     ) -> MutatorError:
-        """An error (not raised) that points at the value at `keys`."""
+        """Return (not raise) an error that points at the value at `keys`."""
         return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
 
     @contextmanager
     def placing(self, keys: Keys) -> Iterator[None]:
-        """Have an error about the value at `keys`, which knows no place, point at it."""
+        """Make a MutatorError raised inside point at the value at `keys`."""
         try:
             yield
         except MutatorError as error:
@@ -76,7 +76,7 @@ class Source:
 
 
 class _Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
-    """The safe loader with the scalars of YAML 1.2: `on` and `no` are words, `1:30` is no number."""
+    """The safe loader with the scalars of YAML 1.2: `on`, `no` and `1:30` are text."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
 
@@ -89,12 +89,12 @@ for _kind, (_first, _pattern) in _CORE.items():
 
 
 def load(path: Path) -> Source:
-    """Parse one YAML file strictly; MutatorError with file and line for anything wrong with it."""
+    """Parse one YAML file strictly; MutatorError with file and line if it is invalid."""
     return parse(_read_text(path), path)
 
 
 def parse(text: str, path: Path) -> Source:
-    """The same for the text of a file."""
+    """Parse the text of a file like `load`."""
     try:
         _check_events(text, path)
         node = yaml.compose(text, Loader=_Loader)
@@ -117,7 +117,7 @@ def _read_text(path: Path) -> str:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise MutatorError(
-                f"{path.stat().st_size} bytes long", where=path, expected=f"at most {MAX_BYTES} bytes"
+                f"{path.stat().st_size} bytes", where=path, expected=f"at most {MAX_BYTES} bytes"
             )
         return no_pipe(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
@@ -133,7 +133,7 @@ def _read_text(path: Path) -> str:
 
 
 def _check_events(text: str, path: Path) -> None:
-    """Refuse what the dialect has not, and what would take long to read, event by event: nothing is built."""
+    """Reject what the dialect excludes and what would take long to read, before anything is built."""
     if directive := _DIRECTIVE.search(text):
         raise MutatorError(
             "'%' at the start of a line (a directive)",
@@ -160,7 +160,11 @@ def _check_events(text: str, path: Path) -> None:
         documents += isinstance(event, yaml.DocumentStartEvent)
         if documents > 1:
             raise MutatorError(
-                "a second document", where=path, line=line, expected="one", remedy="remove the `---` above it"
+                "a second document",
+                where=path,
+                line=line,
+                expected="one document in each file",
+                remedy="remove the `---` above it",
             )
         if depth > MAX_DEPTH or values > MAX_VALUES:
             raise MutatorError(
@@ -194,10 +198,10 @@ def _construct_mapping(
         key = key_node.value
         if key in result:
             raise MutatorError(
-                f"key '{key}' stands here a second time",
+                f"duplicate key '{key}'",
                 where=path,
                 line=line,
-                expected=f"it once (the first is in line {lines[(*keys, key)]})",
+                expected=f"the key once (it is also in line {lines[(*keys, key)]})",
                 remedy="remove one of the two",
             )
         lines[(*keys, key)] = line
@@ -222,9 +226,8 @@ def read(
 ) -> tuple[M, Source]:
     """Parse `path`, check its `schema: name/version` key against `schema`, validate the rest as `model`.
 
-    `older` has what makes a file of `schema` of one of an older schema. The schema key is not part of the
-    model. A newer version, an unknown or doubled key, a wrong type or a value out of range is a MutatorError
-    with file, line, value, what was expected, and a remedy.
+    `older` maps older schemas to functions that convert a file to `schema`. MutatorError, with file, line and
+    remedy, for a newer version, an unknown or duplicate key, a wrong type or a value out of range.
     """
     source = load(path)
     if not isinstance(source.data, dict):
@@ -259,6 +262,6 @@ def _check_schema(source: Source, schema: str) -> None:
     remedy = f"start the file with `schema: {schema}`"
     if match and match[1] == name:
         newer = int(match[2]) > int(version)
-        remedy = "use a newer version of this program" if newer else f"bring the file up to {schema}"
+        remedy = "use a newer version of mutator" if newer else f"update the file to {schema}"
     got = f"schema {given!r}" if "schema" in source.data else "no schema key"
     raise source.error(("schema",), got, expected=schema, remedy=remedy)

@@ -1,4 +1,4 @@
-"""The page of the command line, written from what `--help` is written from."""
+"""Generates docs/reference/cli.md from the same source as `--help`."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -14,27 +14,29 @@ from mutator.execution import pytest_plugin
 from mutator.reference.tables import generated
 from mutator.workspace import Workspace
 
-_PLACES = "Options that say where library, templates and target are may stand before or after the verb.\n"
+_PLACES = (
+    "These options say where the library, templates and target are. Write them before or after the verb.\n"
+)
 
 
 def command_line(workspace: Workspace) -> str:
-    """docs/reference/cli.md."""
+    """Return the text of docs/reference/cli.md."""
     command: Any = get_command(app)
     parts = [
         generated("Command line"),
-        "`mutator --help` and `mutator VERB --help` say the same.\n",
+        "`mutator --help` and `mutator VERB --help` print the same information.\n",
         *(f"* {title}: {', '.join(f'[{name}](#{name})' for name in names)}" for title, names in GROUPS),
         "\n## Exit codes\n",
         _markdown(("code", "meaning"), [(str(code), meaning) for code, meaning in EXIT_CODES.items()]),
-        "\n1 is also a difference that a command was asked to look for; 3 also a defect of mutator itself, "
-        "which is told with\na traceback.\n",
-        "An error, on standard error, says file and line, what was found, what was expected, and what "
-        "to do. With `--json`\nstandard output is one JSON document. Progress goes to standard error.\n",
+        "\nCode 1 also means that a command found a difference that you asked it to look for. Code 3 also "
+        "means a defect of\nmutator itself, reported with a traceback.\n",
+        "Errors go to standard error: file and line, what was found, what was expected, and what to do. "
+        "Progress also goes\nto standard error. With `--json`, standard output is one JSON document.\n",
         "## Completion\n",
-        "`mutator --install-completion` has the current shell complete verbs, options, and the names of "
-        "campaigns, specs,\nscenarios, targets, run folders in `runs/` and experiments: of the run that "
-        "`--run` names, or of the newest one.\n`mutator --show-completion` prints what it would install.\n",
-        "## Where things are\n",
+        "`mutator --install-completion` installs completion for the current shell: verbs, options, "
+        "campaigns, specs,\nscenarios, targets, run folders in `runs/`, and experiments of the run that "
+        "`--run` names or of the newest run.\n`mutator --show-completion` prints what it would install.\n",
+        "## Library, templates and target\n",
         _PLACES,
         *_options(command, [p for p in command.params if p.name in PLACE_OPTIONS]),
     ]
@@ -64,7 +66,7 @@ def _verb(group: Any, name: str) -> Iterator[str]:
 
 
 def _example(line: str) -> str:
-    """A line of the examples; words that stand far behind the command are made a comment."""
+    """Return one example line, with the text after the wide gap as a comment."""
     command, gap, comment = re.match(r"  (.*?)(?:( {2,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
     return f"{command}{gap}# {comment}" if gap else command
 
@@ -85,13 +87,13 @@ def _paragraphs(text: str) -> str:
 
 
 def _plugin() -> Iterator[str]:
-    """What the plugin adds to pytest."""
+    """Describe the options that the plugin adds to pytest."""
     parser = pytest.Parser(_ispytest=True)
     pytest_plugin.pytest_addoption(parser)
     yield "## pytest\n"
     yield (
-        "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign as `mutator run` does, "
-        "without its table.\n"
+        "`pytest --campaign FILE --campaign-out DIR -n 2` runs a campaign like `mutator run`, without "
+        "its table.\n"
     )
     rows = [
         (f"`{' '.join(option.names())} {option.attrs()['metavar']}`", str(option.attrs()["help"]))

@@ -161,7 +161,7 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(
-            "no library here",
+            "no library found",
             where=where,
             expected="the sources of the run: trees and patches were not compared",
         )

@@ -208,7 +208,7 @@ def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
     assert second.code == 2
     assert "in use" in second.err
     assert process.returncode == 130
-    assert "go on: mutator run toy --out runs/cut -n 0 --limit 6" in out + err
+    assert "resume: mutator run toy --out runs/cut -n 0 --limit 6" in out + err
     assert "Traceback" not in err
     again = cli(*words)
     assert again.code == 0

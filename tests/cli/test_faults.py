@@ -138,7 +138,7 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ([], "no spec named"),
+        ([], "no spec given"),
         (["nothing*"], "no spec matches"),
         (["sensor/distance", "--campaign", "x"], "one or the other"),
         (["--in", "toycar/driver.py"], "without --operators"),

@@ -66,6 +66,6 @@ def test_names_that_are_no_text(place: Path, what: str) -> None:
     assert (answer.returncode, answer.stdout) == (2, ""), answer.stderr
     assert "Traceback" not in answer.stderr
     assert answer.stderr.startswith("error: ")
-    assert "is no text in this environment" in answer.stderr
+    assert "cannot be encoded in this environment" in answer.stderr
     assert "LC_ALL=C.UTF-8" in answer.stderr
     assert not (place / out / "run.json").exists()

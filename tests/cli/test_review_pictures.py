@@ -20,6 +20,6 @@ def test_pictures_are_written_and_named(
     assert shown == {light: {n: str(tmp_path / f"out/{light}-{n}.jpg") for n in names}, silent: {}}
     assert sorted(tmp_path.glob("out/*")) == [Path(shown[light][name]) for name in names]
     assert cli("review", "show", silent, "--pictures", tmp_path / "none").err.endswith(
-        f"{silent} has no pictures: it is no image effect in one place\n"
+        f"{silent} has no pictures: it is not an image effect in a single place\n"
     )
     assert not (tmp_path / "none").exists()

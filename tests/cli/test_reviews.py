@@ -114,8 +114,8 @@ def test_no_name_is_no_decision(
     group = next(iter(known))
     for words in ((), ("--by", " ")):
         answer = cli("review", "approve", group, *words)
-        assert (answer.code, "expected: who has reviewed" in answer.err) == (2, True)
-        assert "give --by, or tell git: `git config user.name NAME`" in answer.err
+        assert (answer.code, "expected: the reviewer's name" in answer.err) == (2, True)
+        assert "add --by, or set git's: `git config user.name NAME`" in answer.err
     assert not (root / "fault_library/reviews").exists()
     (root / ".gitconfig").write_text("[user]\nname = Git Smith\n")
     assert " approved by Git Smith on " in cli("review", "approve", group).out
@@ -128,16 +128,16 @@ def test_all_that_a_filter_finds_is_decided_after_a_question(
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
     assert (asked.code, "--only: 3 groups (3 new)" in asked.err) == (2, True)
-    assert "say --yes to approve them" in asked.err
+    assert "add --yes to approve them" in asked.err
     questions: list[str] = []
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
     monkeypatch.setattr(typer, "confirm", lambda text: bool(questions.append(text)))
     assert (cli(*words).code, questions) == (0, ["approve 3 groups (3 new)?"])
     assert not (root / "fault_library/reviews").exists()
     assert cli(*words, "--yes").out.splitlines()[-1].endswith(": 2 new, 3 approved")
-    assert "no group for which" in cli(*words, "--yes").err
+    assert "no group matches" in cli(*words, "--yes").err
     for wrong in ((), (next(iter(known)), "--only", "flagged")):
-        assert "expected: the ids of groups, or a filter" in cli("review", "reject", *wrong, *JANE).err
+        assert "expected: either the ids of groups or --only" in cli("review", "reject", *wrong, *JANE).err
 
 
 def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: dict[str, str]) -> None:
@@ -184,7 +184,7 @@ def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str
 def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[str, str]) -> None:
     """Of a group that is not what was approved any more; of others that there is nothing to show."""
     gap = about(known, "offset(by, target=gap)")
-    assert "nobody has decided yet" in cli("review", "show", gap, "--changes").out
+    assert "no decision yet" in cli("review", "show", gap, "--changes").out
     cli("review", "approve", gap, *JANE)
     assert "nothing has changed since" in cli("review", "show", gap, "--changes").out
     template = root / "templates/offset.py.j2"
@@ -194,7 +194,7 @@ def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[s
     assert "-    {{ target }} = {{ target }} {{ by | signed }}\n" in shown
     assert shown.count("gap = gap") == 2
     shutil.rmtree(root / "fault_library/reviews/seen")
-    assert "what was seen then is not kept" in cli("review", "show", gap, "--changes").out
+    assert "what the reviewer saw then was not kept" in cli("review", "show", gap, "--changes").out
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:

@@ -110,4 +110,4 @@ def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:
     """A folder that is not there is told with the file's name."""
     answer = cli("--root", CLONE, "stpa", "--svg", "no/such/structure.svg")
     assert answer.code == 2
-    assert "no/such/structure.svg: cannot be written" in answer.err
+    assert "no/such/structure.svg: cannot write the file" in answer.err

@@ -24,13 +24,13 @@ def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
 def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
     """Where the fault-free run reaches a hazard itself, one line says so, and so does the JSON."""
     words = ("try", "sensor/lane", "-s", "A", "--trigger", "1")
-    said = "the fault-free run reaches"
+    said = "the fault-free run also reaches"
     assert said not in cli(*words).out
     assert cli(*words, "--json").json["golden_hazards_s"] == {}
     scenario = root / "fault_library" / "scenarios" / "A.yaml"
     scenario.write_text(scenario.read_text().replace("\nspeed: 20", "\nspeed: 36"))
     assert [line for line in cli(*words).out.splitlines() if said in line] == [
-        "the fault-free run reaches TOO_FAST at 0.00 s itself: that need not be the fault's doing"
+        "the fault-free run also reaches TOO_FAST at 0.00 s: the fault may not be the cause"
     ]
     assert cli(*words, "--json").json["golden_hazards_s"] == {"TOO_FAST": 0.0}
 

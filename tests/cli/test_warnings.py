@@ -16,7 +16,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
         (
             ["sensor/distance", "--value", "500"],
             [
-                "value 500 is outside of what the spec declares: sensor/distance/longer, 1 to 65 m; "
+                "value 500 is outside the range that the spec declares: sensor/distance/longer, 1 to 65 m; "
                 "sensor/distance/nearer, 400 to 459 m"
             ],
         ),
@@ -24,7 +24,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
             ["sensor/distance", "--variant", "longer", "--value", "0"],
             [
                 "sensor/distance/longer 0 m changes nothing",
-                "value 0 is outside of what the spec declares: sensor/distance/longer, 1 to 65 m",
+                "value 0 is outside the range that the spec declares: sensor/distance/longer, 1 to 65 m",
             ],
         ),
         (["sensor/lane", "--value", "2.5"], []),

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 TRIES = 20  # of each surrounding
 WORDS = ("small", "--limit", "2", "--engine", "fork")
 BECOME = "\nimport os, sys\nos.execv(sys.executable, [sys.executable, '-m', 'mutator', *sys.argv[1:]])"
-REMEDIES = ("to do: ", "expected: ", "go on: ", "the same command")
+REMEDIES = ("to do: ", "expected: ", "resume: ", "the same command")
 
 
 @dataclass(slots=True, kw_only=True)

@@ -64,5 +64,5 @@ def test_harness_errors_are_not_silent(
         return replace(running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1)
 
     monkeypatch.setattr(campaigns, "run_campaign", run_campaign)
-    with pytest.warns(mutator.IncompleteRun, match="1 of 2.*abcd: no memory.*the same call goes on"):
+    with pytest.warns(mutator.IncompleteRun, match="1 of 2.*abcd: no memory.*the same call resumes"):
         mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar)

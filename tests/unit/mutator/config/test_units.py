@@ -51,9 +51,9 @@ def test_conversion(number: float, source: str, target: str, expected: float) ->
 
 def test_dimensions_do_not_mix() -> None:
     """Metres are no speed."""
-    with pytest.raises(ValueError, match="m is no unit of speed"):
+    with pytest.raises(ValueError, match="m is not a unit of speed"):
         units.convert(1, units.UNITS["m"], units.UNITS["mps"])
-    with pytest.raises(ValueError, match="degC is no unit of temperature in kelvin"):
+    with pytest.raises(ValueError, match="degC is not a unit of temperature in kelvin"):
         units.convert(20, units.UNITS["degc"], units.UNITS["k"])
 
 

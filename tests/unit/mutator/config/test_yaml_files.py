@@ -47,7 +47,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
         (
             "schema: car/2\nname: x\nname: y\n",
             3,
-            ["'name' stands here a second time", "line 2", "remove one"],
+            ["duplicate key 'name'", "line 2", "remove one"],
         ),
         (
             "schema: car/2\nname: x\nnmae: y\n",
@@ -77,7 +77,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
         ("schema: car/2\nname: x\ntags: a\n", 3, ["'a' for 'tags'", "expected a list"]),
         ("schema: car/2\nspare: {radius: 1}\n", 1, ["key 'name' is missing", "add `name: ...`"]),
         ("schema: car/3\nname: x\n", 1, ["'car/3'", "expected car/2", "newer version"]),
-        ("schema: car/1\nname: x\n", 1, ["'car/1'", "expected car/2", "bring the file up to car/2"]),
+        ("schema: car/1\nname: x\n", 1, ["'car/1'", "expected car/2", "update the file to car/2"]),
         ("schema: bus/2\nname: x\n", 1, ["'bus/2'", "expected car/2", "start the file with"]),
         ("name: x\n", 1, ["no schema key", "`schema: car/2`"]),
         ("schema: car/2\nname: &a x\nspare: *a\n", 2, ["an anchor or alias", "write the value out"]),

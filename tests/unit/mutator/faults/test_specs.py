@@ -249,7 +249,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "error_kph:",
             "error_deg:",
-            "42: '-error' for 'by_kph'; expected the same dimension: deg is no unit of speed; "
+            "42: '-error' for 'by_kph'; expected the same dimension: deg is not a unit of speed; "
             "correct the value",
         ),
         (
