@@ -1,5 +1,4 @@
-"""The generated part of the documentation: pages and JSON Schemas, each from the one place that knows.
+"""Generates the reference pages and JSON Schemas from the code and the library.
 
-`python -m mutator.reference` writes all of it into the clone it is run in; a test holds what is committed
-against what is generated.
+`python -m mutator.reference` writes them into the current clone; a test compares the committed files.
 """

@@ -1,4 +1,4 @@
-"""`python -m mutator.reference`: write every generated page and schema of the clone it is run in."""
+"""`python -m mutator.reference`: write all generated pages and schemas of the current clone."""
 
 from mutator.reference.pages import write
 from mutator.workspace import Workspace

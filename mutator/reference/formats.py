@@ -1,4 +1,4 @@
-"""Pages of the file formats: fault specs, campaigns, manifests, the hazard analysis."""
+"""Generates the pages of the file formats: fault specs, campaigns, manifests, hazard analysis, clusters."""
 
 from collections.abc import Iterator
 
@@ -15,86 +15,83 @@ from mutator.targets import manifest_files, severity
 from mutator.workspace import Workspace
 
 STRICT = """\
-The YAML is plain: no tags, anchors or aliases, no key twice, `true` and `false` as the only booleans.
-An unknown key, a wrong type, a unit of the wrong dimension or a value out of range is an error with file and
-line. Numbers carry their unit in the last part of their key (`distance_m`, `by_kph`); a number without a unit
-has a key without one.
+Use plain YAML: no tags, anchors or aliases, no duplicate keys, only `true` and `false` as booleans. Unknown
+keys, wrong types, units of the wrong dimension and values out of range are errors with file and line. The
+last part of a number's key is its unit (`distance_m`, `by_kph`). A number without a unit has a key without
+one.
 """
 _SAME = (
-    "The YAML is strict, as that of [fault specs](fault-spec.md), and "
-    "[an editor can check it](../how-to/edit-with-completion.md)."
+    "The YAML is as strict as in [fault specs](fault-spec.md), and "
+    "[your editor can check it](../how-to/edit-with-completion.md)."
 )
 
 
 def fault_spec(workspace: Workspace) -> str:
-    """docs/reference/fault-spec.md."""
+    """Return the text of docs/reference/fault-spec.md."""
     example = min((workspace.library / "faults").rglob("*.yaml")).read_text(encoding="utf-8")
     return _page(
         generated("Fault specs"),
-        "A fault spec is one YAML file: a fault type of a module, in one or more variants. The "
-        "library keeps it "
-        "at\n`fault_library/faults/<module>/<fault_type>.yaml`; `mutator try FILE --scenario S1` "
-        "takes one from "
-        "anywhere.\n",
+        "A fault spec is one YAML file with a fault type of a module, in one or more variants. Its "
+        "place in the "
+        "library is\n`fault_library/faults/<module>/<fault_type>.yaml`. `mutator try FILE --scenario "
+        "S1` accepts a file anywhere.\n",
         STRICT,
-        f"The first key is `schema: {specs.SCHEMA}`. A file of a newer schema is refused.\n"
-        "[An editor can check it](../how-to/edit-with-completion.md) while you write.\n",
+        f"The first key is `schema: {specs.SCHEMA}`. Files of newer schemas are rejected.\n"
+        "[Your editor can check the file](../how-to/edit-with-completion.md) while you write.\n",
         f"```yaml\n{example.rstrip()}\n```\n",
         *sections("fault-spec.md", specs.spec_model(workspace.readings())),
         *_readings(),
         "## Units\n",
         *_units(),
         "## Fault models\n",
-        "Offset, scale, stuck and so on, with their parameters and examples: [Fault "
-        "models](fault-models.md).\n",
+        "[Fault models](fault-models.md) lists all models (offset, scale, stuck, ...) with their "
+        "parameters and examples.\n",
     )
 
 
 def campaigns(workspace: Workspace) -> str:
-    """docs/reference/campaign.md."""
+    """Return the text of docs/reference/campaign.md."""
     example = (workspace.library / "campaigns" / "quickstart.yaml").read_text(encoding="utf-8")
     return _page(
         generated("Campaigns"),
-        "Which faults, in which scenarios, under which triggers, within which limits. The library keeps a "
-        "campaign at\n`fault_library/campaigns/<name>.yaml`; `mutator run FILE --out DIR` takes one from "
-        "anywhere.\n",
+        "A campaign file chooses faults, scenarios, triggers and limits. Its place in the library is\n"
+        "`fault_library/campaigns/<name>.yaml`. `mutator run FILE --out DIR` accepts a file anywhere.\n",
         f"The first key is `schema: {campaign_files.SCHEMA}`. {_SAME}\n",
         f"```yaml\n{example.rstrip()}\n```\n",
-        "Its experiments are all combinations of the selected faults, scenarios, methods and "
-        "contexts, of which a "
-        "`sample` takes some.\nThe same file and options make the same plan everywhere.\n",
+        "The experiments are all combinations of the selected faults, scenarios, methods and "
+        "contexts; `sample` "
+        "draws some of them.\nThe same file and options produce the same plan everywhere.\n",
         *sections("campaign.md", campaign_model.CampaignModel),
     )
 
 
 def manifests(workspace: Workspace) -> str:
-    """docs/reference/target-manifest.md."""
+    """Return the text of docs/reference/target-manifest.md."""
     return _page(
         generated("Target manifests"),
-        "All that the harness knows of a controller tree, at `fault_library/targets/<name>.yaml`. "
-        "[Another controller tree](../how-to/add-a-target.md)\nsays how to write one; what the "
-        "manifests of this "
-        "library record is in [Channels](channels.md).\n",
+        "A manifest at `fault_library/targets/<name>.yaml` tells the harness everything that it knows "
+        "about a controller.\nTo write one, see [Add a target](../how-to/add-a-target.md). "
+        "[Channels](channels.md) lists "
+        "what the manifests of this library\nrecord.\n",
         f"The first key is `schema: {manifest_files.SCHEMA}`. {_SAME}\n",
         *sections("target-manifest.md", manifest_files.ManifestModel),
         "## Scales of severity\n",
-        "The files of `fault_library/severity/`: which class a delta-v is in, as [Verdicts](../explanation/"
-        "verdicts.md#severity)\nsays. A manifest names one in `severity.scale`. The first key is `schema: "
+        "The files in `fault_library/severity/` map a delta-v to a class; see [Verdicts](../explanation/"
+        "verdicts.md#severity).\nA manifest names one of them in `severity.scale`. The first key is `schema: "
         f"{severity.SCHEMA}`.\n",
         *sections("target-manifest.md", severity.ScaleModel, below=2),
     )
 
 
 def hazard_analysis(workspace: Workspace) -> str:
-    """docs/reference/hazard-analysis.md."""
+    """Return the text of docs/reference/hazard-analysis.md."""
     return _page(
         generated("Files of the hazard analysis"),
-        "The files of `fault_library/stpa/`. [The hazard "
-        "analysis](../explanation/hazard-analysis.md) says what "
-        "they mean together,\n[Change the hazard analysis](../how-to/change-the-hazard-analysis.md) "
-        "how to write "
-        "them; `mutator stpa` prints and checks them.\n",
-        f"{_SAME} The first key of each is `schema`, with the file's kind: "
+        "These are the files in `fault_library/stpa/`. [The hazard "
+        "analysis](../explanation/hazard-analysis.md) explains them.\n[Change the hazard "
+        "analysis](../how-to/change-the-hazard-analysis.md) shows how to write "
+        "them. `mutator stpa` prints and checks them.\n",
+        f"{_SAME} The first key of each file is `schema`: "
         f"`{context_tables.HAZARDS_SCHEMA}`, `{context_tables.CONTEXT_SCHEMA}`,\n`control_structure/1`, "
         "`unsafe_control_actions/1`, `causal_factors/1`.\n",
         *sections(
@@ -109,17 +106,18 @@ def hazard_analysis(workspace: Workspace) -> str:
 
 
 def clusters(workspace: Workspace) -> str:
-    """docs/reference/cluster-file.md."""
+    """Return the text of docs/reference/cluster-file.md."""
     return _page(
         generated("Cluster files"),
-        "Which cluster `mutator run --cluster FILE.yaml` starts, and ends with the run. [Run on many "
-        "machines](../how-to/run-on-many-machines.md)\nhas one [for Slurm](../how-to/clusters/slurm.yaml) "
-        "and one [for Kubernetes](../how-to/clusters/kubernetes.yaml).\n",
+        "A cluster file describes the cluster that `mutator run --cluster FILE.yaml` starts, and stops after "
+        "the run. See\n[Run on many machines](../how-to/run-on-many-machines.md), with examples "
+        "[for Slurm](../how-to/clusters/slurm.yaml) and\n"
+        "[for Kubernetes](../how-to/clusters/kubernetes.yaml).\n",
         f"The first key is `schema: {cluster_files.SCHEMA}`. {_SAME}\n",
         *sections("cluster-file.md", cluster_files.ClusterModel),
-        "Of the options, the run sets these itself, and refuses them: "
-        f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED)}.\n`security` is `true` or left out; "
-        "`processes` is the number of `cores`, as a worker has one thread.\n",
+        "The run sets these options itself and rejects them in a file: "
+        f"{', '.join(f'`{name}`' for name in cluster_files.RESERVED)}.\n`security` must be `true` or left "
+        "out. `processes` must equal `cores`, because each worker has one thread.\n",
     )
 
 
@@ -129,8 +127,8 @@ def _readings() -> Iterator[str]:
         "The [readings](../explanation/concepts.md#readings) of a library are the keys under which its "
         "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
         f"{' and '.join(f'`{name}`' for name in UNDECLARED.names)}. "
-        "The first is the\ndefault: every variant is written in it, and it "
-        "holds where another is not written. The first key of the file is\n"
+        "The first is the\ndefault: every variant must have it, and it "
+        "replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
     yield from sections("fault-spec.md", ReadingsModel, below=2)
@@ -141,9 +139,9 @@ def _units() -> Iterator[str]:
     yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
     yield (
-        "The longest suffix counts: `by_per_m` is `by` in 1/m. A number is converted between units of one "
-        "quantity, by a factor.\ndegC and K also differ by an offset, so they are two quantities: give a "
-        "number in the unit that the variable has.\n"
+        "The longest suffix counts: `by_per_m` is `by` in 1/m. Numbers are converted between units of the "
+        "same quantity by a\nfactor. degC and K also differ by an offset, so they count as two quantities: "
+        "use the variable's unit.\n"
     )
 
 

@@ -1,7 +1,7 @@
-"""The page of licences: what each package in constraints.txt says of itself where it is installed.
+"""Generates the page of licences, as each installed package of constraints.txt states its own.
 
-`python -m mutator.reference.licences` writes it, in the clone it is run in. It is no part of
-`python -m mutator.reference`, since it depends on what is installed.
+`python -m mutator.reference.licences` writes it into the current clone. `python -m mutator.reference` leaves
+it out, since it depends on the installed packages.
 """
 
 import re
@@ -19,19 +19,20 @@ _HEAD = """\
 
 <!-- Written by `python -m mutator.reference.licences`. -->
 
-`mutator` itself is under the MIT License. The packages below are installed beside it, each under its own
-licence, given here as the package states it. Binary wheels may carry libraries under further licences, as
-those of `av` and `opencv-python-headless` carry FFmpeg; the `.dist-info` of such a wheel has them.
+`mutator` is under the MIT License. The packages below are installed with it. Each has its own licence, shown
+as the package states it. Binary wheels may include libraries under other licences: the wheels of `av` and
+`opencv-python-headless` include FFmpeg. The `.dist-info` of such a wheel contains these licences.
 
-*Needed by* says who asks for a package: `mutator` to run; an extra of it (`test`, `dev`, `train`,
-`examples`); or only other packages of this table.
+*Needed by* shows who requires a package: `mutator` itself, one of its extras (`test`, `dev`, `train`,
+`examples`), or only other packages in this table.
 
 """
 _ROW = re.compile(r"^\| ([\w.-]+) \| [^|]* \| ([^|]+) \|$", re.MULTILINE)
 
 
 def write_licences(clone: Path) -> None:
-    """Write the page. A package that is not installed here keeps its licence; MutatorError if it has none."""
+    """Write the page. A package that is not installed keeps its listed licence; MutatorError if it has
+    none."""
     page = clone / PAGE
     known = table_of(page.read_text(encoding="utf-8")) if page.exists() else {}
     direct = _needed_by(clone)
@@ -41,21 +42,21 @@ def write_licences(clone: Path) -> None:
 
 
 def table_of(page: str) -> dict[str, str]:
-    """The licence of each package, as the page has it."""
+    """Return the licence of each package on the page."""
     return {name: licence for name, licence in _ROW.findall(page) if name != "package"}
 
 
 def constrained(clone: Path) -> tuple[str, ...]:
-    """Names of the packages in constraints.txt, sorted, each once."""
+    """Return the names of the packages in constraints.txt, sorted, without duplicates."""
     text = (clone / "constraints.txt").read_text(encoding="utf-8")
     return tuple(sorted(set(re.findall(r"^([\w.-]+)==", text, re.MULTILINE))))
 
 
 def stated_licence(name: str) -> str | None:
-    """The licence that an installed package states; None when it is not installed here.
+    """Return the licence that an installed package states; None if it is not installed.
 
-    The licence expression where there is one (PEP 639); else the classifier; else the first line of the free
-    text, which may be the whole licence.
+    This is its licence expression (PEP 639), else its classifier, else the first line of the free text, which
+    may be a whole licence.
     """
     try:
         stated = metadata.metadata(name)
@@ -73,12 +74,12 @@ def stated_licence(name: str) -> str | None:
 def _licence(name: str, known: Mapping[str, str]) -> str:
     licence = stated_licence(name) or known.get(name)
     if licence is None:
-        raise MutatorError(f"no licence known of {name}", where=PAGE, remedy=f"install {name} here")
+        raise MutatorError(f"no known licence for {name}", where=PAGE, remedy=f"install {name}")
     return licence
 
 
 def _needed_by(clone: Path) -> dict[str, str]:
-    """Who asks for each direct dependency: mutator first, then the first of its extras."""
+    """Return who requires each direct dependency: mutator, or else the first of its extras."""
     project = tomllib.loads((clone / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = {"mutator": project["dependencies"]}
     groups |= {f"`{extra}`": lines for extra, lines in project["optional-dependencies"].items()}

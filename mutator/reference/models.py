@@ -1,4 +1,4 @@
-"""The page of the fault models, written from their templates."""
+"""Generates the page of the fault models from their templates."""
 
 import difflib
 from collections.abc import Iterator
@@ -10,24 +10,30 @@ from mutator.reference.tables import generated, sections
 from mutator.workspace import Workspace
 
 INTRODUCTION = """\
-What a fault does to a statement. A model is two files in `templates/`: `<name>.py.j2`, the template, and
-`<name>.yaml`, its parameters and examples ([add one](../how-to/add-a-fault-model.md)). A model that inserts
-puts lines before or after the anchored statement; one that guards wraps the statement itself. One that
-changes a value is an expression: while the fault is active, its value takes the place of the anchored
-expression's or, at a statement, of a variable's.
+A fault model defines what a fault does to a statement. It consists of two files in `templates/`: the template
+`<name>.py.j2`, and `<name>.yaml` with its parameters and examples
+([add one](../how-to/add-a-fault-model.md)). There are three kinds:
 
-A parameter in *the variable's unit* may be given in any unit of the same dimension. `target` may be left out
-where the anchor names the variable. A *variable* is a name that the function of the anchor knows; an *import*
-is the dotted name of a module of the target and of something defined in it, which the injected lines import.
-A *constant* is a number, `true`, `false`, `null` or a text; a *unit* is a suffix of
-[the table of units](fault-spec.md#units).
+* A model that **inserts** adds lines before or after the anchored statement.
+* A model that **guards** wraps the anchored statement.
+* A model that **changes a value** is an expression. While the fault is active, it replaces the value of the
+  anchored expression or, at a statement, of a variable.
 
-A variable keeps its kind: an integer stays an integer where the parameters are whole numbers.
+Write a parameter in *the variable's unit* in any unit of the same dimension. Leave out `target` if the anchor
+names the variable. Types of parameters:
 
-In the examples, lines with `+` are what the model adds to a source. `_fi` is
-[the probe](../explanation/concepts.md#proof-before-counting): `active` asks whether the trigger holds, and
-`like` gives a number as the variable's kind. [Failure modes](../explanation/failure-modes.md) says what each
-model stands for in standards and in the literature.
+* A *variable* is a name that the anchor's function knows.
+* An *import* is the dotted name of a module of the target and of something defined in it. The injected lines
+  import it.
+* A *constant* is a number, `true`, `false`, `null` or a text.
+* A *unit* is a suffix from [the table of units](fault-spec.md#units).
+
+An integer variable stays an integer if the parameters are whole numbers.
+
+In the examples, the model adds the lines marked with `+`. `_fi` is
+[the probe](../explanation/concepts.md#proof-before-counting): `active` checks whether the trigger holds, and
+`like` converts a number to the variable's type. [Failure modes](../explanation/failure-modes.md) shows what
+each model represents in standards and in the literature.
 """
 
 _DOES = {
@@ -38,7 +44,7 @@ _DOES = {
 
 
 def fault_models_page(workspace: Workspace) -> str:
-    """docs/reference/fault-models.md."""
+    """Return the text of docs/reference/fault-models.md."""
     models = list(workspace.fault_models())
     parts = [generated("Fault models"), INTRODUCTION]
     rows = [(f"[{model.name}](#{model.name})", _sentence(model.about)) for model in models]
@@ -55,7 +61,7 @@ def fault_models_page(workspace: Workspace) -> str:
 
 def _model(model: FaultModel) -> Iterator[str]:
     yield f"## {model.name}\n"
-    does = _DOES[model.kind] + (" Its exceptions are the target's." if model.raises else "")
+    does = _DOES[model.kind] + (" Its exceptions count as the target's." if model.raises else "")
     yield f"{' '.join(model.about.split())} {does}\n"
     params = [param for param in model.params if param.type != "seed"]
     if params:
@@ -73,12 +79,12 @@ def _param(param: ParamSchema) -> tuple[str, str, str, str]:
     high = [] if param.max is None else [f"at most {param.max:g}"]
     more = low + high + [f"`{word}`".replace("|", "\\|") for word in param.choices]
     kind = param.type + (f" ({', '.join(more)})" if more else "")
-    about = param.about + (" (may be left out)" if param.optional else "")
+    about = param.about + (" (optional)" if param.optional else "")
     return f"`{param.name}`", kind, unit, about
 
 
 def _change(example: Example) -> str:
-    """Before and after as one: what the model does to the example's source."""
+    """Return the example's change as a diff."""
     lines = difflib.ndiff(example.before.splitlines(), example.after.splitlines())
     return "\n".join((line[0] + line[2:]).rstrip() for line in lines if not line.startswith("?"))
 

@@ -1,4 +1,4 @@
-"""Pages of what is recorded: the columns of results, and the channels of each target."""
+"""Generates the pages on recorded data: result columns, and the channels of each target."""
 
 from collections.abc import Iterable, Iterator
 
@@ -24,7 +24,7 @@ _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"
 
 
 def results(workspace: Workspace) -> str:
-    """docs/reference/results.md."""
+    """Return the text of docs/reference/results.md."""
     left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
@@ -32,24 +32,24 @@ def results(workspace: Workspace) -> str:
             generated("Result columns"),
             "`results.csv` and `results.parquet` of a [run folder](run-folder.md) have one row for "
             "each experiment "
-            "that has a record,\nsorted by id. An empty cell means that there is nothing to tell. A "
-            "*flag* is 0 or 1. "
-            "Times are seconds of simulation since\nits start. What the words mean is in "
-            "[Verdicts](../explanation/verdicts.md).\n",
-            "Hazards and compared channels are the target's: its [manifest](target-manifest.md) names them. "
-            "A hazard has two\ncolumns, its name in small letters and `t_` and that name. A channel has one, "
-            "`max_dev_` and the first word of its\nname, or its whole name where two channels begin with the "
-            "same word. Margins of hazards and metrics\nhave the names that the manifest gives them.\n",
+            "with a record,\nsorted by id. An empty cell means that there is no value. A *flag* is 0 or "
+            "1. Times are "
+            "seconds since the start of the simulation.\n[Verdicts](../explanation/verdicts.md) defines "
+            "the terms.\n",
+            "The target's [manifest](target-manifest.md) names its hazards and compared channels. A hazard "
+            "has two columns:\nits name in lower case, and `t_` with that name. A channel has one column: "
+            "`max_dev_` with the first word of its\nname, or with its whole name if two channels start with "
+            "the same word. Margins of hazards and metrics have the\nnames that the manifest gives them.\n",
             *(line for manifest in manifests for line in _table_of(manifest)),
             "## plan.csv\n",
-            f"`plan.csv` has what is known before a run: {left_out}.\n",
+            f"`plan.csv` has the columns that are known before a run: {left_out}.\n",
             "## propagation.parquet\n",
-            "One row for each channel of an experiment that left golden beyond its tolerance, in the order "
-            "of experiments and of\nthe manifest's channels. How a path follows from it is in "
-            "[Fault paths](../explanation/fault-paths.md).\n",
+            "One row for each channel of an experiment that differed from golden by more than its tolerance, "
+            "in the order of\nexperiments and of the manifest's channels. [Fault "
+            "paths](../explanation/fault-paths.md) explains how a path follows from\nthese rows.\n",
             *_columns(PROPAGATION),
             "## timings.parquet\n",
-            "What each experiment cost, in its newest run. It is kept apart because it differs from "
+            "The cost of each experiment in its newest run. It is a separate table because it varies from "
             "run to run.\n",
             *_columns(TIMINGS),
         ]
@@ -77,9 +77,9 @@ def channels(workspace: Workspace) -> str:
     parts = [
         generated("Channels and units"),
         "What is observed, recorded and compared of each target of the library, as its "
-        "[manifest](target-manifest.md) says.\nInside everything is SI and radians; other units are "
-        "for files and "
-        "tables alone, and stand in the names there\n([units](fault-spec.md#units)).\n",
+        "[manifest](target-manifest.md) declares.\nInternally, all values are in SI units and radians. "
+        "Files and tables may "
+        "use other units, which are part of the\nnames there ([units](fault-spec.md#units)).\n",
     ]
     for manifest in manifests:
         parts += _target(manifest)
@@ -88,14 +88,14 @@ def channels(workspace: Workspace) -> str:
 
 def _target(manifest: TargetManifest) -> Iterator[str]:
     yield f"## {manifest.name}\n"
-    yield "Triggers and contexts can ask for:\n"
+    yield "Triggers and contexts can use these variables:\n"
     observed = variable_units(manifest.observation)
     variables = [(f"`{name}`", *told) for name, told in observed.items()]
     yield Table(heads=("variable", "unit", "meaning"), rows=variables).as_markdown(escape=False)
     yield ""
     yield (
-        f"A trace is an array for each channel in `{manifest.trace_file}`, with a value for each step of "
-        f"{manifest.step_s:g} s; `{manifest.time_channel}` is the time in s.\n"
+        f"A trace in `{manifest.trace_file}` has one array for each channel, with one value for each step of "
+        f"{manifest.step_s:g} s. `{manifest.time_channel}` is the time in s.\n"
     )
     rows = [_channel(channel) for channel in manifest.channels]
     yield Table(heads=("channel", "unit", "role", "component", "meaning"), rows=rows).as_markdown(
@@ -103,7 +103,7 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
     )
     yield ""
     hazards = [_hazard(hazard) for hazard in manifest.rules]
-    yield Table(heads=("hazard", "comes when", "ends the drive", "meaning"), rows=hazards).as_markdown(
+    yield Table(heads=("hazard", "condition", "ends the drive", "meaning"), rows=hazards).as_markdown(
         escape=False
     )
     yield ""
@@ -126,7 +126,7 @@ def _channel(channel: Channel) -> tuple[str, ...]:
 
 
 def _hazard(hazard: Hazard) -> tuple[str, ...]:
-    when = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "the record says so"
+    when = f"`{hazard.when or hazard.stl}`" if not hazard.recorded else "as recorded"
     if hazard.for_s:
         when += f" for {hazard.for_s:g} s"
     ends = {"": "no", "True": "yes"}.get(hazard.terminal, f"`{hazard.terminal}`")
@@ -135,7 +135,7 @@ def _hazard(hazard: Hazard) -> tuple[str, ...]:
 
 def _metric(metric: Metric) -> tuple[str, ...]:
     if metric.name == DELTA_V:
-        what = "what `severity` says"
+        what = "as in `severity`"
     elif metric.formula:
         what = f"{metric.aggregate} of `{metric.formula}`"
     else:

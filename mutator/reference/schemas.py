@@ -1,6 +1,6 @@
 """JSON Schemas of the YAML files, for editors, made from the models that check these files.
 
-A schema says what a file looks like. What it names (places, hazards, contexts) is checked by `mutator check`.
+A schema covers the form of a file; `mutator check` checks the names in it (places, hazards, contexts).
 """
 
 import re
@@ -20,7 +20,7 @@ from mutator.faults.readings import Readings
 from mutator.stpa import analysis, context_tables
 from mutator.targets import manifest_files, severity
 
-DRAFT = "http://json-schema.org/draft-07/schema#"  # what editors know best
+DRAFT = "http://json-schema.org/draft-07/schema#"  # best supported by editors
 _MODEL = re.compile(r"^_?(\w+?)Model$")
 _LINK = re.compile(r"\[([^]]+)\]\([^)]+\)")
 _DRAWN = {
@@ -37,7 +37,8 @@ _DRAWN = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """A kind of YAML file: its model, the value of its key `schema`, and what such files match in a clone."""
+    """A kind of YAML file: its model, the value of its `schema` key, and the glob of such files in a
+    clone."""
 
     model: type[StrictModel]
     schema: str
@@ -45,7 +46,7 @@ class Format:
 
     @property
     def name(self) -> str:
-        """Name of its JSON Schema: `fault_spec` of `fault_spec/1`."""
+        """Name of its JSON Schema: `fault_spec` for `fault_spec/1`."""
         return self.schema.partition("/")[0]
 
 
@@ -63,7 +64,7 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
 
 
 def file_formats(declared: Readings) -> tuple[Format, ...]:
-    """The kinds of YAML files: of a library that declares these readings, of templates, and of clusters."""
+    """Return the kinds of YAML files of a library with these readings, of templates, and of clusters."""
     specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
@@ -75,10 +76,11 @@ def file_formats(declared: Readings) -> tuple[Format, ...]:
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
-    """Every model that a file of `model` is made of, by its short name (`Variant`).
+    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), the file's
+    first.
 
-    The file's own comes first. Each is a JSON Schema; that of a model has the title of its class, its
-    docstring in one line, and descriptions of its properties.
+    The schema of a model has the class's title, its docstring in one line, and descriptions of its
+    properties.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
@@ -86,13 +88,13 @@ def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
 
 
 def short_name(name: str) -> str:
-    """`Variant` of `_VariantModel`; the name of an enumeration is left as it is."""
+    """Return `Variant` for `_VariantModel`; names of enumerations stay unchanged."""
     match = _MODEL.match(name)
     return match[1] if match else name
 
 
 def _described(part: dict[str, Any]) -> dict[str, Any]:
-    """The part, clean; a model of ours with its title and description, its properties with theirs."""
+    """Clean the part; models and their properties keep titles and descriptions."""
     kept: dict[str, Any] = _clean(part)
     if "properties" in part:
         kept["title"] = part["title"]
@@ -103,7 +105,7 @@ def _described(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _clean(value: Any) -> Any:
-    """Without titles and descriptions, many of which pydantic makes up; references by short names."""
+    """Drop titles and descriptions, many of them made up by pydantic, and shorten references."""
     if isinstance(value, list):
         return [_clean(item) for item in value]
     if not isinstance(value, dict):
@@ -113,7 +115,7 @@ def _clean(value: Any) -> Any:
         for key, inner in value.items()
         if key not in ("title", "description", "properties")
     }
-    if "properties" in value:  # its keys are names, not words of JSON Schema
+    if "properties" in value:  # its keys are names, not JSON Schema keywords
         kept["properties"] = {key: _clean(inner) for key, inner in value["properties"].items()}
     if "$ref" in kept:
         kept["$ref"] = f"#/definitions/{short_name(kept['$ref'].rpartition('/')[2])}"
@@ -121,7 +123,7 @@ def _clean(value: Any) -> Any:
 
 
 def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
-    """The JSON Schema of one kind of file; injections know the parameters of `models`."""
+    """Return the JSON Schema of one kind of file; injections have the parameters of `models`."""
     parts = definitions(kind.model)
     if "Injection" in parts:
         _with_models(parts["Injection"], models)
@@ -141,7 +143,7 @@ def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
 
 
 def _with_models(injection: dict[str, Any], models: FaultModels) -> None:
-    """Offer the fault models; for each, its parameters. An unknown model is left to `mutator check`."""
+    """Add the fault models and their parameters; `mutator check` finds unknown models."""
     properties = injection["properties"]
     properties["model"]["anyOf"] = [{"enum": [model.name for model in models]}, {"type": "string"}]
     properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
@@ -160,7 +162,7 @@ def _parameters(model: FaultModel) -> dict[str, Any]:
 
 
 def keys(param: ParamSchema) -> Iterator[str]:
-    """How a spec may write a parameter: with the suffixes of all units that may fit."""
+    """Yield the keys of a parameter in a spec: its name with the suffix of each possible unit."""
     if param.unit in (None, TARGET_UNIT):
         yield param.name
     if param.unit is not None:

@@ -1,4 +1,4 @@
-"""Markdown of a model: a section with a table of its keys."""
+"""Markdown sections for models, each with a table of its keys."""
 
 import json
 from collections.abc import Iterator
@@ -8,7 +8,7 @@ from mutator._common.tables import Table
 from mutator.config.yaml_files import StrictModel
 from mutator.reference.schemas import definitions
 
-# Parts of several kinds of files, and the page that has their section.
+# parts of several kinds of files, and the page with their section
 _PAGES = {"Injection": "fault-spec.md", "At": "fault-spec.md"}
 _SIGNS = {
     "minimum": "at least",
@@ -26,15 +26,15 @@ _WORDS = {
 
 
 def generated(title: str) -> str:
-    """Head of a page."""
+    """Return the head of a page."""
     return f"# {title}\n\n<!-- Written by `python -m mutator.reference`; do not edit by hand. -->\n"
 
 
 def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
-    """A section for each model that files of `models` are made of, each once, in the order of their keys.
+    """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
-    Headings are of the level below `below`; with several files, those of their parts are a level deeper. A
-    model that has its section on another page is linked there.
+    Headings are one level below `below`; with several files, their parts are one level deeper. A model with
+    its section on another page is linked there.
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:
@@ -53,7 +53,8 @@ def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[
 
 
 def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
-    """The names of models as a reader meets them: the first, then what its keys refer to, each once."""
+    """Return the names of models in reading order: the first, then those that its keys refer to, each
+    once."""
     met: dict[str, None] = {}
     waiting = [next(iter(parts))]
     while waiting:
@@ -65,7 +66,7 @@ def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _references(value: Any) -> Iterator[str]:
-    """The names of the models that a JSON Schema refers to."""
+    """Yield the names of the models that a JSON Schema refers to."""
     if isinstance(value, list):
         for item in value:
             yield from _references(item)
@@ -78,20 +79,20 @@ def _references(value: Any) -> Iterator[str]:
 
 
 class _Tables:
-    """Tables of the keys of models on `page`; `parts` are the models and enumerations by name."""
+    """Tables of the keys of models on `page`; `parts` holds models and enumerations by name."""
 
     def __init__(self, page: str, parts: dict[str, dict[str, Any]]) -> None:
         self._page = page
         self._parts = parts
 
     def keys(self, part: dict[str, Any]) -> Iterator[str]:
-        """The table of a model's keys."""
+        """Yield the table of a model's keys."""
         required = part.get("required", [])
         rows = [
             (
                 f"`{key}`",
                 self._type(value),
-                "needed" if key in required else _default(value),
+                "required" if key in required else _default(value),
                 value["description"],
             )
             for key, value in part["properties"].items()
@@ -100,10 +101,10 @@ class _Tables:
         yield ""
 
     def _type(self, value: dict[str, Any]) -> str:
-        """A JSON Schema type in words. What may be left out has null as its default; that is not told."""
+        """Return a JSON Schema type as text, without the null of optional keys."""
         if "anyOf" in value:
             types = [v.get("type") for v in value["anyOf"]]
-            # A whole number is a number.
+            # "number" includes whole numbers
             skipped = {"integer"} if "number" in types else set()
             if value.get("default", "") is None:
                 skipped.add("null")
