@@ -45,9 +45,9 @@ def cache(
 ) -> None:
     """List or delete what is cached on this machine.
 
-    The cache holds passed checks of campaigns, the target's frames and detections, which lines golden runs
-    execute, previews of image effects, and which finished runs were verified. It is in XDG_CACHE_HOME, or in
-    ~/.cache. Results never depend on it; without it, runs take longer.
+    The cache holds passed checks of campaigns, golden runs, the target's frames and detections, the lines
+    that golden runs execute, previews of image effects, and which finished runs were verified. It is in
+    XDG_CACHE_HOME or ~/.cache. Results never depend on it; without it, runs take longer.
     """
     if path + clear + (most is not None) > 1:
         raise MutatorError("--path, --max and --clear together", expected="one of them")
