@@ -78,7 +78,7 @@ def check_is_text(path: Path) -> None:
         str(path).encode()
     except UnicodeEncodeError:
         raise MutatorError(
-            f"the name {path.name!a} is no text in this environment",
+            f"the name {path.name!a} cannot be encoded in this environment",
             where=path,
             expected=f"UTF-8, and an environment that says so (it says {sys.getfilesystemencoding()})",
             remedy="set LC_ALL=C.UTF-8, or PYTHONUTF8=1; or rename it",
