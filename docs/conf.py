@@ -30,16 +30,19 @@ myst_heading_anchors = 6
 myst_enable_extensions = ["html_image"]
 nb_execution_mode = "off"
 
+highlight_language = "none"  # a block without a language is text
+
 html_theme = "furo"
+pygments_dark_style = "github-dark"
 html_title = project
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
-html_js_files = ["copy.js"]
+html_js_files = ["site.js"]
 html_copy_source = False
 html_additional_pages = {"index": "redirect.html"}
 templates_path = ["_templates"]
 
-LINK = re.compile(r"\]\(([^)#:\s]+\.(?:md|ipynb))\)")
+LINK = re.compile(r"\[([^]]+)\]\(([^)#:\s]+\.(?:md|ipynb))\)")
 RAW_IMAGE = re.compile(r'\b(?:src|srcset)="([^":]+)"')
 
 
@@ -47,7 +50,7 @@ def add_navigation(app: Sphinx, docname: str, source: list[str]) -> None:
     """Append to the front page a table of contents for each of its sections, out of the pages it links."""
     if docname == app.config.root_doc:
         for title, body in re.findall(r"^## (.+)\n((?:(?!## ).*\n?)*)", source[0], re.MULTILINE):
-            pages = "\n".join(dict.fromkeys(LINK.findall(body)))
+            pages = "\n".join(f"{text} <{page}>" for text, page in LINK.findall(body))
             source[0] += f"\n\n```{{toctree}}\n:hidden:\n:caption: {title}\n\n{pages}\n```\n"
 
 

@@ -39,7 +39,7 @@ _ARGUMENTS = (
     ),
     (
         "`workspace: WorkspaceLike`",
-        "a `Workspace`, or the folder of `fault_library/` and `templates/`; else found",
+        "a `Workspace`, or the folder that holds `fault_library/`; default: as on the command line",
     ),
     ("`target`", "the name or file of a target's manifest; default: the only one in the library"),
     (

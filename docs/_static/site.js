@@ -1,6 +1,10 @@
-// A button on each code block. Of a console block it copies the commands alone.
+// A copy button on each code block, and a search that works from a file, too.
 "use strict";
 
+// The excerpts below search results are fetched from the pages, which browsers refuse to do from a file.
+if (location.protocol === "file:") DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false;
+
+// What the button copies: of a console block the commands alone, without their prompts.
 function textOf(block) {
   const text = block.querySelector("pre").textContent;
   if (!block.closest(".highlight-console")) return text;
