@@ -1,4 +1,4 @@
-// A copy button on each code block, and a search that works from a file, too.
+// A copy button on each code block, cells that keep their width, and a search that works from a file, too.
 "use strict";
 
 // The excerpts below search results are fetched from the pages, which browsers refuse to do from a file.
@@ -29,6 +29,9 @@ async function copy(text) {
 }
 
 document.addEventListener("DOMContentLoaded", () => {
+  for (const cell of document.querySelectorAll("td")) {
+    cell.classList.toggle("long", cell.textContent.length > 60);
+  }
   for (const block of document.querySelectorAll("div.highlight")) {
     const button = block.appendChild(document.createElement("button"));
     button.type = "button";
