@@ -41,6 +41,7 @@ WORKED_THROUGH = [
     TUTORIAL,
     TUTORIAL.with_name("first-fault.md"),
     TUTORIAL.with_name("your-own-controller.md"),
+    TUTORIAL.with_name("tour-safety-engineer.md"),
     TUTORIAL.with_name("tour-controller-developer.md"),
     COMPARISON,
     *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # whose code test_studies runs
