@@ -19,6 +19,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from math import ceil, floor
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,10 @@ from playwright.sync_api import sync_playwright
 HERE = Path(__file__).parent
 WIDTHS = {"wide": {"width": 1280, "height": 800}, "narrow": {"width": 390, "height": 780}}
 SCHEMES = ("light", "dark")
+NOON = "2026-01-01T12:00"
 WORST = "[aria-labelledby=answer-dangerous] a[href^='#e=']"
 STEPS = 2  # of 1/20 s, from one frame of a film to the next
-FRAME_MS, LAST_MS, COLOURS = 100, 3000, 64
+FRAME_MS, LAST_MS, COLOURS, MARGIN = 100, 3000, 64, 4
 INSTRUMENTS = ("v_ego", "d_rel", "gas", "brake")  # below the road in a film
 SHOWN = ", ".join(f".gauge[aria-label='Plot of {name}']" for name in INSTRUMENTS)
 # A film has no buttons to press, and nothing covers it.
@@ -38,7 +40,7 @@ FILM_STYLE = f"""
 .replay-player .controls > :not(.legend), .gauge, .gauges .more {{ display: none !important }}
 {SHOWN} {{ display: grid !important }}
 .gauge {{ background: none !important; box-shadow: none !important }}
-.timebar:focus-visible {{ outline: none }}
+.replay-player :focus-visible {{ outline: none }}
 #experiment > header {{ position: static }}
 """
 
@@ -66,6 +68,7 @@ def main() -> None:
                     report(page, runs.run.resolve() / "report" / "index.html", name)
                     static(page, (pages / "review.html").as_uri(), "review" + name)
                     static(page, (pages / "comparison" / "index.html").as_uri(), "comparison" + name)
+                    page.clock.set_fixed_time(NOON)  # a form suggests a name with the time
                     static(page, address, "serve" + name)
                     page.close()
             browser.close()
@@ -101,6 +104,7 @@ def report(page: Any, path: Path, name: str) -> None:
     page.locator(WORST).first.click()
     page.wait_for_selector(".replay-player")
     page.locator(".jumps button").last.click()
+    page.mouse.move(0, 0)  # nothing is hovered over
     show(page, ".replay-player", below="#experiment > header")
     save(page.screenshot(), "experiment" + name)
     page.add_style_tag(content=FILM_STYLE)
@@ -121,7 +125,7 @@ def show(page: Any, what: str, *, below: str) -> None:
     page.evaluate(
         """([what, below]) => {
             const found = document.querySelector(what), head = document.querySelector(below);
-            found.style.scrollMarginTop = `${head.offsetHeight + 8}px`;
+            found.style.scrollMarginTop = `${head.offsetHeight}px`;
             found.scrollIntoView();
         }""",
         [what, below],
@@ -132,18 +136,19 @@ def film(page: Any, name: str) -> None:
     """Step the replay from one second before the activation to the last event; keep what is seen."""
     end = time(page)
     page.locator(".jumps button").first.click()
+    page.mouse.move(0, 0)
     page.locator(".timebar").focus()
     page.keyboard.press("Shift+ArrowLeft")
     show(page, ".stage", below=".jumps")
-    top, bottom = page.locator(".stage").bounding_box(), page.locator(".gauges").bounding_box()
-    clip = {**top, "height": bottom["y"] + bottom["height"] - top["y"]}
+    clip = around(page.locator(".stage").bounding_box(), page.locator(".gauges").bounding_box())
     frames = []
     while (now := time(page)) < end:
         frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
         for _ in range(STEPS):
             page.keyboard.press("ArrowRight")
         assert time(page) > now
-    page.locator(".jumps button").last.click()
+    page.locator(".jumps button").last.press("Enter")
+    time(page)
     frames.append(Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB"))
     column = Image.new("RGB", (frames[0].width, frames[0].height * len(frames)))
     for i, frame in enumerate(frames):
@@ -154,6 +159,17 @@ def film(page: Any, name: str) -> None:
     path = HERE / f"{name}.webp"
     few[0].save(path, save_all=True, append_images=few[1:], duration=times, loop=0, lossless=True, method=6)
     print(path, path.stat().st_size)
+
+
+def around(top: dict[str, float], bottom: dict[str, float]) -> dict[str, float]:
+    """Whole pixels around two boxes, one below the other."""
+    x, y = floor(top["x"]) - MARGIN, floor(top["y"]) - MARGIN
+    return {
+        "x": x,
+        "y": y,
+        "width": ceil(top["x"] + top["width"]) + MARGIN - x,
+        "height": ceil(bottom["y"] + bottom["height"]) + MARGIN - y,
+    }
 
 
 def time(page: Any) -> float:
