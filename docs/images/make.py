@@ -7,7 +7,8 @@
     python docs/images/make.py runs/quickstart runs/distant
 
 Each picture is made wide and narrow, light and dark, such as `report-wide-dark.png`. The film shows the worst
-experiment of the first run. The script needs the extra `test` and Chromium; it takes about a minute.
+experiment of the first run. The same runs give the same pictures, up to the shade of a few pixels.
+The script needs the extra `test` and Chromium; it takes about a minute.
 """
 
 import argparse
