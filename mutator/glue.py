@@ -1,25 +1,25 @@
-"""Glue between a controller and the harness: a run, step by step, and what it leaves behind.
+"""Glue between a controller and the harness: runs the loop step by step and writes the results.
 
-The entry module of a target is a class that builds the loop and drives one step of it, and two lines:
+A target's entry module is a class that builds the loop and simulates one step of it, and two lines:
 
-    from mutator.glue import Run
+from mutator.glue import Run
 
-    class Drive(Run):
-        def __init__(self, scenario, seed):
-            super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
-            self.cart, self.controller = Cart(scenario["speed_mps"]), Controller()
+class Drive(Run):
+    def __init__(self, scenario, seed):
+        super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
+        self.cart, self.controller = Cart(scenario["speed_mps"]), Controller()
 
-        def step(self):
-            distance = self.cart.distance()
-            force = self.controller.update(distance)
-            self.cart.advance(force)
-            self.record(distance=distance, force=force)
+    def step(self):
+        distance = self.cart.distance()
+        force = self.controller.update(distance)
+        self.cart.advance(force)
+        self.record(distance=distance, force=force)
 
-    if __name__ == "__main__":
-        Drive.main()
+if __name__ == "__main__":
+    Drive.main()
 
-and in the manifest `entry: {module: drive, stepwise: Drive.open}`. It runs in the target's process, so this
-module needs the standard library and numpy alone, and nothing else of mutator.
+The manifest says `entry: {module: drive, stepwise: Drive.open}`. This module runs in the target's process, so
+it imports only the standard library and numpy.
 """
 
 import json
@@ -35,16 +35,16 @@ import numpy as np
 
 TRACE = "trace.npz"
 RECORD = "record.json"
-TIME = "t"  # the channel that every trace has, in s
+TIME = "t"  # every trace has this channel, in s
 _OPTIONS = ("scenario", "seed", "out")
 
 
 class GlueError(Exception):
-    """A mistake in how a run is started or written, in words for who wrote it."""
+    """A mistake in how a run is started or written, described for its author."""
 
 
 class Scenario(dict[str, Any]):
-    """What a scenario file says, by key. GlueError, with the keys that there are, for one that is missing."""
+    """The values of a scenario file by key. A missing key is a GlueError that lists the known ones."""
 
     def __init__(self, values: dict[str, Any], path: Path) -> None:
         super().__init__(values)
@@ -55,51 +55,53 @@ class Scenario(dict[str, Any]):
 
 
 class Run:
-    """One run of a closed loop. A subclass has `__init__(self, scenario, seed)`, which builds the loop, and
-    `step(self)`, which drives it on by `step_s` and ends with `self.record(...)`.
+    """One run of a closed loop.
 
-    `scenario` is a `Scenario`, `seed` an int. Nothing global is seeded; see `seed_globals`. A subclass may
-    use any name but `step_s`, `t`, `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open`
-    and `main`.
+    A subclass defines `__init__(self, scenario, seed)`, which builds the loop, and `step(self)`, which
+    advances it by `step_s` and ends with `self.record(...)`. `scenario` is a `Scenario`, `seed` an int.
+    Global generators are not seeded; see `seed_globals`. A subclass may use any name except `step_s`, `t`,
+    `done`, `end`, `record`, `recorded`, `hazard`, `alert`, `write`, `open` and `main`.
     """
 
-    # all else that it holds has two underscores: such names are this class's own
+    # two underscores keep this class's attributes apart from a subclass's
     def __init__(self, *, step_s: float, duration_s: float) -> None:
-        """A run of `duration_s`, to the nearest step, which ends sooner where `end` is called."""
+        """A run of `duration_s`, rounded to whole steps; `end` ends it earlier."""
         self.__channels: tuple[str, ...] = ()
         self.__rows: list[tuple[float, ...]] = []
         self.__duration_s = _length("duration_s", duration_s)
-        self.__since, self.__passed = 0.0, 0  # time and steps when the length of a step was last set
+        self.__since, self.__passed = 0.0, 0  # time and steps when the step length last changed
         self.__step_s = 0.0
         self.step_s = step_s
         if self.__steps < 1:
-            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected one step at least")
+            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected at least one step")
         self.__ended = False
         self.__hazards: dict[str, float | None] = {}
         self.__alerts: list[dict[str, Any]] = []
         self.__alerting: set[str] = set()
 
     def step(self) -> None:
-        """Drive the loop on by one step, and record it: written in the subclass."""
+        """Advance the loop by one step and record it. The subclass defines it."""
         raise NotImplementedError(f"{type(self).__name__} has no step()")
 
     @property
     def step_s(self) -> float:
-        """Length of a step in s. Where steps differ, set it in each before `record`: it holds for the step
-        that is being driven, and for those after it until it is set again."""
+        """Length of a step in s. If steps differ, set it in each step before `record`.
+
+        It holds for the current step and those after it, until it is set again.
+        """
         return self.__step_s
 
     @step_s.setter
     def step_s(self, step_s: float) -> None:
         step_s = _length("step_s", step_s)
-        if self.__rows and step_s != self.__step_s:  # times of equal steps are no sums
+        if self.__rows and step_s != self.__step_s:  # times of equal steps are products, not sums
             self.__since, self.__passed = self.t, len(self.__rows)
         self.__step_s = step_s
         self.__steps = self.__passed + round((self.__duration_s - self.__since) / step_s)
 
     @property
     def t(self) -> float:
-        """Time in s since the start: of the step that is being driven, until it is recorded."""
+        """Time in s since the start: that of the current step until `record` is called."""
         return self.__since + (len(self.__rows) - self.__passed) * self.__step_s
 
     @property
@@ -108,13 +110,13 @@ class Run:
         return self.__ended or len(self.__rows) >= self.__steps
 
     def end(self) -> None:
-        """Make this step the last: the pole lies, the cars have met, nothing more can be learnt."""
+        """Make this step the last, e.g. after the pole has fallen or the cars have met."""
         self.__ended = True
 
     def record(self, **channels: float) -> None:
-        """Record the step that is ending: a number for each channel, the same channels in each step.
+        """Record the current step: a number for each channel, with the same channels in each step.
 
-        It comes once in each step, and last: from then on `t` is the time of the next.
+        Call it once, at the end of each step. From then on `t` is the time of the next step.
         """
         if not self.__rows:
             self.__channels = tuple(channels)
@@ -127,18 +129,23 @@ class Run:
         self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
 
     def recorded(self) -> dict[str, float]:
-        """The channels of the step that was recorded last, and its time."""
+        """The channels of the last recorded step, and its time."""
         return dict(zip((TIME, *self.__channels), self.__rows[-1], strict=True))
 
     def hazard(self, name: str, now: bool) -> None:
-        """Judge a hazard of which the manifest only has the name: to be called in each step, before `record`.
-        The time of the first step in which it is there counts."""
+        """Report whether a hazard that the manifest only names is present. Call it in each step, before
+        `record`.
+
+        The time of the first step with the hazard counts.
+        """
         if self.__hazards.setdefault(name, None) is None and now:
             self.__hazards[name] = self.t
 
     def alert(self, name: str, now: bool) -> None:
-        """Say whether the controller alerts its driver: to be called in each step, before `record`. Each time
-        that an alert begins counts."""
+        """Report whether the controller alerts its driver. Call it in each step, before `record`.
+
+        Each start of an alert counts.
+        """
         if not now:
             self.__alerting.discard(name)
         elif name not in self.__alerting:
@@ -146,23 +153,24 @@ class Run:
             self.__alerts.append({"name": name, "t": self.t})
 
     def write(self, out: Path) -> None:
-        """Write the trace, then the record, into the folder `out`: of equal runs, equal bytes."""
+        """Write the trace, then the record, into the folder `out`; equal runs write equal bytes."""
         if not self.__rows:
-            raise GlueError("nothing is recorded; expected one step at least: `end` is for a step to call")
+            raise GlueError("nothing is recorded; expected at least one step: call `end` within a step")
         out.mkdir(parents=True, exist_ok=True)
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
-        unfinished = out / f".{RECORD}"  # a run that is killed has no record
+        unfinished = out / f".{RECORD}"  # a killed run has no record
         said = {"hazards": self.__hazards, "alerts": self.__alerts}
         unfinished.write_text(json.dumps(said) + "\n", encoding="utf-8")
         unfinished.replace(out / RECORD)
 
     @classmethod
     def open(cls, arguments: Sequence[str]) -> Self:
-        """The run of `--scenario FILE --seed N --out DIR`, before its first step: `stepwise` in the manifest.
+        """The run of `--scenario FILE --seed N --out DIR` before its first step: `stepwise` in the
+        manifest.
 
-        Any other `--key value` stands in place of what the scenario has under that key, and `--key` alone for
-        true: so a change of the manifest needs no code.
+        Any other `--key value` replaces the scenario's value of that key, and `--key` alone means true. So a
+        change of the manifest needs no code.
         """
         given = _options(arguments)
         subclass: Any = cls
@@ -173,7 +181,7 @@ class Run:
 
     @classmethod
     def main(cls, arguments: Sequence[str] | None = None) -> None:
-        """Drive a run from its first step to its last and write it, as the arguments of the process say."""
+        """Run from the first step to the last and write the results, as the process's arguments say."""
         arguments = sys.argv[1:] if arguments is None else arguments
         run = cls.open(arguments)
         while not run.done:
@@ -187,17 +195,16 @@ class Run:
 
 
 def seed_globals(seed: int) -> None:
-    """Seed the generators that a process has one of, `random` and `numpy.random`: for code that draws from
-    them rather than from a generator of its own."""
+    """Seed the global generators `random` and `numpy.random`, for code that draws from them."""
     random.seed(seed)
     np.random.seed(seed)
 
 
 def read_scenario(path: Path) -> Scenario:
-    """A scenario file: `key: value` in each line, `#` before a comment.
+    """Read a scenario file: `key: value` in each line, `#` before a comment.
 
-    Such a file is YAML, but not all YAML is such a file. A value is written as in JSON (a number, true,
-    false, null, [1, 2], {"a": 1}); anything else is text. GlueError for another kind of line.
+    This is a subset of YAML. A value is written as in JSON (a number, true, false, null, [1, 2], {"a": 1});
+    anything else is text. Raise GlueError for any other line.
     """
     found: dict[str, Any] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -235,7 +242,7 @@ def _value(text: str) -> Any:
 
 
 def _options(arguments: Sequence[str]) -> dict[str, str | None]:
-    """`--key value`, `--key=value` and `--key` (None) by key, with _ for any further -."""
+    """Return `--key value`, `--key=value` and `--key` (None) by key, with _ for any further -."""
     found: dict[str, str | None] = {}
     waiting = ""
     for argument in arguments:
@@ -265,11 +272,11 @@ def _seed(given: dict[str, str | None]) -> int:
 
 
 def _scenario(given: dict[str, str | None]) -> Scenario:
-    """The scenario of the arguments, with what stands in its keys' places."""
+    """The arguments' scenario with the replaced values."""
     scenario = read_scenario(Path(_needed(given, "scenario")))
     for key, value in given.items():
         if key in _OPTIONS:
             continue
-        scenario[key]  # a key that the scenario does not have is a mistake
+        scenario[key]  # an unknown key is a mistake: KeyError
         scenario[key] = True if value is None else _value(value)
     return scenario

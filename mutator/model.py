@@ -1,6 +1,6 @@
-"""The records that pass from spec to verdict: frozen, comparable, identified by their content.
+"""Records that pass from spec to verdict: frozen, comparable, identified by their content.
 
-A field that joins one of them later is declared with `hashing.added`, so that it changes no id.
+Declare a field that joins one later with `hashing.added`, so that no id changes.
 """
 
 from dataclasses import dataclass
@@ -12,11 +12,11 @@ from mutator._common.hashing import added, added_values, content_id, plain
 
 Value = int | float | str | bool | None
 
-OPERATORS = "operators"  # the module of faults that mutation operators make, without a spec
+OPERATORS = "operators"  # the module of faults made by mutation operators
 
 
 class AnchorKind(StrEnum):
-    """Where, relative to a statement of the target, a snippet goes; of VALUE_ANCHORS, whose value changes."""
+    """Where a snippet goes relative to a target statement, or, in VALUE_ANCHORS, which value changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"
@@ -48,11 +48,11 @@ FIXED_ANCHORS = frozenset((AnchorKind.CONSTANT, AnchorKind.DEFAULT))  # values t
 
 
 class Hold(StrEnum):
-    """How long a fault stays active once its trigger fired."""
+    """How long a fault stays active once its trigger fires."""
 
-    WHILE = "while"  # as long as the condition holds, again whenever it holds again
-    FOR = "for"  # for a fixed time after the condition first held
-    TO_END = "to_end"  # from the moment the condition first held to the end of the run
+    WHILE = "while"  # as long as the condition holds, each time it holds
+    FOR = "for"  # for a fixed time after the condition first holds
+    TO_END = "to_end"  # from when the condition first holds to the end of the run
 
 
 class Method(StrEnum):
@@ -63,14 +63,14 @@ class Method(StrEnum):
 
 
 class AfterHazard(StrEnum):
-    """What becomes of a run whose drive a terminal hazard has ended."""
+    """What happens to a run after a terminal hazard has ended its drive."""
 
     GO_ON = "go_on"
     STOP = "stop"
 
 
 class Status(StrEnum):
-    """Whether the experiment itself worked; never mixed with its outcome."""
+    """Whether the experiment itself worked; independent of its outcome."""
 
     OK = "ok"  #: the run ended as it should
     CRASHED = "crashed"  #: the controller raised an error or died
@@ -90,14 +90,15 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Anchor:
-    """A statement of a function or an expression in it, or a value that is fixed when its module is loaded:
-    the `nth` (from 1) that fits `kind` and `name`.
+    """A statement of a function, an expression in it, or a value fixed when its module loads.
 
-    `name` is what is assigned to, called or returned, as in the source (`gap`, `self.angle`, `pose['x']`);
-    of a `value`, `condition` or `return_value` it is the expression. It is empty for `entry`, and where any
-    return or condition will do. Of a `constant` it is `LIMIT` or `Class.LIMIT`, of a `default` the parameter;
-    these have no `nth`. `which` chooses an argument of a call, by its place (from 1) or keyword.
-    Without `nth` there must be exactly one hit.
+    It is the `nth` match (from 1) of `kind` and `name`; without `nth` there must be exactly one match.
+    `which` selects an argument of a call by position (from 1) or keyword. `name` depends on the kind:
+
+    * what is assigned to, called or returned, as in the source: `gap`, `self.angle`, `pose['x']`
+    * `value`, `condition`, `return_value`: the expression
+    * `constant`: `LIMIT` or `Class.LIMIT`; `default`: the parameter; neither has an `nth`
+    * empty for `entry`, and where any return or condition will do
     """
 
     kind: AnchorKind
@@ -108,8 +109,10 @@ class Anchor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultLocation:
-    """A place in the target: a file relative to its root, a qualified function name, an anchor. The function
-    is empty for a constant of a module or class."""
+    """A place in the target: a file relative to its root, a qualified function name, an anchor.
+
+    The function is empty for a constant of a module or class.
+    """
 
     path: str
     function: str
@@ -120,8 +123,8 @@ class FaultLocation:
 class Injection:
     """One fault model applied at one location. `params` are sorted (name, value) pairs.
 
-    It acts only `where` a condition over names known there holds; and then only in execution number `call`,
-    or in every one whose number `every` divides, counted from when the fault became active.
+    It acts only while the condition `where`, over names known there, holds. Of those executions, counted from
+    the fault's activation, it acts in number `call` only, or in every one divisible by `every`.
     """
 
     location: FaultLocation
@@ -136,8 +139,8 @@ class Injection:
 class Trigger:
     """When a fault is active.
 
-    `condition` is a validated expression over time `t` and what the target observes;
-    it can fire from `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
+    `condition` is a validated expression over time `t` and the observed values. It can fire from
+    `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
     """
 
     name: str  #: name of the trigger: a context, `always`, a time
@@ -148,10 +151,9 @@ class Trigger:
 
 
 def fault_label(spec: str, value: Value, unit: str) -> str:
-    """What tables and messages call a fault: `sensor/bias/distance 35 m`.
+    """A fault's label for tables and messages: `sensor/bias/distance 35 m`.
 
-    `value` and `unit` are as the spec states them, or as they stand in a table: None or '' for no value, `-`
-    or '' for no unit.
+    `value` and `unit` are as in the spec or a table: None or '' for no value, `-` or '' for no unit.
     """
     if value is None or value == "":
         return spec
@@ -162,10 +164,9 @@ def fault_label(spec: str, value: Value, unit: str) -> str:
 class Fault:
     """One fault with its value drawn: what is injected, where, and what it aims at.
 
-    `value` and `unit` are as the spec states them (for tables); `injections` carry numbers in the unit of
-    the variable they change.
-    `hold` overrides the trigger's when the fault by its nature latches. `changes` are the changes
-    of the scenario that belong to the fault (`alone`).
+    `value` and `unit` are as in the spec, for tables. `injections` have numbers in the unit of the variable
+    they change. `hold` overrides the trigger's if the fault latches by nature. `changes` are the changes of
+    the scenario that belong to the fault (`alone`).
     """
 
     spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
@@ -187,12 +188,12 @@ class Fault:
 
     @property
     def label(self) -> str:
-        """What tables and messages call it."""
+        """The label in tables and messages."""
         return fault_label(self.spec, self.value, self.unit)
 
     @property
     def size(self) -> float:
-        """How large its value is, whatever the sign; 0 for one that is no number."""
+        """The absolute value, or 0 if it is not a number."""
         return float(abs(self.value)) if isinstance(self.value, int | float) else 0.0
 
 
@@ -200,7 +201,7 @@ class Fault:
 class Experiment:
     """One run: a fault, in a scenario, under a trigger, with a seed.
 
-    `setting` names the changes of the scenario that a campaign makes for all its experiments.
+    `setting` names scenario changes that a campaign makes for all its experiments.
     """
 
     fault: Fault  #: what is injected
@@ -216,7 +217,7 @@ class Experiment:
     @cached_property
     def id(self) -> str:
         """Digest of its content."""
-        # through the fault's id, not its whole content: a plan hashes each fault once, not once a run
+        # the fault's id, not its content: a plan then hashes each fault once instead of once per run
         trigger = self.plain_trigger
         parts = (self.scenario, self.scenario_digest, self.method, trigger, self.seed, self.setting)
         later = added_values(self)
@@ -224,23 +225,23 @@ class Experiment:
 
     @cached_property
     def plain_trigger(self) -> dict[str, Any]:
-        """The trigger as JSON knows it: in its id, and in its line of the plan."""
+        """The trigger as JSON types, for the id and the plan file."""
         return dict(plain(self.trigger))
 
     @property
     def label(self) -> str:
-        """What reports call it: `sensor/bias/distance 35 m, S1, guided C1`."""
+        """The label in reports: `sensor/bias/distance 35 m, S1, guided C1`."""
         return f"{self.fault.label}, {self.drive_label}"
 
     @property
     def drive_label(self) -> str:
-        """What reports call the drive that its fault is put to: `S1, guided C1`."""
+        """The label of the drive without its fault: `S1, guided C1`."""
         method = self.method.value
         return f"{self.scenario}, {method} {self.trigger.name.removeprefix(f'{method}/')}"
 
     @cached_property
     def changes(self) -> tuple[str, ...]:
-        """All changes of the scenario, each once: the fault's own, then those of the setting."""
+        """All changes of the scenario without duplicates: the fault's, then the setting's."""
         return tuple(dict.fromkeys((*self.fault.changes, *self.setting)))
 
 
@@ -248,7 +249,7 @@ class Experiment:
 class Limits:
     """What one run may use before it is stopped.
 
-    Seconds of CPU and of wall time, MiB of address space, observed simulation steps, MiB that it writes.
+    Seconds of CPU and wall time, MiB of address space, observed simulation steps, MiB written.
     """
 
     cpu_s: int = 60
@@ -260,7 +261,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Activation:
-    """How often an injected statement ran while triggered: simulation times in s, and a count."""
+    """When and how often an injected statement ran while triggered: simulation times in s, and a count."""
 
     first: float
     last: float
@@ -269,8 +270,11 @@ class Activation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunError:
-    """An exception that ended a run: its type, its text, and the innermost line of the target, `file:line` in
-    the tree that ran (empty if it passed none)."""
+    """An exception that ended a run: type, text, and innermost target line as `file:line` in the tree that
+    ran.
+
+    The line is empty if the exception passed none.
+    """
 
     kind: str
     message: str
@@ -279,15 +283,14 @@ class RunError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """All that is kept of one experiment. Times are seconds of simulation; None: did not happen.
+    """Everything that is stored for one experiment. Times are seconds of simulation; None: did not happen.
 
-    `error` is the exception that ended the run, if one did, whoever is to blame. `hazards` and `alerts` are
-    (name, first time) pairs sorted by time; only what came at or after the activation is kept. `max_dev` and
-    `t_manifest` refer to the manifest's compared channels. `t_end` is when a terminal hazard ended the drive,
-    and `dev` what `max_dev` is up to there (empty without such an end: the same). `metrics` has the metrics
-    of the manifest and the margins of its hazards, those that have a value. `left` has each channel that left
-    golden beyond its tolerance before the end of the drive: its name, when first, and its largest deviation
-    up to that end.
+    * `error`: the exception that ended the run, whatever its cause
+    * `hazards`, `alerts`: (name, first time) pairs sorted by time, from the activation on
+    * `max_dev`, `t_manifest`: refer to the manifest's compared channels
+    * `t_end`: when a terminal hazard ended the drive; `dev`: `max_dev` up to then (empty if nothing ended it)
+    * `metrics`: the manifest's metrics and the margins of its hazards that have a value
+    * `left`: name, first time and largest deviation of each channel that left golden's tolerance in the drive
     """
 
     experiment_id: str  #: id of the experiment

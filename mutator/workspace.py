@@ -1,4 +1,4 @@
-"""Where library, templates and targets are found."""
+"""Find the fault library, the templates and the targets."""
 
 import os
 from collections.abc import Collection, Mapping
@@ -63,19 +63,20 @@ class Workspace:
         templates: str | Path | None = None,
         target: str | Path | None = None,
     ) -> "Workspace":
-        """Each of them from the first place that names or holds it.
+        """Find each of them in the first place that names or holds it:
 
-        1. the argument, or `root`, which holds both library and templates; 2. MUTATOR_LIBRARY,
-        MUTATOR_TEMPLATES and MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder from the current one
-        upward that holds fault_library/; 4. what ships with the harness. MutatorError for a named folder that
-        is missing.
+        1. the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES
+        and MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder upward that holds fault_library/; 4. what
+        ships with the harness.
+
+        MutatorError if a named folder is missing.
         """
         its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
             raise MutatorError(
                 f"no folder {its_target}",
                 expected="the target folder",
-                remedy="correct MUTATOR_TARGET, or name another folder of the controller's source",
+                remedy="correct MUTATOR_TARGET, or name another folder with the controller's source",
             )
         return cls(
             library=_folder(library_folder(root, library), "fault_library", "library"),
@@ -84,14 +85,17 @@ class Workspace:
         )
 
     def manifest(self, name: str) -> TargetManifest:
-        """The target `name`, or the manifest file of that path."""
+        """The target `name`, or the manifest at that path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         check_names(manifest)
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:
-        """What makes classes of severity of the target's contacts: the library's, or one that ships with the
-        harness; None where it tells of none. MutatorError at the manifest for an unknown one."""
+        """The severity scale for a target's contacts, from the library or the harness; None without
+        one.
+
+        MutatorError at the manifest for an unknown scale.
+        """
         if manifest.contact is None:
             return None
         shipped = (shipped_folder() / "fault_library" / "severity").glob("*.yaml")
@@ -123,11 +127,11 @@ class Workspace:
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
-        """The spec `<module>/<fault_type>`, or the spec file of that path."""
+        """The spec `<module>/<fault_type>`, or the spec at that path."""
         return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
-        """All specs of the library, in the order of `spec_files`; each is at `<module>/<fault_type>.yaml`."""
+        """All specs in the order of `spec_files`, each checked to be at `<module>/<fault_type>.yaml`."""
         readings = self.readings()
         specs = tuple(load_spec(path, readings) for path in self.spec_files())
         for spec in specs:
@@ -149,11 +153,12 @@ class Workspace:
         seed: int = 0,
         target: str | None = None,
     ) -> tuple[Fault, ...]:
-        """The faults whose spec fits `pattern`, values drawn from `seed`, in the order of the library.
+        """The faults whose spec matches `pattern`, in the library's order, with values drawn from
+        `seed`.
 
         `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or the
-        path of a spec file. `target` names a manifest; default: the library's only one. MutatorError when
-        nothing fits, and for a mistake in a spec.
+        path of a spec file. `target` names a manifest; default: the library's only one. MutatorError if
+        nothing matches, and for a mistake in a spec.
         """
         check_whole("seed", seed)
         if str(pattern).endswith((".yaml", ".yml")):
@@ -172,7 +177,7 @@ class Workspace:
         if not faults:
             known = [name for spec in specs for name in (spec.name, *_variants(spec))]
             raise MutatorError(
-                f"no fault is named like '{glob}'",
+                f"no fault matches '{glob}'",
                 where=self.library / "faults",
                 expected="<module>/<fault_type>, with or without /<variant>, with * for any text",
                 remedy="see `mutator list specs`" + suggestion(glob, known),
@@ -180,13 +185,13 @@ class Workspace:
         return faults
 
     def target_name(self, given: str | None = None) -> str:
-        """The target that was named, or the library's only one; MutatorError if it has none or several."""
+        """The given target, or the library's only one; MutatorError if it has none or several."""
         names = tuple(self.targets)
         if given is None and not names:
             raise MutatorError(
-                "no manifest of a target",
+                "no target manifest",
                 where=self.library / "targets",
-                remedy="write one, as docs/how-to/add-a-target.md says",
+                remedy="write one (see docs/how-to/add-a-target.md)",
             )
         if given is None and len(names) > 1:
             known = f"{len(names)} targets in the library ({', '.join(names)})"
@@ -199,7 +204,7 @@ class Workspace:
         return self._files("scenarios")
 
     def scenario(self, name: str | Path) -> Path:
-        """File of the scenario `name`, or the scenario file of that path."""
+        """The file of the scenario `name`, or the scenario file at that path."""
         return self._file("scenarios", name, "scenario")
 
     @property
@@ -208,7 +213,7 @@ class Workspace:
         return self._files("campaigns")
 
     def campaign(self, name: str | Path) -> Path:
-        """File of the campaign `name`, or the campaign file of that path."""
+        """The file of the campaign `name`, or the campaign file at that path."""
         return self._file("campaigns", name, "campaign")
 
     @property
@@ -217,22 +222,23 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table `name`, or the table of that path; `variables` are what a target observes."""
+        """The context table `name`, or the table at that path; `variables` are what a target observes."""
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
-        """Accidents and hazards of fault_library/stpa/hazards.yaml; None where there is no such file."""
+        """Accidents and hazards of fault_library/stpa/hazards.yaml; None without that file."""
         path = self.library / "stpa" / "hazards.yaml"
         return load_hazards(path) if os.path.lexists(path) else None
 
     def analysis(self) -> Analysis | None:
-        """The hazard analysis of fault_library/stpa/; None where there is no control structure in it."""
+        """The hazard analysis in fault_library/stpa/; None without a control structure."""
         folder = self.library / "stpa"
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def structure(self, manifest: TargetManifest) -> StructureModel | None:
-        """The control structure of a target; None where the library has none, or one that no channel of the
-        target's names a component of."""
+        """A target's control structure; None if the library has none or no channel names a component
+        of it.
+        """
         path = self.library / "stpa" / "control_structure.yaml"
         structure = load_structure(path) if path.exists() else None
         known = structure.components if structure else {}

@@ -1,4 +1,4 @@
-"""What every part needs and no part owns: files, hashing, random streams, locks, interrupts, text, tables.
+"""Shared helpers: files, hashing, random streams, locks, interrupts, text, tables.
 
-Nothing here knows a fault, a target or a campaign.
+They know no fault, target or campaign.
 """

@@ -1,4 +1,4 @@
-"""Arguments of the Python API checked where they come in; the error names the argument."""
+"""Check arguments of the Python API; errors name the argument."""
 
 import math
 
@@ -6,21 +6,21 @@ from mutator.errors import MutatorError
 
 
 def check_whole(argument: str, value: object, *, least: int = 0) -> None:
-    """MutatorError unless `value` is an integer of at least `least`."""
+    """Raise MutatorError unless `value` is an integer of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         expected = "a positive number" if least == 1 else f"a whole number, at least {least}"
         raise MutatorError(repr(value), argument=argument, expected=expected)
 
 
 def check_number(argument: str, value: object, *, least: float = -math.inf) -> None:
-    """MutatorError unless `value` is a finite number of at least `least`."""
+    """Raise MutatorError unless `value` is a finite number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not _fits(value, least):
         expected = "a number" if least == -math.inf else f"a number, at least {least:g}"
         raise MutatorError(repr(value), argument=argument, expected=expected)
 
 
 def check_type(argument: str, value: object, kind: type, what: str) -> None:
-    """MutatorError unless `value` is of that type; `what` says in words what is expected."""
+    """Raise MutatorError unless `value` has the type `kind`; `what` describes what is expected."""
     if not isinstance(value, kind):
         raise MutatorError(repr(value), argument=argument, expected=what)
 

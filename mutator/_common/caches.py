@@ -1,15 +1,15 @@
-"""What is kept from one command to the next: where it lies, how much it is, and how it is kept small.
+"""The cache that commands share: layout, size, pruning.
 
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
-      goldens/<digest>/    golden runs that a worker of a cluster drove
-      runs/<digest>.json   finished runs that were verified: what was found
-      lines/<digest>.json  the lines that a golden run executes
-      pictures/<digest>.json  what image effects do to a picture, for their review
-      targets/<name>/      what a target keeps for its own runs: the place `{cache}` of its manifest
+      goldens/<digest>/    golden runs that a cluster worker ran
+      runs/<digest>.json   verified run folders
+      lines/<digest>.json  lines that a golden run executes
+      pictures/<digest>.json  effects of image faults, for review
+      targets/<name>/      files that a target keeps for its runs: `{cache}` in its manifest
 
-Results never depend on it: an entry is found by a digest of all it follows from, and is checked before it is
-used. An unwritable or damaged cache is ignored, and any entry may be deleted at any time.
+Results never depend on the cache. Each entry is found by a digest of its inputs and checked before use. An
+unwritable or damaged cache is ignored, and you can delete any entry at any time.
 """
 
 import os
@@ -21,15 +21,15 @@ from urllib.parse import quote
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, TARGETS = "lines", "pictures", "targets"
-TARGET_BYTES = 4_000_000_000  # that a target may keep while it is driven with many seeds
+TARGET_BYTES = 4_000_000_000  # limit for one target, enforced between seeds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """Something in the cache that is kept or deleted as a whole.
+    """A cached item that is kept or deleted as a whole.
 
-    `what` says whose it is: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is
-    its size on the disk in bytes, `used` when it was last read or written, in seconds since the epoch.
+    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is its
+    size on disk in bytes, `used` its last use in seconds since the epoch.
     """
 
     what: str
@@ -46,7 +46,7 @@ class Entry:
 
 
 def folder() -> Path:
-    """The folder of all caches, which need not exist. Where no home is known it is one that cannot."""
+    """The folder of all caches, which may not exist; without a home directory, an impossible path."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named / "mutator"
@@ -57,7 +57,7 @@ def folder() -> Path:
 
 
 def of_checks() -> Path:
-    """Where passed checks are kept."""
+    """The folder of passed checks."""
     return folder() / CHECKS
 
 
@@ -67,27 +67,27 @@ def of_goldens() -> Path:
 
 
 def of_runs() -> Path:
-    """Where it is kept which runs were verified."""
+    """The folder of verified runs."""
     return folder() / RUNS
 
 
 def of_lines() -> Path:
-    """Where it is kept which lines golden runs execute."""
+    """The folder of lines that golden runs execute."""
     return folder() / LINES
 
 
 def of_pictures() -> Path:
-    """Where it is kept what image effects do to a picture."""
+    """The folder of image effects."""
     return folder() / PICTURES
 
 
 def of_target(name: str) -> Path:
-    """Where the target of that name keeps what its runs share; any name is one folder there."""
+    """The folder that the runs of a target share; any name maps to one folder."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
 def entries() -> list[Entry]:
-    """All that is cached: each campaign's checks, each verified run, and each file that a target keeps."""
+    """List everything cached: each campaign's checks, each verified run, each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
     found += [_entry(GOLDENS, path) for path in _children(of_goldens())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
@@ -99,13 +99,16 @@ def entries() -> list[Entry]:
 
 
 def prune(most: int) -> list[Entry]:
-    """Delete the least recently used entries until at most `most` bytes are left; what was deleted."""
+    """Delete the least recently used entries until at most `most` bytes remain; returns the deleted ones."""
     return _pruned(entries(), most)
 
 
 def make_room(target: str) -> list[Entry]:
-    """Delete what the target of that name has not used for longest, until it keeps at most TARGET_BYTES; what
-    was deleted. A run of many seeds does so before each next one, which has pictures of its own."""
+    """Delete the least recently used files of a target until at most TARGET_BYTES remain; returns the deleted
+    ones.
+
+    A run of many seeds calls this before each seed, as each seed has its own images.
+    """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
 
 
@@ -122,7 +125,7 @@ def _pruned(kept: list[Entry], most: int) -> list[Entry]:
 
 
 def clear() -> list[Entry]:
-    """Delete all of it; what was deleted."""
+    """Delete the whole cache; returns the deleted entries."""
     deleted = entries()
     for entry in deleted:
         entry.delete()
@@ -134,13 +137,12 @@ def _entry(what: str, path: Path) -> Entry:
     return Entry(
         what=what,
         path=path,
-        size=sum(state.st_blocks * 512 for state in states),  # a table with holes is smaller than it says
+        size=sum(state.st_blocks * 512 for state in states),  # a sparse table takes less than its size
         used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
     )
 
 
 def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
-    """The state of each that is still there."""
     for path in paths:
         try:
             yield path.lstat()
@@ -151,7 +153,7 @@ def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
 def _children(place: Path) -> list[Path]:
     try:
         return sorted(place.iterdir())
-    except OSError:  # not there, or not ours
+    except OSError:  # missing, or not ours
         return []
 
 

@@ -1,4 +1,4 @@
-"""The harness's own files: schemas are checked on reading, and files are written whole or not at all."""
+"""The harness's own files: schemas are checked on reading, and writes are atomic."""
 
 import errno
 import json
@@ -22,14 +22,14 @@ _NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
 class DiskFull(MutatorError):
-    """No space left. What finished is kept, and the same command goes on once there is room."""
+    """No space left. Finished work is kept; rerun the command once there is room."""
 
     exit_code = EXIT_HARNESS_ERRORS
 
 
 def is_disk_full(err: BaseException | None) -> bool:
-    """Whether an error came of a full disk or quota, be it in the words of another library."""
-    seen: list[BaseException] = []  # a chain of causes may be a circle
+    """Whether a full disk or quota caused an error, including errors of other libraries."""
+    seen: list[BaseException] = []  # a chain of causes can be circular
     while err is not None and not any(err is one for one in seen):
         if getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in str(err) for n in _NO_SPACE):
             return True
@@ -39,13 +39,12 @@ def is_disk_full(err: BaseException | None) -> bool:
 
 
 def is_no_file(err: OSError) -> bool:
-    """Whether there is no file in a place, but nothing, a folder, a dangling link, a pipe or a socket."""
+    """Whether an error means that a path holds no regular file."""
     return err.errno in _NO_FILE
 
 
 def no_pipe(path: Path) -> Path:
-    """The path; OSError (`is_no_file`) where there is a pipe, a socket or a device: who reads one may wait
-    for ever, or get no end of it."""
+    """The path; raise OSError (`is_no_file`) for a pipe, socket or device, which could block a reader."""
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
     return path
@@ -55,13 +54,13 @@ def disk_full(where: str | Path | None) -> DiskFull:
     return DiskFull(
         "no space left on this disk",
         where=where,
-        remedy="make room and give the same command again; finished experiments are kept and not repeated",
+        remedy="make room and run the same command again; finished experiments are kept and not repeated",
     )
 
 
 @contextmanager
 def raising_disk_full(where: Path) -> Iterator[None]:
-    """Turn what a full disk makes of other code into DiskFull."""
+    """Turn the errors that a full disk causes into DiskFull."""
     try:
         yield
     except MutatorError:
@@ -73,20 +72,20 @@ def raising_disk_full(where: Path) -> Iterator[None]:
 
 
 def check_is_text(path: Path) -> None:
-    """MutatorError for a path with bytes that are no text here: neither digests nor tables could hold it."""
+    """Raise MutatorError for a path that is not text here: neither digests nor tables could hold it."""
     try:
         str(path).encode()
     except UnicodeEncodeError:
         raise MutatorError(
             f"the name {path.name!a} cannot be encoded in this environment",
             where=path,
-            expected=f"UTF-8, and an environment that says so (it says {sys.getfilesystemencoding()})",
-            remedy="set LC_ALL=C.UTF-8, or PYTHONUTF8=1; or rename it",
+            expected=f"UTF-8 names and a UTF-8 environment (this one uses {sys.getfilesystemencoding()})",
+            remedy="set LC_ALL=C.UTF-8 or PYTHONUTF8=1, or rename the file",
         ) from None
 
 
 def make_folder(path: Path) -> None:
-    """Make a folder to write into, and its parents; MutatorError when that fails."""
+    """Make a writable folder and its parents; MutatorError if that fails."""
     check_is_text(path.absolute())
     try:
         with raising_disk_full(path):
@@ -98,21 +97,21 @@ def make_folder(path: Path) -> None:
             f"cannot be written ({err.strerror})",
             where=path,
             argument="out",
-            expected="a folder that you may write to",
+            expected="a folder that you can write to",
             remedy="choose another `out`",
         ) from None
 
 
 def remove_folder(path: Path) -> None:
-    """Delete a folder that a run has written to, as far as one may: however deep it is, and locked or not.
+    """Delete a folder that a run wrote to, as far as permissions allow, even if it is deep or locked.
 
-    `shutil.rmtree` calls itself for each level, and fails at some hundred of them.
+    `shutil.rmtree` recurses and fails at a depth of some hundred folders.
     """
     if path.is_symlink():
         return
     with suppress(OSError):
         here = _opened(str(path))
-        way = [("", _emptied(here))]  # each folder on the way down, and the folders that are left in it
+        way = [("", _emptied(here))]  # folders on the way down, each with its remaining subfolders
         try:
             while way:
                 name, left = way[-1]
@@ -133,7 +132,7 @@ def remove_folder(path: Path) -> None:
 
 
 class ScratchFolder:
-    """A new temporary folder for runs to write to; it is gone with this object, whatever they left in it."""
+    """A temporary folder for runs to write to, deleted together with this object."""
 
     def __init__(self, prefix: str) -> None:
         self.path = Path(tempfile.mkdtemp(prefix=prefix)).resolve()
@@ -147,7 +146,7 @@ class ScratchFolder:
 
 
 def _opened(name: str, parent: int | None = None) -> int:
-    """A folder, unlocked."""
+    """Open a folder, after unlocking it."""
     with suppress(OSError):
         os.chmod(name, stat.S_IRWXU, dir_fd=parent)
     return os.open(name, _FOLDER, dir_fd=parent)
@@ -159,7 +158,7 @@ def _instead(old: int, new: int) -> int:
 
 
 def _emptied(folder: int) -> list[str]:
-    """Delete all that is in an open folder but for folders: their names."""
+    """Delete everything in an open folder except subfolders; return their names."""
     with os.scandir(folder) as entries:
         found = [(entry.name, entry.is_dir(follow_symlinks=False)) for entry in entries]
     for name, is_folder in found:
@@ -170,15 +169,16 @@ def _emptied(folder: int) -> list[str]:
 
 
 def write_atomic(path: Path, data: bytes) -> None:
-    """Write the whole file or leave the old one; DiskFull if there is no room, MutatorError for a folder."""
+    """Write the whole file or leave the old one; raise DiskFull if there is no room, MutatorError for a
+    folder.
+    """
     with half_written(path) as temporary:
         temporary.write_bytes(data)
 
 
 @contextmanager
 def half_written(path: Path) -> Iterator[Path]:
-    """Where to write what is to become the file at `path`, in pieces: as `write_atomic`, it does at the end,
-    unless something was raised."""
+    """Yield a path to write in pieces, which becomes the file at `path` unless the block raises."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")
@@ -195,40 +195,40 @@ def half_written(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing_atomic(path: Path) -> Iterator[BinaryIO]:
-    """As `half_written`, opened for writing."""
+    """Like `half_written`, opened for writing."""
     with half_written(path) as temporary, temporary.open("wb") as file:
         yield file
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a file of that name was left by a killed `write_atomic` or `half_written`."""
+    """Whether a killed `write_atomic` or `half_written` left a file of that name."""
     return complete(name) != name
 
 
 def complete(name: str) -> str:
-    """The name that such a file was to get; any other name as it is."""
+    """The final name of a half-written file; any other name unchanged."""
     found = re.fullmatch(r"\.(.+)\.\d+", name)
     return found[1] if found else name
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:
-    """Write `data` (which names its schema) for people and programs."""
+    """Write `data`, which names its schema, as JSON."""
     write_atomic(path, json_bytes(data))
 
 
 def json_bytes(data: dict[str, Any]) -> bytes:
-    """What `write_json` writes."""
+    """The bytes that `write_json` writes."""
     return (json.dumps(data, indent=1, ensure_ascii=False) + "\n").encode()
 
 
 def read_json(path: Path, schema: str) -> dict[str, Any]:
-    """Read a JSON object of `schema` (`name/version`) or an older version of it."""
+    """Read a JSON object that has this `schema` (`name/version`) or an older version of it."""
     try:
         data = json.loads(no_pipe(path).read_bytes())
     except OSError as err:
         if not is_no_file(err):
             raise
-        got = "no such file" if isinstance(err, FileNotFoundError) else f"no file ({err.strerror})"
+        got = "no such file" if isinstance(err, FileNotFoundError) else f"not a file ({err.strerror})"
         raise MutatorError(got, where=path) from None
     except (ValueError, RecursionError) as err:
         raise MutatorError(f"not JSON ({err})", where=path, remedy="delete it if it is damaged") from None
@@ -239,7 +239,7 @@ def read_json(path: Path, schema: str) -> dict[str, Any]:
 
 
 def check_schema(found: object, schema: str, where: Path) -> None:
-    """Refuse anything but `schema` (`name/version`) and older versions of it."""
+    """Raise MutatorError unless `found` is `schema` (`name/version`) or an older version of it."""
     name, _, known = schema.partition("/")
     found_name, _, version = str(found).partition("/")
     if found_name != name or not version.isdigit():

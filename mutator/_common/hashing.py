@@ -1,7 +1,7 @@
-"""Content hashes: the same input gives the same id on every machine, in this version and in later ones.
+"""Content hashes: the same input has the same id on every machine and in every later version.
 
-Ids and plan digests are cited, so they must outlive new fields. A field that joins a hashed record is
-declared with `added(default)`: ids and plan files leave it out while it holds that default.
+Ids and plan digests are cited, so they must not change when records gain fields. Declare such a field with
+`added(default)`: ids and plan files omit it while it has that default.
 """
 
 import dataclasses
@@ -13,15 +13,15 @@ from typing import Any
 
 import orjson
 
-_ADDED = "added"  # key in a field's metadata
+_ADDED = "added"  # metadata key of a field
 _SCALARS = frozenset((str, int, float, bool, type(None)))
 
 
 def added(default: Any) -> Any:
     """Declare a dataclass field that joins a hashed record after its first release.
 
-    No id changes: `plain` leaves the field out while it equals `default`, and readers of older files, which
-    lack it, give it `default`. The default must be immutable and must never change.
+    No id changes: `plain` omits the field while it equals `default`, and older files are read with `default`.
+    The default must be immutable and must never change.
     """
     return dataclasses.field(default=default, metadata={_ADDED: True})
 
@@ -37,29 +37,28 @@ def added_values(record: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=256)
 def _fields(kind: type) -> tuple[tuple[str, ...], tuple[tuple[str, Any], ...]]:
-    """Names of a dataclass's first fields; names and defaults of its `added` ones."""
+    """The names of a dataclass's original fields, and names and defaults of its `added` fields."""
     every = dataclasses.fields(kind)
     first = tuple(f.name for f in every if _ADDED not in f.metadata)
     return first, tuple((f.name, f.default) for f in every if _ADDED in f.metadata)
 
 
 def from_json(data: bytes) -> Any:
-    """What `json.loads` makes of `data`, or raises, in a quarter of its time; but integers of more than 64
-    bits become floats."""
+    """Parse JSON like `json.loads`, but four times as fast; integers of more than 64 bits become floats."""
     try:
         return orjson.loads(data)
-    except ValueError:  # also of what it is too strict for, like nan
+    except ValueError:  # orjson also rejects e.g. nan
         return json.loads(data)
 
 
 def plain(value: Any) -> Any:
-    """Turn records, tuples and enums into what JSON knows; floats stay as they are.
+    """Convert records, tuples and enums into JSON types; floats stay as they are.
 
-    Of a record's `added` fields only those count that differ from their defaults.
+    A record's `added` fields are omitted while they have their defaults.
     """
     if type(value) in _SCALARS:
         return value
-    if isinstance(value, Enum):  # first, as an enumeration takes long to say that it has no fields
+    if isinstance(value, Enum):  # first: finding that an enum has no fields is slow
         return value.value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         found = {}
@@ -74,21 +73,21 @@ def plain(value: Any) -> Any:
     return value
 
 
-# only what JSON does not know goes through `plain`: a plan has a million ids
+# only types unknown to JSON go through `plain`: a plan has a million ids
 _ENCODER = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
 def canonical(value: Any) -> str:
-    """One text for one value: sorted keys, no spaces, shortest exact floats."""
+    """One canonical text for a value: sorted keys, no spaces, shortest exact floats."""
     return _ENCODER.encode(value)
 
 
 def digest(value: Any) -> str:
-    """SHA-256 of `value` (bytes as they are, anything else in its canonical text), in hex."""
+    """The SHA-256 of `value` in hex: of bytes as they are, of anything else in its canonical text."""
     data = value if isinstance(value, bytes) else canonical(value).encode()
     return hashlib.sha256(data).hexdigest()
 
 
 def content_id(value: Any) -> str:
-    """The first 16 hex digits of `digest`: among 10^6 things a clash has odds of 1 in 37 million."""
+    """The first 16 hex digits of `digest`: among 10^6 items the odds of a clash are 1 in 37 million."""
     return digest(value)[:16]

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: both end the work in order, but never in the middle of a parse."""
+"""Ctrl-C and SIGTERM: both stop the work in order, but never in the middle of a parse."""
 
 import signal
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 @dataclass(slots=True)
 class _State:
     held: int = 0  # depth
-    asked: bool = False  # for an interruption, while held
+    asked: bool = False  # an interruption arrived while held
 
 
 _state = _State()
@@ -17,9 +17,9 @@ _state = _State()
 
 @contextmanager
 def terminable() -> Iterator[None]:
-    """Within it, SIGINT and SIGTERM raise KeyboardInterrupt: stop in order, keep what finished.
+    """Raise KeyboardInterrupt on SIGINT and SIGTERM within the block, so that finished work is kept.
 
-    A process that ignores SIGINT goes on ignoring it.
+    A process that ignores SIGINT keeps ignoring it.
     """
 
     def interrupt(number: int, frame: object) -> None:
@@ -33,7 +33,7 @@ def terminable() -> Iterator[None]:
         for number in (signal.SIGINT, signal.SIGTERM):
             if signal.getsignal(number) is not signal.SIG_IGN:
                 before[number] = signal.signal(number, interrupt)
-    except ValueError:  # not the main thread: signals are another's business
+    except ValueError:  # not the main thread, which cannot set handlers
         yield
         return
     try:
@@ -45,9 +45,9 @@ def terminable() -> Iterator[None]:
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Within it, an interruption waits until the end.
+    """Delay an interruption to the end of the block.
 
-    Native code that calls Python turns an exception raised there into one of its own.
+    Native code that calls Python would replace the exception by another.
     """
     _state.held += 1
     try:

@@ -1,6 +1,6 @@
-"""Who may write to a run folder: one command at a time, and no worker of an earlier command.
+"""Locks of a run folder: one command at a time, and no worker of an earlier command.
 
-Locks are flocks: the kernel drops them when their process dies, however it dies.
+They are flocks, which the kernel drops when their process dies.
 """
 
 import fcntl
@@ -15,7 +15,7 @@ from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
 WORKERS = "workers"
-_PATIENCE_S = 15.0  # workers of a dead command end by themselves well within this
+_PATIENCE_S = 15.0  # workers of a dead command exit well within this
 
 
 @contextmanager
@@ -38,8 +38,8 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
             raise MutatorError(
                 f"workers of an earlier run are still running (processes {', '.join(map(str, living))})",
                 where=run,
-                expected="a folder without workers",
-                remedy="wait for them or end them, then give the same command again",
+                expected="a folder with no workers in it",
+                remedy="wait for them or end them, then run the same command again",
             )
         try:
             yield
@@ -53,7 +53,7 @@ def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
 
 @contextmanager
 def alone_in(folder: Path) -> Iterator[None]:
-    """Wait until nobody else works in an existing folder, then keep others waiting. Nothing is written."""
+    """Wait until nobody else works in an existing folder, then keep others out. Nothing is written."""
     fd = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
         fcntl.flock(fd, fcntl.LOCK_EX)
@@ -63,7 +63,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 
 def register_worker(run: Path) -> int:
-    """Register this process as a worker in `run`, for as long as the returned descriptor is open."""
+    """Register this process as a worker in `run` until the returned descriptor is closed."""
     with raising_disk_full(run):
         folder = run / WORKERS
         folder.mkdir(exist_ok=True)
@@ -73,12 +73,12 @@ def register_worker(run: Path) -> int:
 
 
 def living_workers(run: Path) -> list[int]:
-    """Process ids of the workers in `run`; entries of dead workers are removed."""
+    """The process ids of the workers in `run`; remove entries of dead workers."""
     living = []
     for path in sorted((run / WORKERS).glob("[0-9]*")):
         try:
             fd = _opened(path)
-        except FileNotFoundError:  # another looked, too
+        except FileNotFoundError:  # another process removed it
             continue
         try:
             if _try_lock(fd):
@@ -91,7 +91,7 @@ def living_workers(run: Path) -> list[int]:
 
 
 def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
-    """Wait until no worker is left in `run`; process ids of those that stay longer."""
+    """Wait until no worker is left in `run`; returns the process ids of those that stay longer."""
     deadline = time.monotonic() + patience_s
     while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
@@ -99,17 +99,17 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
 
 
 def _opened(path: Path, more: int = 0) -> int:
-    """The file there, open; MutatorError for a folder, a pipe, and a link: nothing is written to its end."""
+    """Open a file; MutatorError for a folder, pipe or link, so that nothing is written through a link."""
     try:
         return os.open(no_pipe(path), os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:
         if isinstance(err, FileNotFoundError) or not is_no_file(err):
             raise
         raise MutatorError(
-            f"no file ({err.strerror})",
+            f"not a regular file ({err.strerror})",
             where=path,
             expected="a file of the run folder",
-            remedy="delete it: it says nothing of a result",
+            remedy="delete it: it holds no results",
         ) from None
 
 

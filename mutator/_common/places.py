@@ -1,4 +1,4 @@
-"""Where libraries, templates and run folders lie; no file in them is read."""
+"""Find libraries, templates and run folders, without reading their files."""
 
 import os
 from pathlib import Path
@@ -6,7 +6,7 @@ from pathlib import Path
 from mutator._common.shipped import shipped_folder
 
 RUNS = Path("runs")
-RUN_HEAD = "run.json"  # the file by which a run folder is known
+RUN_HEAD = "run.json"  # the file that identifies a run folder
 _LIBRARY = "fault_library"
 _TEMPLATES = "templates"
 
@@ -14,20 +14,23 @@ _Given = str | Path | None
 
 
 def library_folder(root: _Given = None, library: _Given = None) -> Path:
-    """The fault library that an argument or the environment names, else the nearest one upward, else the
-    one that ships. It need not exist."""
+    """The fault library: from an argument, the environment, the nearest folder upward, or the shipped
+    one.
+
+    It may not exist.
+    """
     named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
     return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
 
 
 def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
-    """The templates, found as `library_folder` finds the library. They need not exist."""
+    """The templates folder, found like `library_folder`. It may not exist."""
     named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
     return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
 
 
 def environment_path(variable: str) -> Path | None:
-    """The path that an environment variable has; None where it is not set, or empty."""
+    """The path in an environment variable, or None if it is unset or empty."""
     value = os.environ.get(variable)
     return Path(value) if value else None
 
@@ -40,7 +43,7 @@ def library_files(library: Path, folder: str) -> dict[str, Path]:
 
 
 def run_folders(root: Path) -> list[Path]:
-    """The run folders in runs/, here and under `root`; what was used last comes first."""
+    """The run folders in runs/, here and under `root`, the most recently used first."""
     bases = {base.resolve() for base in (RUNS, root / RUNS)}
     heads = [head for base in bases for head in base.glob(f"*/{RUN_HEAD}")]
     heads.sort(key=lambda head: (head.stat().st_mtime_ns, str(head)), reverse=True)
@@ -48,7 +51,7 @@ def run_folders(root: Path) -> list[Path]:
 
 
 def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | None:
-    """The folder `name` that an argument names, itself or by its root, else the one of the environment."""
+    """The folder `name` from an argument, directly or by its root, or from the environment."""
     if folder or root:
         return Path(folder) if folder else Path(root or "") / name
     base = environment_path("MUTATOR_ROOT")
@@ -56,7 +59,7 @@ def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | Non
 
 
 def _upward(*folders: str) -> Path | None:
-    """The nearest folder from the current one upward that holds fault_library/, if it holds all of these."""
+    """The nearest folder upward that holds fault_library/, if it holds all of `folders`."""
     here = Path.cwd()
     nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
     return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None

@@ -1,4 +1,4 @@
-"""Work shared among processes, each a copy of this one; results come in the order of the work."""
+"""Share work among forked processes; results keep the order of the work."""
 
 import gc
 import os
@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from mutator._common.cores import usable_cores
 from mutator.errors import MutatorError
 
-_MOST = 2  # processes: each needs room
+_MOST = 2  # processes: each needs memory
 _WORTH = 20_000  # experiments
 
 T = TypeVar("T")
@@ -21,15 +21,16 @@ R = TypeVar("R")
 
 
 def processes_for(experiments: int) -> int:
-    """How many processes are to share what there is to do for so many experiments."""
+    """How many processes should share the work for so many experiments."""
     return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
 
 
 def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
-    """`made` of each item, in the order of the items, by so many processes; by this one for fewer than two.
+    """Yield `made(item)` for each item in order, computed by `processes` processes, or here for fewer than
+    two.
 
-    What this process has in memory the others have, too. A process is at most one result ahead of what is
-    taken, so results need no room. What `made` raises is raised here. MutatorError when a process dies.
+    The processes inherit this one's memory. Each is at most one result ahead, so results take little room.
+    Exceptions of `made` are raised here. MutatorError if a process dies.
     """
     if processes < 2:
         yield from map(made, items)
@@ -41,8 +42,10 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
 
 @contextmanager
 def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
-    """Another process does `work` while the block runs. What the block is given waits for its result, and
-    raises what it raised; for fewer than two processes it does the work itself."""
+    """Run `work` in another process during the block, which receives a function that waits for the result.
+
+    That function raises what `work` raised. With fewer than two processes it does the work itself.
+    """
     if processes < 2:
         yield work
         return
@@ -52,7 +55,7 @@ def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
 
 @contextmanager
 def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
-    """Processes at work, each with the connection by which its results come; they end with the block."""
+    """Start processes, and yield the connection of each for its results; they end with the block."""
     context = get_context("fork")
     pipes = [context.Pipe(duplex=False) for _ in range(processes)]
     workers = [
@@ -80,11 +83,11 @@ def _work(
     pipes: Sequence[tuple[Connection, Connection]],
     number: int,
 ) -> None:
-    """Send what is made of each item, or what was raised, which is the last."""
-    gc.disable()  # what is made has no circles, and a search would copy what the processes share
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all: the first process ends the others
+    """Send the result for each item, or the exception, which ends the work."""
+    gc.disable()  # results have no cycles, and a collection would copy shared memory
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the first process ends the others
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for receiver, _ in pipes:  # else nobody would notice that the first process is gone
+    for receiver, _ in pipes:  # or nobody would notice when the first process dies
         receiver.close()
     sender = pipes[number][1]
     try:
@@ -101,9 +104,9 @@ def _received(receiver: Connection) -> Any:
         result, error = pickle.loads(receiver.recv_bytes())
     except EOFError:
         raise MutatorError(
-            "a process that shared the work was killed",
+            "a helper process was killed",
             expected="enough memory for it",
-            remedy="give the command again",
+            remedy="free some memory, then run the same command again",
         ) from None
     if error is not None:
         raise error

@@ -1,4 +1,4 @@
-"""Seeded draws: one generator for each (seed, key), so no draw depends on how many came before it."""
+"""Seeded random generators, one per (seed, key), so no draw depends on how many came before it."""
 
 import hashlib
 
@@ -10,10 +10,10 @@ _WORD = 2**32
 
 
 def generator(seed: int, key: str) -> np.random.Generator:
-    """A generator of its own for (seed, key), the same on every machine."""
+    """The generator for (seed, key), the same on every machine."""
     if not 0 <= seed < 2**63:
         raise MutatorError(f"seed {seed}", expected="0 or more, below 2 to the power of 63")
     words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")
-    # NumPy would make these words of [seed, *words], number by number, in ten times the time
+    # the words that NumPy derives from [seed, *words], ten times as fast
     own = [seed] if seed < _WORD else [seed % _WORD, seed // _WORD]
     return np.random.Generator(np.random.PCG64(np.concatenate((own, words)).astype(np.uint32)))

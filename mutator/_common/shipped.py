@@ -1,9 +1,9 @@
-"""What ships with the harness: the controller under test, its fault library, the templates.
+"""The shipped controller, fault library and templates.
 
-In a clone they are folders beside the package. A wheel carries them as one archive, for two reasons: pip
-compiles every .py file that it installs, and no bytecode may lie beside a target's sources; and nothing must
-make `selfdrive` importable. The archive is unpacked once into the user's data folder, $XDG_DATA_HOME or
-~/.local/share: runs read it all the time, so it is no cache to be cleared.
+In a clone they are folders next to the package. A wheel carries them as one archive: pip compiles every .py
+file that it installs, a target's sources must have no bytecode next to them, and `selfdrive` must not become
+importable. The archive is unpacked once into $XDG_DATA_HOME or ~/.local/share. Runs read it all the time, so
+it is not part of the cache.
 """
 
 import os
@@ -21,34 +21,34 @@ CLONE = Path(__file__).resolve().parents[2]
 SHIPPED_TARGET = "shipped:target"  # as `root` of a manifest
 _README = Path(__file__).with_name("new_library.md")
 _ROOT_IN_CLONE = "root: ../../target\n"
-_SHOWN = 3  # names of changed files in an error
+_SHOWN = 3  # changed files named in an error
 
 
 def shipped_folder() -> Path:
-    """The folder that holds target/, fault_library/ and templates/ as they ship.
+    """The folder that holds the shipped target/, fault_library/ and templates/.
 
-    An unpacked archive is compared with the archive, byte for byte, once in each process. MutatorError when
-    it was changed or cannot be unpacked.
+    Compare an unpacked archive with the archive, byte for byte, once per process. MutatorError if it
+    was changed or cannot be unpacked.
     """
     return _unpacked(ARCHIVE, _home()) if ARCHIVE.exists() else CLONE
 
 
 def refuse_shipped(path: Path) -> None:
-    """MutatorError when `path`, which is about to be written, is in the unpacked archive."""
+    """Raise MutatorError if `path`, about to be written, is in the unpacked archive."""
     if ARCHIVE.exists() and path.absolute().is_relative_to(_home()):
         raise MutatorError(
-            "part of the library that ships with mutator, which stays as it is",
+            "part of the library that ships with mutator, which must not change",
             where=path,
-            expected="a library of your own",
-            remedy="make one: `mutator init DIR`, then work in DIR",
+            expected="your own library",
+            remedy="make one with `mutator init DIR`, then work in DIR",
         )
 
 
 def write_library(folder: Path) -> None:
-    """Write a library and templates to edit, and a README, into a new or empty `folder`.
+    """Write an editable library, templates and a README into a new or empty `folder`.
 
-    The manifest of the copy says `root: shipped:target`, so it finds the controller wherever the folder is
-    moved and whichever mutator is installed. MutatorError for a folder that holds anything.
+    The manifest in the copy says `root: shipped:target`, so it works wherever the folder moves and whichever
+    mutator is installed. MutatorError for a folder that is not empty.
     """
     shipped = shipped_folder()
     make_empty(folder)
@@ -61,7 +61,7 @@ def write_library(folder: Path) -> None:
 
 
 def make_empty(folder: Path) -> None:
-    """Make a new folder, or find it empty; MutatorError for one that holds anything or cannot be made."""
+    """Make a folder or find it empty; MutatorError if it is not empty or cannot be made."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""
@@ -84,7 +84,7 @@ def _home() -> Path:
 
 @lru_cache(maxsize=1)
 def _unpacked(archive: Path, home: Path) -> Path:
-    """The archive's folder in `home`, named by its digest, made whole or not at all."""
+    """Unpack the archive atomically into a folder in `home` named by its digest, unless it is there."""
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)
@@ -94,7 +94,7 @@ def _unpacked(archive: Path, home: Path) -> Path:
             f"no longer as it ships: {', '.join(changed[:_SHOWN])}{more}",
             where=folder,
             expected="the files that were installed with mutator, unedited",
-            remedy="delete this folder to have it unpacked again; edit in a library of `mutator init DIR`",
+            remedy="delete this folder to unpack it again; make edits in a library of `mutator init DIR`",
         )
     return folder
 
@@ -113,13 +113,13 @@ def _unpack(archive: Path, folder: Path) -> None:
         raise MutatorError(
             f"cannot unpack what ships with mutator ({err.strerror})",
             where=folder,
-            expected="a data folder that you may write to",
+            expected="a data folder that you can write to",
             remedy="set XDG_DATA_HOME to one, or work in a clone",
         ) from None
 
 
 def _changed(archive: Path, folder: Path) -> list[str]:
-    """Files that were edited, added or deleted since they were unpacked; bytecode is no part of a tree."""
+    """List files that were edited, added or deleted since unpacking; bytecode is ignored."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
     found = {path.relative_to(folder).as_posix(): path for path in files}
     with ZipFile(archive) as file:

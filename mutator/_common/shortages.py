@@ -1,4 +1,4 @@
-"""Errors of a machine that has no more memory, files or processes to give: a user can mend them."""
+"""Errors of a machine that is out of memory, files or processes, which a user can fix."""
 
 import errno
 import os
@@ -7,18 +7,18 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _FILES = (errno.EMFILE, errno.ENFILE)
 _PROCESSES = "can't start new thread"
-_LOADING = ("failed to map segment", "cannot allocate memory")  # what a library says that does not fit in
-_AGAIN = "give the same command again; finished experiments are kept and not repeated"
+_LOADING = ("failed to map segment", "cannot allocate memory")  # what a library reports when it does not fit
+_AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 
 class Shortage(MutatorError):
-    """The machine, or a limit of this process, gave no more. What finished is kept."""
+    """The machine, or a limit of this process, is exhausted. Finished work is kept."""
 
     exit_code = EXIT_HARNESS_ERRORS
 
 
 def shortage(err: BaseException | None) -> Shortage | None:
-    """What an error says of a shortage, or the error that it came of; None: nothing."""
+    """The shortage that an error or one of its causes reports, or None."""
     while err is not None:
         number = getattr(err, "errno", None)
         loading = isinstance(err, ImportError) and any(words in str(err) for words in _LOADING)

@@ -1,4 +1,4 @@
-"""The one renderer of tables: plain text for a terminal, Markdown, HTML."""
+"""Render tables as plain text, Markdown and HTML."""
 
 import re
 from collections.abc import Collection, Sequence
@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-# What Markdown would read as an element, italics or bold; nothing in `code` is read so.
+# what Markdown would take for an element, italics or bold; `code` is exempt
 _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Table:
-    """A table of texts. Each row has a cell for each head; columns in `right` are aligned to the right.
+    """A table of texts, with one cell per head in each row. Columns in `right` are right-aligned.
 
-    A cell may be Markup, which HTML shows as it is: a link, say. With `named` the first cell of a row is its
+    A cell may be Markup, e.g. a link, which HTML shows as it is. With `named` the first cell of a row is its
     head.
     """
 
@@ -46,10 +46,11 @@ class Table:
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":
-        """A scrollable HTML table of class `style`, every text escaped; no head if all heads are empty.
+        """A scrollable HTML table of class `style` with escaped text, without a head if all heads are
+        empty.
 
-        A row whose first cell is empty continues the row above it and gets the class `group`; cells of the
-        columns in `right` get the class `number`.
+        A row with an empty first cell continues the row above and has the class `group`; cells of columns in
+        `right` have the class `number`.
         """
         from markupsafe import Markup
 
@@ -75,7 +76,7 @@ class Table:
 
         if not any(self.heads):
             return Markup("")
-        tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # a head says something
+        tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # an empty head is a plain cell
         numbers = Markup(' class="number"')
         heads = [
             Markup(tags[bool(head)]).format(numbers if i in self.right else "", head)
@@ -85,8 +86,9 @@ class Table:
 
 
 def markdown_line(text: str) -> str:
-    """A text as one line of Markdown that shows every character: `<class 'float'>` is not an HTML element,
-    `__init__` is not bold."""
+    """A text as one line of Markdown that shows every character: `<class 'float'>` is not an HTML
+    element, `__init__` is not bold.
+    """
     return _MARKUP.sub(_escaped, " ".join(text.splitlines()))
 
 

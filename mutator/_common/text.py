@@ -1,4 +1,4 @@
-"""Text for people: counted things, values in errors, suggestions."""
+"""Text for people: counts, values in errors, suggestions."""
 
 import difflib
 import re
@@ -7,12 +7,12 @@ from typing import Any
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """A number of things: 1 run, 2 runs; `plural` where it is not the noun and an s."""
+    """A count with its noun: 1 run, 2 runs; `plural` where an s is not enough."""
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
 def shown(value: Any) -> str:
-    """A value as an error shows it: at most 60 characters, text is quoted, numbers are not."""
+    """A value as errors show it: at most 60 characters, text quoted, numbers not."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -22,7 +22,7 @@ def shown(value: Any) -> str:
 
 
 def suggestion(word: str, known: list[str]) -> str:
-    """`, did you mean 'x'?` when one of `known` is close to `word`, else nothing."""
+    """Return `; did you mean 'x'?` if one of `known` is close to `word`, else an empty text."""
     close = difflib.get_close_matches(word, known, n=1)
     return f"; did you mean '{close[0]}'?" if close else ""
 
@@ -33,7 +33,7 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def operator_hint(text: str) -> str:
-    """What to write for the operators of other languages in an expression; empty if it has none."""
+    """What to write instead of other languages' operators in an expression, or an empty text."""
     found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
     return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
 
@@ -44,8 +44,11 @@ _NO_BREAK = "\0"
 
 
 def folded(text: str, width: int) -> str:
-    """The text with lines of at most `width` characters, broken between words. A word that is longer, and a
-    command in backticks, stays whole; what follows a break is indented, to the value of a `name  value`."""
+    """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
+    whole.
+
+    Continuation lines are indented, to the value in a line `name  value`.
+    """
     return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
 
 
@@ -72,5 +75,4 @@ def _indent(line: str) -> int:
 
 
 def seeds_text(seeds: range) -> str:
-    """`seed 1`, `seeds 1 to 90`."""
     return f"seed {seeds[0]}" if len(seeds) == 1 else f"seeds {seeds[0]} to {seeds[-1]}"

@@ -1,3 +1,3 @@
-"""The version of this program, kept apart so that every part may ask for it."""
+"""The version of this program."""
 
 VERSION = "0.2.0"
