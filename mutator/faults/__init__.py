@@ -1,4 +1,4 @@
-"""What may go wrong: fault specs, fault models, parameters, injections, and their expansion into faults.
+"""Fault specs, fault models, parameters and injections, and their expansion into faults.
 
-Source code is not read or changed here, and triggers are not made here.
+This package does not read or change source code, and makes no triggers.
 """

@@ -1,4 +1,4 @@
-"""From spec to faults: values drawn, units converted, parameters checked against their model."""
+"""Expand specs into faults: draw values, convert units, check parameters against their model."""
 
 import math
 from collections.abc import Iterator
@@ -29,10 +29,10 @@ def expand(
 ) -> tuple[Fault, ...]:
     """The faults of `spec` in a reading (None: the library's default), in the order of variants and ranges.
 
-    The same seed gives the same values in every reading and whatever the triggers, scenarios and methods are.
-    MutatorError (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location
-    outside the target or in a forbidden place, a change the target does not offer. Anchors are resolved when
-    a mutant is built.
+    The same seed draws the same values for every reading, trigger, scenario and method. MutatorError
+    (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location outside the
+    target or in a forbidden place, a change that the target does not offer. Anchors are resolved when a
+    mutant is built.
     """
     reading = reading or spec.readings.default
     spec.readings.check(reading)
@@ -41,10 +41,10 @@ def expand(
 
 
 def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
-    """The values of `draw` for `seed`, in its own unit: one from each range, or the list as it is.
+    """The values of `draw` for `seed`, in its unit: one from each range, or the list as it is.
 
-    The value of a range depends on nothing but seed, key, its place and the values before it: a value that
-    came before is drawn again (two equal faults would be one), and so is a real 0 (no error is no fault).
+    A range's value depends only on seed, key, position and the values before it. Duplicates are drawn again,
+    as equal faults would be one; so is a real 0, which is no fault.
     """
     if draw.kind == "list":
         return draw.values
@@ -61,7 +61,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
 
 
 def _value(draw: Draw, index: int, u: float) -> int | float:
-    """The value at `u` (0 to 1) of one range, rounded and capped as the draw says."""
+    """The value at `u` (0 to 1) in one range, rounded and capped as the draw says."""
     low, high = draw.ranges[index]
     if draw.kind == "integers":
         whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
@@ -84,7 +84,7 @@ class _Expander:
         self.manifest = manifest
 
     def faults(self, variant: Variant) -> Iterator[Fault]:
-        """One fault for each value of the variant's draw, or the one fault of a variant without."""
+        """Yield a fault for each drawn value of the variant, or one fault for a variant without a draw."""
         self._check(variant)
         draw = variant.draw
         unit = units.UNITS[draw.unit].symbol if draw and draw.unit else "-"

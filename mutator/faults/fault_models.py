@@ -1,4 +1,4 @@
-"""Fault models: what a fault does to a statement. Each is a Jinja2 template and a YAML, no Python."""
+"""Fault models: what a fault does to a statement. Each is a Jinja2 template and a YAML file."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -21,9 +21,8 @@ from mutator.faults.injections import InjectionModel, InjectionSpec
 SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
-# `variable` is a name known at the anchor, `import` a name of a module of the target, with the module's.
-# A `constant` is a number, a truth value, a text or None; a `choice` one of a few words; a `unit` the suffix
-# of one.
+# `variable`: a name known at the anchor; `import`: a name in a module of the target, with the module;
+# `constant`: a number, truth value, text or None; `choice`: one of a few terms; `unit`: the suffix of a unit.
 ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
 ]
@@ -33,21 +32,19 @@ _GIVEN = ("fi", "original", "left", "right", "called", "arguments", "statement",
 
 
 class SnippetKind(StrEnum):
-    """How a snippet meets the anchored statement."""
+    """How a snippet changes the anchored statement."""
 
     INSERT = "insert"  # lines before or after it
-    GUARD = "guard"  # lines above it, the last opening a block, the statement indented beneath
-    VALUE = (
-        "value"  # another value: of the expression that is anchored, or of the variable that is assigned to
-    )
+    GUARD = "guard"  # lines above it that open a block, with the statement indented beneath
+    VALUE = "value"  # a new value for the anchored expression or the assigned variable
 
 
 class Needs(StrEnum):
-    """What a template asks for beside its parameters."""
+    """What a template needs in addition to its parameters."""
 
-    CALL = "call"  # the anchored expression is one: `called`, `arguments`
-    STATEMENT = "statement"  # the anchor is a statement: `statement`, its text
-    NEXT_STATEMENT = "next_statement"  # that, and the text of the one after it, `next_statement`
+    CALL = "call"  # the anchored expression is a call: `called`, `arguments`
+    STATEMENT = "statement"  # the text of the anchored statement: `statement`
+    NEXT_STATEMENT = "next_statement"  # also the text of the statement after it: `next_statement`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -55,9 +52,8 @@ class ParamSchema:
     """One parameter of a model.
 
     `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
-    template wants (`s`). `min` and `max` are inclusive, in that unit. `neutral` is the value with which the
-    model changes nothing. `choices` are the words that a `choice` may be, which the template writes as they
-    are.
+    template expects (`s`). `min` and `max` are inclusive, in that unit. With the value `neutral` the model
+    changes nothing. `choices` lists the terms of a `choice`, which the template writes verbatim.
     """
 
     name: str
@@ -80,7 +76,7 @@ _TARGET = ParamSchema(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Example:
-    """A source before and after one injection (its tag is `example`): documentation that is run as a test."""
+    """A source before and after one injection with the tag `example`: documentation that runs as a test."""
 
     about: str
     injection: InjectionSpec
@@ -93,9 +89,9 @@ class Example:
 class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
-    `raises`: an exception of its injected lines is what it is for, and counts as a crash of the target.
-    `expression` is the template of a changed value; None for a model that cannot change an expression's.
-    `needs` is what the templates ask for, of whichever kind of anchor has it.
+    `raises`: its injected lines raise on purpose, so an exception counts as a crash of the target.
+    `expression` is the template of a changed value, or None if the model cannot change an expression. `needs`
+    lists what the templates need, for the kinds of anchors that have it.
     """
 
     name: str
@@ -111,16 +107,16 @@ class FaultModel:
     template_path: Path
 
     def param(self, name: str) -> ParamSchema | None:
-        """The parameter `name`, if the model has it."""
+        """The parameter `name`, or None."""
         return next((p for p in self.params if p.name == name), None)
 
     @property
     def parts(self) -> frozenset[str]:
-        """The parts of an expression that the template of its value asks for beside the whole."""
+        """The parts of an expression that the value template needs in addition to the whole."""
         return frozenset(_PARTS.findall(self.expression or ""))
 
     def changes_nothing(self, params: Mapping[str, object]) -> bool:
-        """Whether these values leave everything as it is; one with a bound may not."""
+        """Whether these values certainly change nothing; a value with a bound may still change something."""
         bounded = any(p.optional and p.type == "number" and p.name in params for p in self.params)
         neutral = (p.neutral is not None and params.get(p.name) == p.neutral for p in self.params)
         return any(neutral) and not bounded
@@ -128,12 +124,12 @@ class FaultModel:
 
 @dataclass(frozen=True)
 class FaultModels:
-    """All fault models of a templates folder, by name, and the probe's template."""
+    """All fault models of a templates folder by name, and the probe's template."""
 
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: str  # of templates, probe, and which models raise: text and blame of a mutant follow from them
+    digest: str  # of what determines a mutant's text and blame: templates, probe, which models raise
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())
@@ -153,24 +149,24 @@ class _ParamModel(StrictModel, title="A parameter"):
     """Its name has no unit: a spec writes `by_m` for the parameter `by`."""
 
     type: ParamType = Field(
-        description="What a value is: a name in the function (`variable`), a dotted name to be imported "
+        description="The type of a value: a name in the function (`variable`), a dotted name to import "
         "(`import`), a number, a `constant` (a number, truth value, text or null), a `choice` (one of the "
-        "words in `choices`), the suffix of a `unit`, or a `seed`, which no spec gives and expansion draws."
+        "terms in `choices`), the suffix of a `unit`, or a `seed`, which expansion draws and no spec sets."
     )
-    about: str = Field(description="What it is.")
+    about: str = Field(description="What the parameter is.")
     unit: str | None = Field(
         None,
-        description="The unit the template wants, `target` for that of the changed variable; without it, "
+        description="The unit that the template expects, `target` for that of the changed variable; default: "
         "none.",
     )
-    optional: bool = Field(False, description="May be left out; the template then finds `none`.")
-    min: float | None = Field(None, description="The least value, in that unit.")
-    max: float | None = Field(None, description="The greatest value, in that unit.")
+    optional: bool = Field(False, description="Whether it can be left out; the template then gets `none`.")
+    min: float | None = Field(None, description="The minimum, in that unit.")
+    max: float | None = Field(None, description="The maximum, in that unit.")
     neutral: float | None = Field(
-        None, description="The value with which a fault changes nothing; plans and `try` warn of it."
+        None, description="The value with which a fault changes nothing; plans and `try` warn about it."
     )
     choices: list[str] = Field(
-        [], description="The words that a `choice` may be; the template writes them as they are."
+        [], description="The terms that a `choice` allows; the template writes them verbatim."
     )
 
 
@@ -180,13 +176,13 @@ class _ExampleModel(StrictModel, title="An example"):
     about: str = Field(description="What it shows, after *For example*.")
     injection: InjectionModel = Field(description="An injection, as a spec has it.")
     before: str = Field(description="A source.")
-    after: str = Field(description="The same with the injection, tagged `example`.")
+    after: str = Field(description="The source after the injection, tagged `example`.")
 
 
 class FaultModelModel(StrictModel, title="The file"):
-    """Name, parameters and examples of a fault model, whose template is the file beside it."""
+    """Name, parameters and examples of a fault model. Its template is the file next to it."""
 
-    name: str = Field(description="Its name, that of the file.")
+    name: str = Field(description="The name, equal to the file's.")
     kind: Literal["insert", "guard", "value"] = Field(
         description="`insert`: lines before or after the statement; `guard`: the statement is wrapped; "
         "`value`: the template is one expression over `original`, the value of a variable or an expression."
@@ -195,16 +191,16 @@ class FaultModelModel(StrictModel, title="The file"):
         None,
         description="Of an `insert`: the template of the same change to an expression's value, `original`.",
     )
-    about: str = Field(description="What it does, in a sentence.")
+    about: str = Field(description="What the model does, in one sentence.")
     raises: bool = Field(
         False,
-        description="Whether an exception in its lines is what it is for. It then counts as a crash of the "
-        "target; otherwise it makes an invalid mutant.",
+        description="Whether its lines raise on purpose. An exception in them then counts as a crash of the "
+        "target; otherwise the mutant is invalid.",
     )
     needs: Literal["call", "statement", "next_statement"] | None = Field(
         None,
-        description="What the template asks for beside its parameters: `call`, an anchored expression that "
-        "is a call, as `called` and its `arguments`; `statement`, the anchored statement on one line; "
+        description="What the template needs in addition to its parameters: `call`, an anchored expression "
+        "that is a call, as `called` and its `arguments`; `statement`, the anchored statement on one line; "
         "`next_statement`, also the statement after it, and a guard then wraps both.",
     )
     params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
@@ -275,7 +271,7 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
         raise source.error(
             keys,
             f"parameter '{name}'",
-            expected=f"none of the names that templates have anyway: {', '.join(_GIVEN)}",
+            expected=f"a name that templates do not have already: {', '.join(_GIVEN)}",
             remedy="rename it",
         )
     if model.unit not in (None, TARGET_UNIT, *units.UNITS):
@@ -290,5 +286,5 @@ def _text(path: Path) -> str:
         return no_pipe(path).read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise MutatorError(
-            f"cannot be read ({error})", where=path, remedy="put the template beside its YAML, as UTF-8"
+            f"cannot be read ({error})", where=path, remedy="put the template next to its YAML file, as UTF-8"
         ) from None

@@ -1,4 +1,4 @@
-"""Names that an injected statement imports: the target must define them."""
+"""Check names that an injected statement imports: the target must define them."""
 
 import ast
 from collections.abc import Iterator
@@ -10,7 +10,9 @@ from mutator.targets.manifest import TargetManifest
 
 
 def check_import(manifest: TargetManifest, dotted: str) -> None:
-    """MutatorError (without place) unless `dotted` is a module of the target and a name defined in it."""
+    """Raise MutatorError, without a place, unless `dotted` is a module of the target and a name defined in
+    it.
+    """
     module, _, name = dotted.rpartition(".")
     base = module.replace(".", "/")
     path = next((p for p in (f"{base}.py", f"{base}/__init__.py") if p in manifest.tree.files), None)
@@ -31,13 +33,13 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
 
 
 def _names(path: str, data: bytes, root: Path) -> list[str]:
-    """The names that a module's top level defines or imports, sorted."""
+    """The names that a module defines or imports at top level, sorted."""
     try:
         return sorted(_defined(ast.parse(data)))
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {message}", where=root / path, line=line, remedy="mend the target"
+            f"not valid Python: {message}", where=root / path, line=line, remedy="correct the target"
         ) from None
 
 

@@ -1,4 +1,4 @@
-"""Injections as YAML writes them: a place, a fault model, parameters whose units are in their names."""
+"""Injections as written in YAML: a place, a fault model, parameters with units in their names."""
 
 import math
 import re
@@ -22,8 +22,7 @@ _REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
 class Drawn:
     """A parameter that takes the drawn value `name`, times `sign`.
 
-    Where a reading says that a number written in one unit is read as another, the value goes through that
-    mistake.
+    If a reading says that a number in one unit is read as another, the value is converted by that mistake.
     """
 
     name: str
@@ -42,7 +41,7 @@ class ParamSpec:
     name: str
     unit: str | None
     value: ParamValue
-    keys: Keys  # where it stands in the file
+    keys: Keys  # its position in the file
 
     @property
     def key(self) -> str:
@@ -52,7 +51,7 @@ class ParamSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InjectionSpec:
-    """One injection as written; `unit` is the unit of the changed variable, where the model needs it."""
+    """One injection as written; `unit` is the unit of the changed variable, if the model needs it."""
 
     location: FaultLocation
     model: str
@@ -71,40 +70,40 @@ class InjectionModel(StrictModel, title="An injection"):
     model: str = Field(description="A [fault model](fault-models.md).")
     unit: str | None = Field(
         None,
-        description="The unit that the changed variable has in the source, a suffix of the table of units, "
-        "or `'1'` for a plain number. Needed where the model has parameters in that unit.",
+        description="The unit of the changed variable in the source: a suffix of the table of units, "
+        "or `'1'` for a plain number. Needed if the model has parameters in that unit.",
     )
     params: dict[str, Any] = Field(
         default_factory=dict,
-        description="Parameters of the model, their unit in the key. A value is a number, a name, a "
+        description="Parameters of the model, with the unit in the key. A value is a number, a name, a "
         "constant such as `true`, the draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a "
         "number that is written in one unit and read as another.",
     )
 
     where: str | None = Field(
         None,
-        description="A condition that chooses one instance among several, over names that the function "
+        description="A condition that selects one instance among several, over names that the function "
         "knows: `index == 2`, `self.name == 'left'`, `item is self.items[0]`. Names, attributes, items, "
-        "constants, comparisons, `and`, `or`, `not`. It is asked only while the fault is active.",
+        "constants, comparisons, `and`, `or`, `not`. It is evaluated only while the fault is active.",
     )
     call: int | None = Field(
         None,
         ge=1,
-        description="The fault acts only in this execution of the place, counted from 1 each time that it "
-        "becomes active; with `where`, of those for which that holds.",
+        description="The fault acts only in this execution of the place, counted from 1 at each "
+        "activation; with `where`, only executions that satisfy it count.",
     )
     every: int | None = Field(
-        None, ge=1, description="The fault acts in every so many executions of the place, counted likewise."
+        None, ge=1, description="The fault acts in every n-th execution of the place, counted the same way."
     )
 
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
-        """The injection; errors point into `source` at `keys`."""
+        """Check and convert; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
             raise source.error(
                 (*keys, "unit"),
                 f"unit '{self.unit}'",
                 expected=f"one of {units.KNOWN}, or '1' for a plain number",
-                remedy="give the unit that the variable has in the source",
+                remedy="name the variable's unit in the source",
             )
         params = []
         for key, value in self.params.items():
@@ -126,13 +125,13 @@ class InjectionModel(StrictModel, title="An injection"):
         )
 
     def _check_instance(self, kind: AnchorKind, source: Source, keys: Keys) -> None:
-        """What chooses among instances and executions must fit the place, and each other."""
+        """Check that `where`, `call` and `every` fit the place and each other."""
         given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
         if given and kind in FIXED_ANCHORS:
             raise source.error(
                 (*keys, given[0]),
                 f"`{given[0]}` at a {kind.value}",
-                expected="none: it is set for all, once in each step",
+                expected="none of these: the value is set for all, once in each step",
                 remedy="leave it out, or anchor where the value is used",
             )
         if {"call", "every"} <= set(given):
@@ -146,7 +145,7 @@ class InjectionModel(StrictModel, title="An injection"):
                 (*keys, "where"),
                 shown(self.where),
                 expected="names, attributes, items, constants, comparisons, `and`, `or` and `not`",
-                remedy="ask for something that the function knows, e.g. `where: index == 2`",
+                remedy="use something that the function knows, e.g. `where: index == 2`",
             ) from None
 
 
@@ -178,13 +177,13 @@ def _value(value: Any, source: Source, keys: Keys) -> ParamValue:
 
 
 def reference(text: str) -> Drawn | None:
-    """`distance` or `-distance` as a reference to the draw of that name."""
+    """Parse `distance` or `-distance` as a reference to the draw of that name."""
     match = _REFERENCE.match(text)
     return Drawn(name=match[2], sign=-1 if match[1] else 1) if match else None
 
 
 def quantity(drawn: Drawn, number: float, unit: units.Unit, target: units.Unit) -> float:
-    """The drawn `number` (in `unit`) as the parameter takes it, in `target`; ValueError for wrong units."""
+    """Convert the drawn `number` from `unit` to the parameter's `target`; ValueError if incompatible."""
     number = math.copysign(1.0, drawn.sign) * number
     if drawn.written_in and drawn.read_as:
         number = units.convert(number, unit, units.UNITS[drawn.written_in])

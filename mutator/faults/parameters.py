@@ -1,4 +1,4 @@
-"""Parameters of an injection: from what a spec wrote to what a template takes, checked against the schema."""
+"""Resolve an injection's parameters from the spec's form to the template's, checked against the schema."""
 
 from mutator._common.random_streams import generator
 from mutator._common.text import shown, suggestion
@@ -26,10 +26,10 @@ def resolve(
     seed: int = 0,
     key: str = "",
 ) -> Injection:
-    """The injection with `value` (of `draw`) put in: numbers in the variable's own unit, sorted by name.
+    """The injection with `value` (of `draw`) inserted: numbers in the variable's own unit, sorted by name.
 
-    A `target` that is not given is the name that the anchor assigns to. A `seed` parameter is drawn from
-    (seed, key). MutatorError with file and line for whatever does not fit the model.
+    A missing `target` is the name that the anchor assigns to. A `seed` parameter is drawn from (seed, key).
+    MutatorError with file and line for anything that does not fit the model.
     """
     resolver = _Resolver(spec, model, source, draw, value)
     params: dict[str, Value] = {}
@@ -40,7 +40,7 @@ def resolve(
             raise source.error(
                 param.keys,
                 f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
-                expected="none: what is anchored is what changes",
+                expected="none: the anchored expression is what changes",
                 remedy="leave it out, or anchor at a statement",
             )
     for schema in model.params:
@@ -67,7 +67,7 @@ def resolve(
 
 
 class _Resolver:
-    """Checks the parameters of one injection one by one."""
+    """Checks the parameters of one injection."""
 
     def __init__(
         self,
@@ -84,9 +84,9 @@ class _Resolver:
         self.drawn = value
 
     def schema(self, param: ParamSpec) -> ParamSchema:
-        """The schema of a parameter as written; its unit suffix must be of the right dimension.
+        """The schema of a parameter as written; its unit suffix must have the right dimension.
 
-        A constant that is no number has no unit, whatever the variable's is.
+        A constant that is not a number has no unit.
         """
         schema = self.model.param(param.name)
         if schema is None or schema.type == "seed":
@@ -110,7 +110,7 @@ class _Resolver:
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Whether it is a constant but no number: a truth value, None, or a text other than the draw's."""
+        """Whether it is a constant but not a number: a truth value, None, or a text other than the draw's."""
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
@@ -119,7 +119,7 @@ class _Resolver:
         return drawn is None or self.draw is None or drawn.name != self.draw.name
 
     def keys(self, schema: ParamSchema) -> list[str]:
-        """How a parameter may be written: with each suffix that fits."""
+        """The keys under which a parameter can be written: one per suffix that fits."""
         unit = self.unit(schema)
         if unit is None:
             return [schema.name]
@@ -127,11 +127,11 @@ class _Resolver:
         return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
     def key(self, schema: ParamSchema) -> str:
-        """How an error writes it: in the unit that the template takes, the first of `keys`."""
+        """The key that errors show, in the template's unit: the first of `keys`."""
         return f"`{self.keys(schema)[0]}`"
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
-        """The unit in which the template takes the parameter."""
+        """The template's unit for the parameter."""
         if schema.unit != TARGET_UNIT:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:
@@ -139,12 +139,12 @@ class _Resolver:
                 self.spec.keys,
                 f"model {self.model.name} without `unit`",
                 expected=f"the changed variable's unit, one of {units.KNOWN}, or '1'",
-                remedy="add `unit: m` (or what it is in the source) beside `model`",
+                remedy="add `unit: m` (the variable's unit in the source) next to `model`",
             )
         return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
 
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
-        """The parameter's value in the template's unit, of the right type and in range."""
+        """The value in the template's unit, with type and range checked."""
         if schema.type in NAMES:
             fits = dotted_name if schema.type == "import" else assignable
             if not isinstance(param.value, str) or not fits(param.value):
@@ -178,10 +178,10 @@ class _Resolver:
         return number
 
     def _constant(self, param: ParamSpec) -> Value:
-        """The value itself, unless it is a text that looks like the draw's name misspelt."""
+        """The value itself, unless it is a text that resembles the draw's name."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
-            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that is less like it")
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that resembles it less")
         return param.value
 
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:

@@ -1,4 +1,4 @@
-"""Readings: ways to understand the same written faults, by the names that a library declares for them."""
+"""Readings: different ways to understand the same written faults, declared by a library."""
 
 import re
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from mutator.config.yaml_files import StrictModel, read
 from mutator.errors import MutatorError
 
 SCHEMA = "readings/1"
-FILE = "readings.yaml"  # of a library
+FILE = "readings.yaml"  # in a library
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Readings:
-    """The readings of a library, in its order. The first is the default: every variant is written in it."""
+    """The readings of a library, in order. The first is the default, in which every variant is written."""
 
     names: tuple[str, ...]
-    about: tuple[str, ...]  # of each, what it means
+    about: tuple[str, ...]  # what each one means
 
     @property
     def default(self) -> str:
         return self.names[0]
 
     def check(self, name: str) -> None:
-        """MutatorError that lists the readings for an unknown name."""
+        """Raise MutatorError, which lists the readings, for an unknown name."""
         if name not in self.names:
             raise MutatorError(
                 f"reading '{name}'",
@@ -42,7 +42,7 @@ UNDECLARED = Readings(
         "The injections, as the code that was published with it has them.",
     ),
 )
-"""The readings of a library that declares none: those of libraries that are older than `readings.yaml`."""
+"""The readings of a library that declares none, i.e. one that is older than `readings.yaml`."""
 
 
 class _DeclaredReadingModel(StrictModel, title="A declared reading"):
@@ -50,7 +50,7 @@ class _DeclaredReadingModel(StrictModel, title="A declared reading"):
 
 
 class ReadingsModel(StrictModel, title="readings.yaml"):
-    """Which readings there are."""
+    """The readings of a library."""
 
     readings: dict[str, _DeclaredReadingModel] = Field(
         min_length=1, description="By name: small letters, digits and `_`. The first is the default."
@@ -58,7 +58,7 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
 
 
 def load_readings(library: Path) -> Readings:
-    """The readings that a library declares, `UNDECLARED` where it has no file of them."""
+    """The readings that a library declares, or `UNDECLARED`."""
     path = library / FILE
     if not path.is_file():
         return UNDECLARED

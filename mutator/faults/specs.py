@@ -1,4 +1,4 @@
-"""Fault specs: what may go wrong in one module, as a YAML file says it, values not yet drawn."""
+"""Fault specs: the faults of one module as a YAML file describes them, values not yet drawn."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -18,15 +18,15 @@ from mutator.model import Hold
 SCHEMA = "fault_spec/1"
 _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 _MOST_RANGES = 1000
-_LARGEST = 1e15  # of a drawn number: whole numbers up to it are exact
+_LARGEST = 1e15  # limit of a drawn number: whole numbers up to it are exact
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draw:
-    """How a variant's values are made: one draw from each range, or a list taken as it is.
+    """How a variant's values are made: one draw from each range, or a list.
 
     Values are in `unit` (a suffix; None for plain numbers), the unit in the YAML key. `key` seeds the draw:
-    equal keys and ranges give equal values.
+    equal keys and ranges draw equal values.
     """
 
     key: str
@@ -41,12 +41,12 @@ class Draw:
 
     @property
     def count(self) -> int:
-        """How many values it makes."""
+        """The number of values."""
         return len(self.values) if self.kind == "list" else len(self.ranges)
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """The least and the greatest value that it can make."""
+        """The least and the greatest possible value."""
         ends = self.values or [end for ends in self.ranges for end in ends]
         return min(ends), max(ends) if self.cap is None else min(max(ends), self.cap)
 
@@ -55,7 +55,7 @@ class Draw:
 class Variant:
     """One row of the library: injections that share a trigger and a draw, by reading, the default first.
 
-    `holds` has how long the fault stays active in a reading, where it does not follow the trigger.
+    `holds` overrides, by reading, how long the fault stays active.
     """
 
     name: str
@@ -68,11 +68,11 @@ class Variant:
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        """The injections under `reading`; where it is not written, those of the default."""
+        """The injections under `reading`, or else the default's."""
         return self.readings[self._written(reading)]
 
     def hold(self, reading: str) -> Hold | None:
-        """How long the fault stays active under `reading`, likewise; None: as its trigger says."""
+        """How long the fault stays active under `reading`, or else the default; None: as its trigger says."""
         return self.holds[self._written(reading)]
 
     def _written(self, reading: str) -> str:
@@ -80,7 +80,7 @@ class Variant:
 
     @property
     def count(self) -> int:
-        """Number of faults it expands to."""
+        """The number of faults it expands to."""
         return self.draw.count if self.draw else 1
 
 
@@ -92,12 +92,12 @@ class FaultSpec:
     fault_type: str
     about: str
     variants: tuple[Variant, ...]
-    readings: Readings  # of the library
+    readings: Readings  # the library's
     source: Source
 
     @property
     def name(self) -> str:
-        """`<module>/<fault_type>`; its faults carry `<module>/<fault_type>/<variant>` as `Fault.spec`."""
+        """`<module>/<fault_type>`; its faults have `<module>/<fault_type>/<variant>` as `Fault.spec`."""
         return f"{self.module}/{self.fault_type}"
 
     @property
@@ -107,7 +107,7 @@ class FaultSpec:
 
     @property
     def count(self) -> int:
-        """Number of faults it expands to, in each reading."""
+        """The number of faults it expands to, in each reading."""
         return sum(v.count for v in self.variants)
 
     def __iter__(self) -> Iterator[Variant]:
@@ -123,7 +123,7 @@ class SweepModel(StrictModel, title="A sweep"):
 
     first: list[_Number] = Field(description="The first range, [low, high].")
     step: float = Field(gt=0.0, allow_inf_nan=False, description="The distance from one range to the next.")
-    last: list[_Number] = Field(description="The last range; whole steps above the first.")
+    last: list[_Number] = Field(description="The last range, a whole number of steps above the first.")
 
     @model_validator(mode="after")
     def _even(self) -> "SweepModel":
@@ -140,26 +140,26 @@ class SweepModel(StrictModel, title="A sweep"):
             raise ValueError(f"at most {_MOST_RANGES} ranges")
         ranges = tuple((low + i * self.step, high + i * self.step) for i in range(round(steps) + 1))
         if not ranges or any(abs(a - b) > 1e-9 for a, b in zip(ranges[-1], self.last, strict=True)):
-            raise ValueError("a last range that lies whole steps above the first")
+            raise ValueError("a last range that is a whole number of steps above the first")
         return ranges
 
 
 class _DrawModel(StrictModel, title="A draw"):
-    """The key of a draw is a name of one's own and a unit: `distance_m`. Parameters take the drawn value by
-    that name, without the unit, with a minus sign if wanted: `by_m: -distance`. Exactly one of
-    `integers_from`, `reals_from` and `values` is given. The same seed and the same key draw the same
-    values."""
+    """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters take the drawn value by
+    that name without the unit, optionally with a minus sign: `by_m: -distance`. Exactly one of
+    `integers_from`, `reals_from` and `values` is given. The same seed and key draw the same values.
+    """
 
     integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
     reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
     decimals: int | None = Field(
-        None, ge=0, le=12, description="Round numbers of `reals_from` to so many decimals."
+        None, ge=0, le=12, description="The number of decimals that `reals_from` is rounded to."
     )
-    values: list[float | int] | None = Field(None, description="These values, as they are.")
-    cap: float | None = Field(None, allow_inf_nan=False, description="No drawn value is above it.")
+    values: list[float | int] | None = Field(None, description="A list of values, used unchanged.")
+    cap: float | None = Field(None, allow_inf_nan=False, description="The maximum of drawn values.")
     key: str | None = Field(
         None,
-        description="What seeds the draw, so that variants can share it; default: the variant's full name.",
+        description="The seed of the draw, which variants can share; default: the variant's full name.",
     )
 
 
@@ -196,16 +196,18 @@ class _VariantBase(StrictModel, title="A variant"):
 class SpecModel(StrictModel, title="The file"):
     """A fault type of a module, in one or more variants."""
 
-    # its `variants` come with the readings of a library: see `spec_model`
+    # `variants` depends on the readings of a library: see `spec_model`
 
     module: str = Field(description="The module of the controller that the fault is in.")
-    fault_type: str = Field(description="The name of the fault type; with the module the name of the spec.")
-    about: str = Field(description="What goes wrong, in a sentence.")
+    fault_type: str = Field(
+        description="The name of the fault type; the spec's name is module and fault type."
+    )
+    about: str = Field(description="What goes wrong, in one sentence.")
 
 
 @cache
 def spec_model(readings: Readings) -> type[SpecModel]:
-    """The shape of the spec files of a library: its variants have a key for each of its readings."""
+    """The schema of a library's spec files: its variants have a key for each of its readings."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.about, strict=True):
         required = name == readings.default
@@ -222,7 +224,7 @@ def spec_model(readings: Readings) -> type[SpecModel]:
 
 
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
-    """Read one spec of a library strictly (file:line errors); see `expand` for what is checked later."""
+    """Read one spec of a library strictly (file:line errors); `expand` does the remaining checks."""
     model, source = read(path, spec_model(readings), SCHEMA)
     models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):

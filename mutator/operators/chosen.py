@@ -1,4 +1,4 @@
-"""Which mutations are meant: operators, places in the source, lines that golden runs execute."""
+"""Select mutations: by operator, by place in the source, by lines that golden runs execute."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,15 +19,17 @@ from mutator.targets.locations import check_file
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.source_tree import matches
 
-Lines = Mapping[str, Collection[int]]  # of each file, from 1
+Lines = Mapping[str, Collection[int]]  # by file, from 1
 _GLOB = "*?["
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """The mutations of some places, and how many were left out: their line is executed in no golden run
-    (`unexecuted`), or their code is the original's (`equal`), another mutation's (`twins`) or does not
-    compile (`invalid`)."""
+    """The mutations of some places, and how many were left out, by reason.
+
+    Their line is executed in no golden run (`unexecuted`), or their code equals the original's (`equal`) or
+    another mutation's (`twins`) or does not compile (`invalid`).
+    """
 
     mutations: tuple[Mutation, ...] = ()
     unexecuted: int = 0
@@ -37,7 +39,7 @@ class Found:
 
     @property
     def told(self) -> str:
-        """How many there are, and what was left out, in words."""
+        """A summary of how many there are and what was left out."""
         left_out = {
             "in lines that no golden run executes": self.unexecuted,
             "with the code of the original": self.equal,
@@ -58,8 +60,8 @@ def find_mutations(
 ) -> Found:
     """The mutations that the operators make at these places, in the order of files and lines.
 
-    A place is `PATH::FUNCTION` or `PATH`, either with `*`, and `**` over folders. `executed` are the lines
-    that count; None: all. MutatorError for a place where there is nothing.
+    A place is `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders. `executed` restricts the lines
+    (None: all). MutatorError for a place that matches nothing.
     """
     wanted: dict[str, dict[str, None]] = {}
     for place in places:
@@ -104,7 +106,7 @@ def _added(one: Found, other: Found) -> Found:
 
 
 def _functions(manifest: TargetManifest, place: str) -> Iterator[tuple[str, str]]:
-    """Path and qualified name of each function that a place names; never none."""
+    """Yield path and qualified name of each function that a place names; at least one."""
     path, _, function = place.partition("::")
     paths = _paths(manifest, path)
     hits = [
@@ -148,8 +150,10 @@ def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
 
 
 def sampled(found: Found, count: int | None, seed: int) -> tuple[Mutation, ...]:
-    """`count` of the mutations, in their order: of each operator in each function in proportion to its
-    number, by a systematic sample of seeded order. Each has the same chance."""
+    """`count` of the mutations, in their order, sampled in proportion from each operator in each function.
+
+    The sample is systematic over a seeded order, so each mutation has the same chance.
+    """
     total = len(found.mutations)
     if count is None or count >= total:
         return found.mutations

@@ -1,4 +1,4 @@
-"""All mutations of a function, in the order of its source."""
+"""All mutations of a function, in source order."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -16,14 +16,13 @@ from mutator.operators.names import Operator
 from mutator.operators.rules import rules_for
 
 LEFT_OUT = "left out"
-_ID = "ffffffff"  # no template of an operator writes it
+_ID = "ffffffff"  # no operator template writes it
 
 
 def mutations_of(
     file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
 ) -> list[Mutation]:
-    """What the operators make of the functions of that qualified name, in the order of the source and, at
-    one place, of the operators."""
+    """The operators' mutations of the functions with that qualified name, by place, then by operator."""
     found = list(_of_values(file, facts, function, models, operators))
     if Operator.OMISSION in operators:
         found += _omissions(file, facts, function)
@@ -61,7 +60,7 @@ def _of_values(
 
 
 def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
-    """Assignments, augmented ones and calls that stand alone on their lines, each left out."""
+    """Omissions of assignments, augmented assignments and calls that stand alone on their lines."""
     every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
     found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()
@@ -81,7 +80,7 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
         try:
             file.resolve(location)
         except MutatorError:
-            continue  # LibCST and `ast` see it in different places
+            continue  # LibCST and `ast` disagree on the place
         yield Mutation(
             operator=Operator.OMISSION,
             location=location,
@@ -94,8 +93,10 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
 
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
-    """Not the statement that binds a local name first: without it every later use of the name fails.
-    `function` is the line of the one that it is in."""
+    """False for the statement that first binds a local name: every later use of the name would fail.
+
+    `function` is the line of the function that contains it.
+    """
     if not statement.alone or statement.is_return:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]

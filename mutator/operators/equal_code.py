@@ -1,4 +1,4 @@
-"""Mutations that are none: their function compiles to the code of the original, or of another mutation."""
+"""Find mutations whose function compiles to the code of the original or of another mutation."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,8 +12,11 @@ from mutator.operators.mutations import Mutation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distinct:
-    """Mutations with code of their own, and how many had that of the original (`equal`) or of an earlier
-    mutation (`twins`), or do not compile (`invalid`)."""
+    """Mutations with distinct code.
+
+    `equal`, `twins` and `invalid` count those left out: equal to the original, equal to an earlier mutation,
+    not compiling.
+    """
 
     mutations: tuple[Mutation, ...]
     equal: int
@@ -22,14 +25,13 @@ class Distinct:
 
 
 def distinct(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct:
-    """The mutations of one file whose code, as it is while they are active, is neither the original's nor an
-    earlier one's."""
-    known: dict[range, list[object]] = {}  # what the codes of a function do, that of the original first
+    """One file's mutations whose code, while active, differs from the original's and from earlier ones'."""
+    known: dict[range, list[object]] = {}  # codes seen for a function, the original's first
     kept: list[Mutation] = []
     equal = twins = invalid = 0
     for mutation in mutations:
         function = file.outer_function(mutation.line)
-        assert function is not None  # its place is in a function
+        assert function is not None  # every place is in a function
         if function not in known:
             known[function] = [_does(file, file.lines[function.start : function.stop])]
         code = _does(file, mutated(file, function, mutation))
@@ -46,7 +48,7 @@ def distinct(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct:
 
 
 def mutated(file: ParsedFile, function: range, mutation: Mutation) -> list[bytes]:
-    """The lines of the function as if the mutation stood in its source."""
+    """The lines of the function with the mutation written into its source."""
     before, place = list(file.lines[function.start : mutation.line]), mutation.place
     if isinstance(place, Expression):
         first, last = file.lines[place.start[0]], file.lines[place.end[0]]

@@ -1,6 +1,6 @@
-"""The lines that golden runs execute: measured once for each, in a process of its own, and kept in the cache.
+"""The lines that golden runs execute, measured once per run in a separate process and cached.
 
-Noted are lines from the first observation on. What runs before it, like a constructor, is over before a fault
+Only lines from the first observation on count: what runs before, such as a constructor, ends before a fault
 can be active.
 """
 
@@ -27,7 +27,7 @@ Executed = dict[str, frozenset[int]]  # lines (from 1) by file
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenDrive:
-    """A run without a fault: its scenario's file, what that is made with, its seed."""
+    """A run without a fault: scenario file, changes, seed."""
 
     scenario: Path
     changes: tuple[str, ...]
@@ -35,8 +35,7 @@ class GoldenDrive:
 
 
 def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
-    """The lines of each drive, measured unless they are known. MutatorError for a drive that does not end
-    well."""
+    """The executed lines of each drive, measured unless cached. MutatorError if a drive fails."""
     found = [_recalled(_key(manifest, drive)) for drive in drives]
     if any(lines is None for lines in found):
         with ScratchFolder("mutator-lines-") as scratch:
@@ -55,16 +54,15 @@ def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Exec
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
         raise MutatorError(
-            f"the golden run of {drive.scenario.stem}, which tells the executed lines: {execution.detail}",
+            f"the golden run of {drive.scenario.stem}, needed to find the executed lines: {execution.detail}",
             where=engine.manifest.path,
-            expected="a run without a fault that ends well",
+            expected="a fault-free run that succeeds",
             remedy="see `mutator check --drive`",
         )
     return {file: frozenset(lines) for file, lines in execution.lines.items()}
 
 
 def _key(manifest: TargetManifest, drive: GoldenDrive) -> str:
-    """What stands for the run of a drive."""
     arguments = manifest.arguments(
         scenario=Path("scenario"), seed=drive.seed, out=Path("out"), changes=drive.changes
     )
@@ -79,7 +77,7 @@ def _recalled(key: str) -> Executed | None:
     try:
         data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
         if data["sum"] == digest([key, data["lines"]]):
-            os.utime(path)  # used now
+            os.utime(path)  # mark as used
             return {file: frozenset(lines) for file, lines in data["lines"].items()}
     except (OSError, MutatorError, ValueError, KeyError, TypeError, AttributeError):
         pass

@@ -1,4 +1,4 @@
-"""What operators need to know of a file beside its expressions: of its statements, as `ast` sees them."""
+"""What operators need to know about a file's statements, from `ast`."""
 
 import ast
 from collections.abc import Collection, Iterator
@@ -15,12 +15,13 @@ _OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Statements of a file's functions.
+    """Statements of a file's functions. Lines count from 1.
 
-    `augmented` has the operator of the augmented assignment that an expression, by its extent, is the value
-    of; `texts` the source of each statement that begins on a line; `bound` the line of the first statement
-    that binds a name of a function, which is known by the line of its `def`: a property and its setter share
-    a name. `own` are the lines of each statement without those of the statements in it. Lines count from 1.
+    * `augmented`: the operator of the augmented assignment whose value is the expression of that extent
+    * `texts`: the source of each statement that begins on a line
+    * `bound`: the line that first binds a name in a function, which is identified by its `def` line, since
+      a property and its setter share a name
+    * `own`: the lines of each statement without those of nested statements
     """
 
     augmented: dict[Extent, ast.operator] = field(default_factory=dict)
@@ -29,8 +30,7 @@ class Facts:
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
-        """All lines of the statements of which one of these lines is: a statement over several lines is
-        executed as one."""
+        """All lines of the statements that contain one of these lines: a statement executes as a whole."""
         ran = [own for own in self.own if any(line in lines for line in own)]
         return frozenset(lines).union(*ran)
 
@@ -40,7 +40,7 @@ def extent(node: ast.expr) -> Extent:
 
 
 def facts_of(tree: SourceTree, path: str) -> Facts:
-    """The facts of a file of the target, found once."""
+    """The facts of a file of the target, cached."""
     return tree.derived(path, _facts)
 
 
@@ -51,7 +51,7 @@ def _facts(path: str, data: bytes, root: Path) -> Facts:
 
 
 def _block(body: list[ast.stmt], function: int | None, facts: Facts) -> None:
-    """Statements of a function, known by its line, or of a module or class."""
+    """Add the statements of a function, known by its line, or of a module or class."""
     for statement in body:
         if function is not None:
             _statement(statement, function, facts)
@@ -88,8 +88,9 @@ def _statement(statement: ast.stmt, function: int, facts: Facts) -> None:
 
 
 def _own_nodes(statement: ast.stmt) -> Iterator[ast.AST]:
-    """The nodes of a statement without those of the statements in it, and without names that comprehensions
-    and lambdas keep to themselves."""
+    """Yield a statement's nodes without nested statements and without names local to comprehensions and
+    lambdas.
+    """
     todo: list[ast.AST] = [statement]
     while todo:
         node = todo.pop()

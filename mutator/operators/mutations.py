@@ -1,4 +1,4 @@
-"""What an operator makes of a place in a function: one mutation, which becomes one fault."""
+"""Mutations: what an operator does at a place in a function. Each becomes one fault."""
 
 from dataclasses import dataclass
 
@@ -7,8 +7,8 @@ from mutator.mutants.expressions import Expression
 from mutator.mutants.statements import Statement
 from mutator.operators.names import Operator
 
-_LONGEST = 60  # characters of either side of a change
-_AROUND = 20  # of what stays the same at either end of what differs
+_LONGEST = 60  # characters on either side of a change
+_AROUND = 20  # unchanged characters kept at either end
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -24,7 +24,7 @@ class Rule:
 class Mutation:
     """One change of a function: `was` becomes `now`, in source.
 
-    `place` is the expression whose value is another one, or the statement that is left out.
+    `place` is the expression whose value changes, or the statement that is left out.
     """
 
     operator: Operator
@@ -42,7 +42,7 @@ class Mutation:
 
     @property
     def text(self) -> str:
-        """The change in a few words: `a + b -> a - b`."""
+        """The change, abbreviated: `a + b -> a - b`."""
         was, now = " ".join(self.was.split()), " ".join(self.now.split())
         if max(len(was), len(now)) <= _LONGEST:
             return f"{was} -> {now}"
@@ -51,7 +51,7 @@ class Mutation:
         return " -> ".join(_part(text, before, after) for text in (was, now))
 
     def fault(self, reading: str) -> Fault:
-        """The fault that is this change."""
+        """The fault that makes this change."""
         injection = Injection(location=self.location, model=self.model, params=self.params)
         return Fault(
             spec=f"{OPERATORS}/{self.operator}/{self.location.path}::{self.location.function}",
@@ -66,7 +66,7 @@ class Mutation:
 
 
 def _in_common(one: str, other: str) -> int:
-    """How many characters two texts begin with that are the same."""
+    """The length of the common prefix."""
     same = 0
     while same < min(len(one), len(other)) and one[same] == other[same]:
         same += 1
@@ -74,8 +74,7 @@ def _in_common(one: str, other: str) -> int:
 
 
 def _part(text: str, before: int, after: int) -> str:
-    """What differs in a text and a little around it: without so many characters at either end, and, where it
-    is long all the same, without its middle."""
+    """The part of a text that differs, with some context; the middle of a long text is left out."""
     part = text[before : len(text) - after]
     half = _LONGEST // 2
     if len(part) > _LONGEST + 4:

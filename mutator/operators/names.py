@@ -8,11 +8,11 @@ from mutator.errors import MutatorError
 from mutator.model import OPERATORS, Fault
 
 _OWN = ("constant", "drop", "empty", "infix", "prefix", "swap")
-MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models that they use
+MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models that operators use
 
 
 class Operator(StrEnum):
-    """The mutation operators, in the order in which they claim a change that two of them make."""
+    """The mutation operators. If two make the same change, the first one claims it."""
 
     ARITHMETIC = "arithmetic"
     COMPARISON = "comparison"
@@ -24,12 +24,12 @@ class Operator(StrEnum):
 
 
 def operator_of(fault: Fault) -> Operator | None:
-    """The operator that made a fault, if one did: no spec's name has `::`."""
+    """The operator that made a fault, or None: no spec's name contains `::`."""
     return Operator(fault.fault_type) if fault.module == OPERATORS and "::" in fault.spec else None
 
 
 def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
-    """The operators of these names, each once; MutatorError for an unknown one, and for none."""
+    """The operators with these names, without duplicates; MutatorError for an unknown name, and for none."""
     known = [one.value for one in Operator]
     found: dict[Operator, None] = {}
     for name in names:

@@ -47,18 +47,22 @@ _UNCALCULATED = (ast.Yield, ast.YieldFrom)
 
 
 def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterator[Rule]:
-    """The rules that fit an expression; `augmented` is the operator of the augmented assignment whose value
-    it is, if it is one's."""
+    """The rules that fit an expression.
+
+    `augmented` is the operator of the augmented assignment whose value the expression is, if any.
+    """
     node = expression.node
     if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(node)):
-        return  # to calculate it a second time would suspend the function
+        return  # computing it twice would suspend the function
     yield from _arithmetic(node, augmented)
     yield from _comparison(node)
     for value in _constants(node):
         yield _rule(Operator.CONSTANT, "operator_constant", to=value)
     if expression.answers(AnchorKind.CONDITION, "", None):
         yield _rule(Operator.BRANCH, "operator_prefix", to="not")
-        if not any(isinstance(inner, ast.NamedExpr) for inner in ast.walk(node)):  # its name would be missing
+        if not any(
+            isinstance(inner, ast.NamedExpr) for inner in ast.walk(node)
+        ):  # or its name would be missing
             yield _rule(Operator.BRANCH, "operator_constant", to=True)
             yield _rule(Operator.BRANCH, "operator_constant", to=False)
     if expression.answers(AnchorKind.RETURN_VALUE, "", None):
@@ -87,7 +91,7 @@ def _arithmetic(node: ast.expr, augmented: ast.operator | None) -> Iterator[Rule
 
 
 def _is_number(node: ast.expr) -> bool:
-    """Whether it may be one: no text, and no container."""
+    """Whether it may be a number: not a text or container."""
     if isinstance(node, ast.Constant):
         return isinstance(node.value, int | float | complex)
     return not isinstance(node, _NO_NUMBERS)
@@ -105,7 +109,7 @@ def _comparison(node: ast.expr) -> Iterator[Rule]:
 
 
 def _constants(node: ast.expr) -> list[Value]:
-    """What a constant becomes: 0, 1, -1, one more, one less, negated, each once, as numbers of its kind."""
+    """Replacements of a constant: 0, 1, -1, one more, one less, negated; distinct, of the constant's type."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         sign, node = -1, node.operand
@@ -143,7 +147,7 @@ def _is_denied(node: ast.expr) -> bool:
 
 
 def _called(node: ast.Call) -> Iterator[Rule]:
-    """Neighbours swapped, as far as their places are known; keywords dropped."""
+    """Adjacent positional arguments swapped, and keywords dropped."""
     operator = Operator.ARGUMENT
     known = 0
     while known < len(node.args) and not isinstance(node.args[known], ast.Starred):

@@ -1,4 +1,4 @@
-"""When a fault is active: conditions over observed values, and the kinds of triggers made of them.
+"""When a fault is active: conditions over observed values, and the kinds of triggers.
 
-Which triggers a campaign uses, and what a fault does once it is active, never lives here.
+This package does not select triggers for a campaign or know what a fault does.
 """

@@ -1,8 +1,8 @@
-"""Conditions over observed values: checked, total, and never more than data.
+"""Conditions and formulas over observed values: checked, total, and pure data.
 
-A condition has one canonical text (`gap <= 2.0 and closing > 0.0`), which is what ids are made of. All
-numbers are floats, and division cannot raise, so a condition is True or False for every observation. A
-formula is a number in the same language; it can choose (`a / b if b > 0 else inf`).
+Ids are made from a condition's canonical text (`gap <= 2.0 and closing > 0.0`). All numbers are floats and
+division cannot raise, so a condition is True or False for every observation. A formula is a number in the
+same language, including choices (`a / b if b > 0 else inf`).
 """
 
 import ast
@@ -15,12 +15,12 @@ from mutator.errors import MutatorError
 
 TIME = "t"  # s; every target has it
 _FUNCTIONS = ("abs", "min", "max", "hypot")
-_OVER_TIME = ("ever", "rate")  # whether a condition has held by now; the change of a number in a second
+_OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
 _ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # at least, at most; others take two or more
-_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # no variable is called so
+_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not allowed as variables
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
-RESERVED = (*_FUNCTIONS, *_OVER_TIME, "inf", TIME)  # names in formulas that are no values of the target's
+RESERVED = (*_FUNCTIONS, *_OVER_TIME, "inf", TIME)  # names in formulas that are not the target's values
 _MAX_LENGTH = 1000
 _ALLOWED = "comparisons, and/or/not, + - * /, abs/min/max/hypot, numbers, True, and "
 
@@ -32,19 +32,21 @@ def check_condition(
     *,
     over_time: bool = False,
 ) -> str:
-    """The condition in its one canonical text, constants replaced by their numbers.
+    """Check a condition and return its canonical text, constants replaced by their numbers.
 
-    Allowed: the variables (None: any name, to be checked when the target is known), numbers, `True`,
-    comparisons, and/or/not, + - * /, abs/min/max/hypot, and `over_time` what a whole trace can answer: `ever`
-    of a condition, `rate` of a number. Anything else raises MutatorError (without place: the caller knows
-    file and line).
+    Allowed: the variables (None: any name, checked once the target is known), numbers, `True`, comparisons,
+    and/or/not, + - * /, abs/min/max/hypot, and, with `over_time`, `ever` of a condition and `rate` of a
+    number, which need a whole trace. Anything else raises MutatorError without a place; the caller knows file
+    and line.
     """
     return _checked(text, constants or {}, variables, number=False, over_time=over_time)
 
 
 def check_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
-    """The formula in its one canonical text. Allowed is what `check_condition` allows inside a comparison,
-    `inf`, and a choice: `a if CONDITION else b`. Raises as it does.
+    """Check a formula and return its canonical text; errors as in `check_condition`.
+
+    Allowed is what `check_condition` allows inside a comparison, `inf`, and a choice: `a if CONDITION else
+    b`.
     """
     return _checked(text, {}, variables, number=True, over_time=over_time)
 
@@ -60,33 +62,34 @@ def _checked(
     try:
         writer = _Writer(text, constants, variables, divide="({} / {})", over_time=over_time)
         canonical = writer.number(parse(text)) if number else writer.boolean(parse(text))
-        # what the probe is given must be readable and compile too
+        # the probe must be able to read and compile it, too
         if over_time:
             compile(canonical, "<condition>", "eval")
         else:
             _function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
-        raise _refuse("too much in one expression", text, variables, "write it shorter") from None
+        raise _refuse("an expression that is too complex", text, variables, "write it shorter") from None
     return canonical
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """The variables of a checked condition or formula, in the order in which they come."""
+    """The variables of a checked condition or formula, in order of appearance."""
     nodes = (node for node in ast.walk(parse(text)) if isinstance(node, ast.Name))
     found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
     return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))
 
 
 def to_code(text: str, *, number: bool = False) -> str:
-    """Python source of a checked condition (or formula) that cannot raise: division goes through the probe's
-    `_div`, and `math` must be there.
+    """Convert a checked condition or formula to Python source that cannot raise.
+
+    Division goes through the probe's `_div`, and `math` must be available.
     """
     writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
     return writer.number(parse(text)) if number else writer.boolean(parse(text))
 
 
 def evaluate(condition: str, values: Mapping[str, float]) -> bool:
-    """What the probe would decide for these values of the variables; those that are missing are NaN."""
+    """What the probe would decide for these values of the variables; missing ones are NaN."""
     names = names_in(condition)
     return bool(_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names)))
 
@@ -112,9 +115,9 @@ def _refuse(
     return MutatorError(f"{what} in {text!r}", expected=_ALLOWED + known, remedy=remedy)
 
 
-@lru_cache(maxsize=1024)  # those of a manifest are asked for again with each run that is judged
+@lru_cache(maxsize=1024)  # a manifest's conditions are parsed for each run that is judged
 def parse(text: str) -> ast.expr:
-    """The tree of a condition or formula, to be read only; MutatorError for what is no expression."""
+    """Parse a condition or formula into a tree that must not be changed; MutatorError for bad syntax."""
     if len(text) > _MAX_LENGTH:
         raise MutatorError(f"a condition of {len(text)} characters", expected=f"at most {_MAX_LENGTH}")
     try:
@@ -125,7 +128,9 @@ def parse(text: str) -> ast.expr:
 
 
 class _Writer:
-    """Writes a parsed condition back, refusing whatever is not on the list; booleans and numbers apart."""
+    """Writes a parsed condition back; refuses anything not on the list, and keeps booleans and numbers
+    apart.
+    """
 
     def __init__(
         self,
@@ -159,7 +164,9 @@ class _Writer:
             if len(node.args) != 1 or node.keywords:
                 raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
             return f"ever({self.boolean(node.args[0])})"
-        raise self._refuse(f"{ast.unparse(node)!r} is no truth value", "compare it with something: t <= 2.0")
+        raise self._refuse(
+            f"{ast.unparse(node)!r} is not a truth value", "compare it with something: t <= 2.0"
+        )
 
     def number(self, node: ast.expr) -> str:
         """A formula: a number, or a choice between two."""

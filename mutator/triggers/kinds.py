@@ -1,6 +1,6 @@
-"""The kinds of triggers: each makes a `Trigger` of a condition and of how long it holds.
+"""The kinds of triggers: each makes a `Trigger` from a condition and a hold.
 
-A kind is a function that makes its triggers and, if people may type it, a reader in `READERS`.
+A kind is a function that makes its triggers and, if users can type it, a reader in `READERS`.
 """
 
 import math
@@ -11,16 +11,16 @@ from mutator.errors import MutatorError
 from mutator.model import Hold, Trigger
 from mutator.triggers.conditions import check_condition
 
-ALWAYS = "always"  # the name of the trigger of a permanent fault
+ALWAYS = "always"  # the trigger of a permanent fault
 
 
 def always(*, armed_after_s: float = 0.0) -> Trigger:
-    """Fires at the first observation after arming and stays."""
+    """Fires at the first observation after arming and stays active."""
     return Trigger(name=ALWAYS, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
 def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
-    """Fires at the first step whose start is not before `time_s`; stays for `hold_s`, or to the end."""
+    """Fires at the first step that starts at `time_s` or later; stays active for `hold_s`, or to the end."""
     if not math.isfinite(time_s):
         raise MutatorError(f"time {time_s}", expected="a number of seconds")
     hold = Hold.TO_END if hold_s is None else Hold.FOR
@@ -37,9 +37,9 @@ def time_of(trigger: Trigger) -> float | None:
 
 
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
-    """A time uniform on the steps from `first_s` to `last_s` (both included), drawn from (seed, key).
+    """Draw a time from the steps from `first_s` to `last_s` (both included), uniform in (seed, key).
 
-    The result is the start of a step to nine decimals, so that it reads as one would write it.
+    The result is the start of a step, rounded to nine decimals for readability.
     """
     first, last = round(first_s / step_s), round(last_s / step_s)
     if last < first:
@@ -67,13 +67,12 @@ def _read_condition(text: str, armed_after_s: float, variables: Collection[str])
 _Reader = Callable[[str, float, Collection[str]], Trigger | None]
 
 
-# in this order; a reader returns None for what is not of its kind, and the last one raises MutatorError
+# in this order; a reader returns None for other kinds, and the last one raises MutatorError
 READERS: tuple[_Reader, ...] = (_read_always, _read_time, _read_condition)
 TYPED = "a time in s, `always`, or a condition, e.g. 't > 3'"
 
 
 def read_trigger(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
-    """The trigger that somebody typed (`TYPED`), over what the target observes; MutatorError for anything
-    else."""
+    """Parse a trigger that a user typed (`TYPED`) over observed values; MutatorError for anything else."""
     found = (reader(text, armed_after_s, variables) for reader in READERS)
     return next(trigger for trigger in found if trigger is not None)

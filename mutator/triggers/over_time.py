@@ -1,4 +1,4 @@
-"""Conditions and formulas over a whole trace: a truth value or a number for each of its steps."""
+"""Evaluate conditions and formulas over a whole trace, to a value for each step."""
 
 import ast
 from collections.abc import Mapping
@@ -28,26 +28,25 @@ _OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
 
 
 def holds(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Whether a checked condition holds, for each step; `values` has the variables, time (s) among them."""
+    """Whether a checked condition holds, for each step; `values` has the variables and the time (s)."""
     with np.errstate(all="ignore"):
         return _for_each_step(_Evaluation(values).boolean(parse(condition)), values)
 
 
 def numbers(formula: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """What a checked formula gives, for each step. Division by 0 is infinite or NaN, as the probe has it."""
+    """The value of a checked formula for each step. Division by 0 is infinite or NaN, as in the probe."""
     with np.errstate(all="ignore"):
         return _for_each_step(_Evaluation(values).number(parse(formula)), values)
 
 
 def _for_each_step(found: Any, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """An array, also of what is the same in every step."""
+    """Expand a value that is the same in every step to an array."""
     shape = values[TIME].shape
     return found if np.shape(found) == shape else np.full(shape, found)
 
 
 class _Evaluation:
-    """Walks a checked expression; everything in it is an array with a value for each step, or one value for
-    all of them."""
+    """Evaluates a checked expression; each value is an array with an entry per step, or one value for all."""
 
     def __init__(self, values: Mapping[str, np.ndarray]) -> None:
         self._values = values

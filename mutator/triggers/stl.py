@@ -1,4 +1,4 @@
-"""Signal temporal logic, as rtamt reads it: an extra (`pip install rtamt`)."""
+"""Signal temporal logic as read by rtamt, an optional package (`pip install rtamt`)."""
 
 import logging
 import re
@@ -18,38 +18,37 @@ _PLACE = re.compile(r"1:(\d+): Syntax")
 _BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
 _UNBOUNDED = ("Always", "Eventually", "Until")
 _NEXT = ("Next", "StrongNext")
-_SAME_LENGTH = 0.01  # of a step; times are sums of steps, or were rounded
+_SAME_LENGTH = 0.01  # of a step; times are sums of steps, or rounded
 
 
 def check(formula: str, variables: Collection[str], step_s: float) -> None:
-    """MutatorError for a formula that cannot be evaluated in steps of `step_s`, and where rtamt is not
-    installed."""
-    # NaN goes through any arithmetic
+    """Raise MutatorError for a formula that cannot be evaluated in steps of `step_s`, or without rtamt."""
+    # NaN passes through any arithmetic
     _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 
 
 def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
-    """The variables that a formula asks for."""
+    """The variables of a formula."""
     known = set(variables)
     return tuple(dict.fromkeys(name for name in _NAME.findall(formula) if name in known))
 
 
 def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
-    """How far each step is from violating the formula (below 0: it does).
+    """How far each step is from violating the formula (below 0: violated).
 
-    `values` has an array for each variable, and the time of each step. A formula that looks ahead tells of a
-    step once all that it looks at is there: what it says of step i stands at i + how far it looks, and `inf`
-    before. MutatorError where steps are not `step_s` long, for the logic knows steps, not times.
+    `values` has an array for each variable, and the time of each step. A formula that looks ahead is known
+    for a step once all the steps it looks at are there: its value for step i stands at i + its look-ahead,
+    with `inf` before. MutatorError if steps are not `step_s` long, since the logic counts steps, not times.
     """
     time = values[TIME]
     lengths = np.diff(time)
     uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
     if uneven.size:
         raise MutatorError(
-            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, and {formula!r} to judge it by",
+            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, to be judged by {formula!r}",
             expected=f"steps of {step_s:g} s, the manifest's `step_s`: a formula of signal temporal logic "
             "counts steps",
-            remedy="record even steps, or say the hazard with `when`",
+            remedy="record even steps, or write the hazard with `when`",
         )
     return _evaluated(formula, values, step_s)
 
@@ -58,13 +57,13 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     specification = _specification(step_s)
     formula = " ".join(formula.split())
     names, steps = names_in(formula, values), len(values[TIME])
-    # rtamt asks for two steps at least: the last is there twice, and what it says of the copy is left out
+    # rtamt needs two steps at least: the last one is doubled, and its second value dropped
     rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
     try:
         _parse(specification, formula, names)
         ahead = _ahead(specification.ast.specs[-1], specification.offline_interpreter)
         told = specification.evaluate({**rows, "time": [*range(steps + 1)]}) if steps else []
-    except Exception as error:  # of rtamt: KeyError, ValueError, its own, and whatever arithmetic raises
+    except Exception as error:  # from rtamt: KeyError, ValueError, its own, and any arithmetic error
         raise _refusal(error, formula, values, step_s) from None
     judged = [number for _, number in told[: max(0, steps - ahead)]]
     return np.array([np.inf] * min(ahead, steps) + judged, dtype=float)
@@ -75,9 +74,9 @@ def _specification(step_s: float) -> Any:
         import rtamt  # type: ignore[import-untyped]
     except ImportError:
         raise MutatorError(
-            "a formula of signal temporal logic, and no rtamt to read it",
+            "a formula of signal temporal logic, but rtamt is not installed",
             expected="the package rtamt",
-            remedy="pip install rtamt, or say it with `when`",
+            remedy="pip install rtamt, or write the condition with `when`",
         ) from None
     specification = rtamt.StlDiscreteTimeSpecification()
     specification.set_sampling_period(Fraction(step_s).limit_denominator(10**9), "s", 0.1)
@@ -90,7 +89,7 @@ def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
         specification.declare_var(name, "float")
     specification.spec = f"{_OUT} = {formula}"
     before = logging.root.manager.disable
-    logging.disable(logging.WARNING)  # rtamt warns of a name that it does not know: it is refused here
+    logging.disable(logging.WARNING)  # rtamt warns of an unknown name, which is refused here
     try:
         specification.parse()
     finally:
@@ -101,7 +100,7 @@ def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
 
 
 def _ahead(node: Any, interpreter: Any) -> int:
-    """How many steps a formula looks ahead; ValueError for one without end."""
+    """How many steps a formula looks ahead; ValueError if unbounded."""
     kind = type(node).__name__
     if kind in _UNBOUNDED:
         raise ValueError(f"unbounded {kind.lower()}")
@@ -115,19 +114,19 @@ def _ahead(node: Any, interpreter: Any) -> int:
 
 
 def _refusal(error: Exception, formula: str, variables: Collection[str], step_s: float) -> MutatorError:
-    """What rtamt says, in words for who wrote the formula."""
+    """Turn rtamt's message into one for the formula's author."""
     said = str(error).removeprefix("RTAMT Exception: ").strip()
     remedy = "correct the formula"
     if place := _PLACE.match(said):
         rest = formula[int(place[1]) - len(f"{_OUT} = ") :]
-        said = f"unexpected {rest!r}" if rest else "an end too soon"
+        said = f"unexpected {rest!r}" if rest else "an unexpected end"
     elif isinstance(error, KeyError):
         name = str(error.args[0])
         said, remedy = f"unknown name '{name}'", f"correct it{suggestion(name, [*variables])}"
     elif "unbounded" in said:
-        remedy = "say how far it looks, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
+        remedy = "bound the look-ahead, `always[0:2](x < 3)`, or look back: `historically(x < 3)`"
     elif "sampling period" in said:
-        said, remedy = f"a time that is no multiple of the step, {step_s:g} s,", "take one that is"
+        said, remedy = f"a time that is not a multiple of the step, {step_s:g} s,", "use a multiple"
     return MutatorError(
         f"{said} in {formula!r}",
         expected="a formula of signal temporal logic that looks back, or ahead for a given time, over "

@@ -1,6 +1,6 @@
-"""Conditions and formulas as JSON, for what evaluates them in another language: the report's page.
+"""Conditions and formulas as JSON, for evaluation in another language: the report's page.
 
-A number, a truth value or a name (`t` and `inf` too) stands for itself. Anything else is a list of an
+A number, a truth value or a name (also `t` and `inf`) stands for itself. Anything else is a list of an
 operator and its operands: `+ - * / neg abs hypot min max rate`, `< <= > >= == !=`, `and or not ever`, and
 `if` with a condition and two numbers.
 """
@@ -48,7 +48,7 @@ def _tree(node: ast.expr, derived: Mapping[str, str]) -> Tree:
 
 
 def _application(node: ast.expr) -> tuple[str, list[ast.expr]]:
-    """The operator of a node, and what it is of."""
+    """The operator of a node, and its operands."""
     if isinstance(node, ast.BoolOp):
         return _OPERATORS[type(node.op)], node.values
     if isinstance(node, ast.UnaryOp):

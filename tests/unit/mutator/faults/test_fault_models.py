@@ -126,7 +126,7 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
             "3: 'wrap' for 'kind'; expected one of 'insert', 'guard'",
         ),
         ("scale.yaml", "type: number", "type: float", "7: 'float' for 'type'; expected one of 'variable'"),
-        ("scale.yaml", "factor:", "left:", "7: parameter 'left'; expected none of the names that templates"),
+        ("scale.yaml", "factor:", "left:", "7: parameter 'left'; expected a name that templates do not"),
         ("scale.yaml", "factor:", "factor_m:", "7: parameter 'factor_m'; expected an identifier without"),
         (
             "wrong_branch.yaml",

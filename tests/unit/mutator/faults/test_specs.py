@@ -185,8 +185,8 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "after_assign: gap}\n          model: offset\n          unit: m\n          params: {by_m: error}",
             "assigned_value: gap}\n          model: offset\n          unit: m\n"
             "          params: {by_m: error, target: gap}",
-            "17: 'gap' for 'target' at `assigned_value`; expected none: what is anchored is what changes; "
-            "leave it out, or anchor at a statement",
+            "17: 'gap' for 'target' at `assigned_value`; expected none: the anchored expression is "
+            "what changes; leave it out, or anchor at a statement",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
@@ -221,7 +221,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
             "model: stuck\n          unit: '1'\n          params: {value: -errror}",
-            "17: '-errror' for 'value'; expected 'error', the draw, or a text that is less like it",
+            "17: '-errror' for 'value'; expected 'error', the draw, or a text that resembles it less",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
@@ -232,14 +232,14 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "          unit: m\n",
             "",
             "14: model offset without `unit`; expected the changed variable's unit, one of {KNOWN}, "
-            "or '1'; add `unit: m` (or what it is in the source) beside "
+            "or '1'; add `unit: m` (the variable's unit in the source) next to "
             "`model`",
         ),
         (
             "          unit: m\n",
             "          unit: feet\n",
             "16: unit 'feet'; expected one of {KNOWN}, or '1' "
-            "for a plain number; give the unit that the variable has in the source",
+            "for a plain number; name the variable's unit in the source",
         ),
         (
             "by_kph: -error",

@@ -228,7 +228,7 @@ def test_a_formula_of_temporal_logic(write: Write) -> None:
     assert dict(found.metrics) == {"margin_late": -1.0}  # of 1 s; what 4 s and 5 s lack was not recorded
     with pytest.raises(MutatorError, match=r"cart.yaml:20: unknown name 'speeed' in"):
         write('hazards: {LATE: {stl: "historically(speeed < 3)"}}\n')
-    with pytest.raises(MutatorError, match=r"cart.yaml:20: a time that is no multiple of the step, 1 s"):
+    with pytest.raises(MutatorError, match=r"cart.yaml:20: a time that is not a multiple of the step, 1 s"):
         write('hazards: {LATE: {stl: "historically[0:0.5](speed < 3)"}}\n')
 
 

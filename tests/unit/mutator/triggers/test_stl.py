@@ -120,13 +120,13 @@ def test_steps_of_another_length_are_refused(third: float) -> None:
 @pytest.mark.parametrize(
     ("formula", "message"),
     [
-        ("always(x < 3)", r"unbounded always in .*say how far it looks"),
+        ("always(x < 3)", r"unbounded always in .*bound the look-ahead"),
         ("once[0:1](eventually(x < 3))", "unbounded eventually"),
         ("historically(xx < 3)", r"unknown name 'xx' in .*expected .*over x, y, t.*correct it"),
         ("speeed < 3", "unknown name 'speeed'"),
-        ("x < 3 or", "an end too soon in 'x < 3 or'"),
+        ("x < 3 or", "an unexpected end in 'x < 3 or'"),
         ("(x < 3) ) and y", r"unexpected '\) and y' in"),
-        ("always[0:0.7](x < 3)", r"no multiple of the step, 0.5 s.*take one that is"),
+        ("always[0:0.7](x < 3)", r"not a multiple of the step, 0.5 s.*use a multiple"),
         ("once[2:1](x < 3)", "a time that ends before it begins"),
     ],
 )
