@@ -2,21 +2,21 @@
 
 A target's entry module is a class that builds the loop and simulates one step of it, and two lines:
 
-from mutator.glue import Run
+    from mutator.glue import Run
 
-class Drive(Run):
-    def __init__(self, scenario, seed):
-        super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
-        self.cart, self.controller = Cart(scenario["speed_mps"]), Controller()
+    class Drive(Run):
+        def __init__(self, scenario, seed):
+            super().__init__(step_s=0.02, duration_s=scenario["duration_s"])
+            self.cart, self.controller = Cart(scenario["speed_mps"]), Controller()
 
-    def step(self):
-        distance = self.cart.distance()
-        force = self.controller.update(distance)
-        self.cart.advance(force)
-        self.record(distance=distance, force=force)
+        def step(self):
+            distance = self.cart.distance()
+            force = self.controller.update(distance)
+            self.cart.advance(force)
+            self.record(distance=distance, force=force)
 
-if __name__ == "__main__":
-    Drive.main()
+    if __name__ == "__main__":
+        Drive.main()
 
 The manifest says `entry: {module: drive, stepwise: Drive.open}`. This module runs in the target's process, so
 it imports only the standard library and numpy.

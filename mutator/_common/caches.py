@@ -28,8 +28,8 @@ TARGET_BYTES = 4_000_000_000  # limit for one target, enforced between seeds
 class Entry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is its
-    size on disk in bytes, `used` its last use in seconds since the epoch.
+    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is
+    its size on disk in bytes, `used` its last use in seconds since the epoch.
     """
 
     what: str
@@ -62,7 +62,7 @@ def of_checks() -> Path:
 
 
 def of_goldens() -> Path:
-    """Where a worker of a cluster keeps the golden runs that it drove."""
+    """The folder of golden runs that a cluster worker ran."""
     return folder() / GOLDENS
 
 
