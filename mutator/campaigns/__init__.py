@@ -1,4 +1,4 @@
 """From a campaign file to its frozen plan: experiments, sampling, filters, chunks, provenance.
 
-Nothing here runs an experiment or judges one.
+This package does not run or judge experiments.
 """

@@ -1,4 +1,4 @@
-"""Campaign files: which faults, in which scenarios, under which triggers, within which limits."""
+"""Campaign files: faults, scenarios, triggers and limits of a campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -24,11 +24,10 @@ _Told = TypeVar("_Told")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """Faults taken from the library: specs by glob over `<module>/<fault_type>/<variant>`; or `file`, a spec
-    file, whole; or mutants of `operators`, and no spec.
+    """A selection of faults: specs by glob over `<module>/<fault_type>/<variant>`, a spec `file`, or
+    `operators`.
 
-    `values` is how many of a variant's values are taken, spread evenly over them in the order of the spec
-    (None: all).
+    `values` is how many of a variant's values are taken, spread evenly in spec order (None: all).
     """
 
     spec: str
@@ -52,18 +51,18 @@ class Canary:
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """A campaign file, checked. Times are seconds of simulation; `source` is the file as it was read.
+    """A checked campaign file. Times are seconds of simulation; `source` is the file as read.
 
-    `sample` is how many experiments are taken: each variant as often, or, with `proportional`, each fault
-    type in each scenario in proportion to its number, guided and random ones in pairs.
-    `study` names the published work that reports of the campaign stand beside (None: none).
-    `setting_in(reading)` names changes of the manifest that every run of the campaign is made with.
-    `reading` is None for the library's default. Before `armed_after(reading)` no trigger fires and no random
-    time is drawn; None: as the target's manifest says. Triggers are those of the context table `table`, or
-    `listed`.
-    It is made with each of its `seeds`.
-    `hold_s` is how long a fault stays active once triggered (None: while its context holds, or from its
-    random time to the end). `after_hazard` says whether runs end at their first terminal hazard.
+    * `sample`: how many experiments are taken, equally per variant; with `proportional`, in pairs, in
+      proportion to the number of each fault type and scenario
+    * `study`: the published work that reports compare with (None: none)
+    * `setting_in(reading)`: manifest changes of every run
+    * `reading`: None for the library's default
+    * `armed_after(reading)`: no trigger fires and no random time is drawn before it; None: as in the manifest
+    * `table`, `listed`: the triggers, from a context table or a list
+    * `seeds`: the campaign is repeated with each
+    * `hold_s`: how long a triggered fault stays active (None: while its context holds, or to the end)
+    * `after_hazard`: whether runs end at their first terminal hazard
     """
 
     name: str
@@ -98,15 +97,15 @@ class Campaign:
         return self.seeds[0]
 
     def armed_after(self, reading: str) -> float | None:
-        """When triggers are armed under a reading; None: the campaign does not say."""
+        """When triggers are armed under a reading; None if the campaign does not say."""
         return _in(self.armed_after_s, reading) if self.armed_after_s else None
 
     def setting_in(self, reading: str) -> tuple[str, ...]:
-        """The changes of the manifest under a reading."""
+        """The manifest changes under a reading."""
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """Where in the file they stand."""
+        """Their position in the file."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
@@ -119,9 +118,9 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file strictly; MutatorError with file and line for anything wrong with it.
+    """Read a campaign file strictly; MutatorError with file and line for any mistake.
 
-    Whether its study can be had is asked by `load_study` alone: old runs open without it.
+    Only `load_study` checks that its study is available, so old runs open without it.
     """
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)
@@ -177,12 +176,12 @@ def _operators(item: SelectionModel) -> OperatorSelection | None:
 def _seeds(model: CampaignModel) -> range:
     if model.seeds is not None:
         return range(model.seeds.from_, model.seeds.to + 1)
-    assert model.seed is not None  # the model has one of the two
+    assert model.seed is not None  # the model requires one of the two
     return range(model.seed, model.seed + 1)
 
 
 def _check_once(model: CampaignModel, source: Source) -> None:
-    """No scenario, method or change of a setting stands twice."""
+    """Check that no scenario, method or change of a setting appears twice."""
     settings: dict[Keys, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
@@ -199,12 +198,12 @@ def _check_once(model: CampaignModel, source: Source) -> None:
 
 
 def _spec_file(campaign: Path, spec: str) -> Path | None:
-    """The spec file that a selection names; None: it names specs of the library."""
+    """The spec file that a selection names; None if it names specs of the library."""
     return campaign.parent / spec if spec.endswith((".yaml", ".yml")) else None
 
 
 def load_study(campaign: Campaign) -> Study | None:
-    """The study that a campaign asks for, if any; MutatorError with file and line if it cannot be had."""
+    """The study that a campaign names, or None; MutatorError with file and line if it is unavailable."""
     if campaign.study is None:
         return None
     try:
@@ -216,8 +215,7 @@ def load_study(campaign: Campaign) -> Study | None:
 
 
 def check_readings(campaign: Campaign, readings: Readings) -> None:
-    """MutatorError with file and line for a reading that the library does not declare, or for one that
-    `armed_after_s` or `setting` leaves out."""
+    """Raise MutatorError for an undeclared reading, or one that `armed_after_s` or `setting` omits."""
     known = ", ".join(readings.names)
     remedy = f"correct the name, or declare the reading in the library's {FILE}"
     if campaign.reading is not None and campaign.reading not in readings.names:

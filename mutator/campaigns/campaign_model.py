@@ -1,4 +1,4 @@
-"""The shape of a campaign file, as it is written."""
+"""The schema of a campaign file."""
 
 from typing import Annotated
 
@@ -18,8 +18,7 @@ from mutator.operators.names import Operator
 
 
 class SelectionModel(StrictModel, title="A selection"):
-    """Faults of the library, by the names of their specs, or of a spec file; or, without a spec, mutants of
-    `operators`."""
+    """Faults of the library by the names of their specs, faults of a spec file, or mutants of `operators`."""
 
     spec: str | None = Field(
         None,
@@ -39,17 +38,17 @@ class SelectionModel(StrictModel, title="A selection"):
         None,
         alias="in",
         min_length=1,
-        description="Of operators: where, `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders.",
+        description="With operators: where, `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders.",
     )
     sample: int | None = Field(
         None,
         ge=1,
-        description="Of operators: how many mutants, drawn by operator and function; without it, all.",
+        description="With operators: how many mutants, drawn by operator and function; without it, all.",
     )
     when: list[Annotated[When, Field(strict=False)]] | None = Field(
         None,
         min_length=1,
-        description="Of operators: `permanent` (under the trigger `always`), `transient` (under the "
+        description="With operators: `permanent` (under the trigger `always`), `transient` (under the "
         "campaign's other triggers) or, without it, both.",
     )
 
@@ -69,15 +68,15 @@ _NAMES = {"type": "array", "items": {"type": "string"}}
 
 
 class _CanaryModel(StrictModel, title="The canary"):
-    """A fault known to be harmful. It must reach its hazard, or the campaign does not start."""
+    """A fault known to be harmful. The campaign starts only if it reaches its hazard."""
 
     spec: str = Field(
         description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken, "
         "then the others until one does harm."
     )
     scenario: str = Field(description="The scenario.")
-    hazard: str = Field(description="The hazard that must come.")
-    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="From when on the fault is active.")
+    hazard: str = Field(description="The hazard that it must reach.")
+    at_s: float = Field(ge=0.0, allow_inf_nan=False, description="The time from which the fault is active.")
 
 
 class _LimitsModel(StrictModel, title="Limits"):
@@ -96,10 +95,10 @@ class _LimitsModel(StrictModel, title="Limits"):
 
 
 class SeedsModel(StrictModel, title="Seeds"):
-    """The campaign is repeated with each of these seeds, as if each were its `seed`."""
+    """The campaign is repeated with each of these seeds."""
 
     from_: int = Field(alias="from", ge=0, lt=2**63, description="The first seed.")
-    to: int = Field(ge=0, lt=2**63, description="The last one, which counts, too.")
+    to: int = Field(ge=0, lt=2**63, description="The last seed (included).")
 
     @model_validator(mode="after")
     def _check(self) -> "SeedsModel":
@@ -109,7 +108,7 @@ class SeedsModel(StrictModel, title="Seeds"):
 
 
 class CampaignModel(StrictModel, title="The file"):
-    """What is run, and what each run may use."""
+    """What to run, and what each run may use."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$", description="Its name: small letters, digits and `_`.")
     about: str = Field(description="What it is for.")
@@ -122,7 +121,7 @@ class CampaignModel(StrictModel, title="The file"):
         dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
     ] = Field(
         {EVERY_READING: []},
-        description="Changes of the manifest that every run is made with, fault-free ones included: one "
+        description="Changes of the manifest for every run, including fault-free ones: one "
         "list, or one for each reading by its name.",
     )
     faults: list[SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
@@ -140,7 +139,7 @@ class CampaignModel(StrictModel, title="The file"):
     sample: int | None = Field(
         None,
         ge=1,
-        description="How many experiments are taken, each variant as often as another; without it, all.",
+        description="How many experiments are taken, equally per variant; without it, all.",
     )
     proportional: bool = Field(
         False,
@@ -151,25 +150,25 @@ class CampaignModel(StrictModel, title="The file"):
         None,
         ge=0,
         lt=2**63,
-        description="The seed of all that is drawn; `--seed` overrides it. Either this or `seeds`.",
+        description="The seed of all draws; `--seed` overrides it. Give either this or `seeds`.",
     )
     seeds: SeedsModel | None = Field(
         None,
         description="Several seeds: the campaign is repeated with each, `sample` included. `--seed` takes "
         "one seed instead.",
     )
-    canary: _CanaryModel = Field(description="The check that a known fault does harm.")
+    canary: _CanaryModel = Field(description="The check that a known fault causes a hazard.")
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
         description="`stop` ends each faulty run at its first [terminal hazard](../explanation/verdicts.md"
-        "#the-end-of-the-drive), which saves time; later hazards and alerts are then not seen.",
+        "#the-end-of-the-drive), which saves time; later hazards and alerts are then not observed.",
     )
     limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
     chunk: int = Field(
         20,
         ge=1,
         le=1000,
-        description="How many experiments make a unit of work, which a worker takes at a time.",
+        description="How many experiments a worker takes at a time.",
     )
 
     @model_validator(mode="after")

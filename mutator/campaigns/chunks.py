@@ -1,4 +1,4 @@
-"""Chunks: what one pytest item runs. Cut when a plan is frozen; what is left of them is found on a start."""
+"""Chunks: the work of one pytest item. They are cut when a plan is frozen."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,8 +11,10 @@ from mutator.store.run_folder import RunFolder
 
 
 def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
-    """Lengths of the chunks of a plan: at most `size` experiments each, none across two neighbouring groups
-    (a group shares a golden run, so an engine can share work within a chunk)."""
+    """Lengths of a plan's chunks: at most `size` experiments each, within one of the neighbouring groups.
+
+    A group shares a golden run, so an engine can share work within a chunk.
+    """
     lengths: list[int] = []
     for i, group in enumerate(groups):
         if i and group == groups[i - 1] and lengths[-1] < size:
@@ -23,8 +25,7 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
 
 
 def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
-    """Experiments of each chunk, when the plan is cut into chunks of at most `size` runs: a run that several
-    experiments share stays whole."""
+    """Experiments per chunk, for chunks of at most `size` runs; a shared run stays whole."""
     lengths = iter([len(same) for same in runs])
     counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
     return tuple(sum(islice(lengths, count)) for count in counts)
@@ -32,15 +33,16 @@ def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """What is left of one chunk: its index, and the places within it that lack a record."""
+    """The rest of one chunk: its index, and the positions in it without a record."""
 
     chunk: int
     places: tuple[int, ...]
 
 
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
-    """Every chunk of the folder's share that has experiments without a record, or with a harness error,
-    which is tried again."""
+    """Chunks of the folder's share with experiments that have no record or a harness error, which is tried
+    again.
+    """
     done = {one.experiment_id for one in endings(records) if one.counts}
     names = plan_file.ids(folder.path) if done else None
     shard = folder.shard

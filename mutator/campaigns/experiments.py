@@ -1,4 +1,4 @@
-"""From a campaign to its experiments: faults selected and expanded, triggers made, random times drawn."""
+"""From a campaign to its experiments: select and expand faults, make triggers, draw random times."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -24,11 +24,11 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.kinds import always, at_time, draw_time
 from mutator.workspace import Workspace
 
-_Numbered = tuple[int, Fault]  # a fault and its place among the values of its variant
+_Numbered = tuple[int, Fault]  # a fault and its position among its variant's values
 
 
 class Expansion:
-    """Everything a campaign's experiments are made of, for one seed and one reading."""
+    """Everything that a campaign's experiments are made from, for one seed and one reading."""
 
     def __init__(
         self, workspace: Workspace, campaign: Campaign, manifest: TargetManifest, seed: int, reading: str
@@ -46,7 +46,7 @@ class Expansion:
         self._operators = OperatorFaults(manifest, self._models, campaign.limits)
 
     def with_seed(self, seed: int) -> "Expansion":
-        """The same with another seed; files that were read are not read again."""
+        """The same with another seed, without reading files again."""
         other = copy(self)
         other.seed = seed
         return other
@@ -57,7 +57,9 @@ class Expansion:
         return tuple(self._operators.told)
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """All of them, runs of the same scenario and changes side by side (they share a golden run)."""
+        """All experiments; those with the same scenario and changes are adjacent, as they share a golden
+        run.
+        """
         self._check_setting()
         faults = self._selected()
         mutants = self._mutants()
@@ -74,7 +76,7 @@ class Expansion:
         return tuple(experiment for _, experiment in made)
 
     def canary(self) -> Experiment:
-        """The campaign's canary: the variant's largest value from a given time on."""
+        """The canary: the variant's largest value from a given time on."""
         canary = self.campaign.canary
         if canary.hazard not in self.manifest.hazards:
             raise self.campaign.error(
@@ -109,12 +111,12 @@ class Expansion:
         return self._expanded(self._specs[0])
 
     def _files(self) -> dict[int, list[_Numbered]]:
-        """The faults of the spec files that the campaign names, by the places of its selections."""
+        """The faults of the spec files that the campaign names, by selection."""
         files = {i: one.file for i, one in enumerate(self.campaign.faults) if one.file is not None}
         return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
 
     def _spec_of_file(self, keys: Keys, file: Path) -> FaultSpec:
-        """The spec of a file, which has no other one's name."""
+        """The spec in a file; its name must differ from those of the library."""
         if not file.is_file():
             raise self.campaign.error(
                 keys,
@@ -127,14 +129,13 @@ class Expansion:
         if known.exists() and not known.samefile(file):
             raise self.campaign.error(
                 keys,
-                f"{file.name} is called {spec.name}, as a spec of the library is",
-                expected="a name of its own",
+                f"{file.name} has the name {spec.name} of a spec in the library",
+                expected="a unique name",
                 remedy="change `fault_type` in the file",
             )
         return spec
 
     def _expanded(self, specs: Iterable[FaultSpec]) -> list[_Numbered]:
-        """Every fault of these specs with its number within its variant."""
         numbered: list[_Numbered] = []
         for spec in specs:
             seen: dict[str, int] = {}
@@ -162,7 +163,7 @@ class Expansion:
         return list(selected.values())
 
     def _mutants(self) -> list[OperatorFault]:
-        """The mutants of operators, each once; one of several selections is active when any of them says."""
+        """The mutants of operators without duplicates; active whenever one of several selections says so."""
         found: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.faults):
             if selection.operators is not None:
@@ -189,14 +190,15 @@ class Expansion:
         fits = any(fnmatchcase(fault.spec, whole) for _, fault in library)
         return self.campaign.error(
             keys,
-            f"no fault in the library is named like '{pattern}'",
+            f"no fault in the library matches '{pattern}'",
             expected="<module>/<fault_type>/<variant>, with * for any text",
             remedy=f"write '{whole}' for all its variants" if fits else "see `mutator list`",
         )
 
     def _triggers(self) -> tuple[Trigger, ...]:
-        """One for each row of the context table, or those listed; random times are drawn for the same ones,
-        as their pairs."""
+        """The triggers of the context table or the list; random times are drawn for the same ones, as
+        pairs.
+        """
         if self.campaign.table is None:
             return listed_triggers(
                 self.campaign.listed,
@@ -225,7 +227,9 @@ class Expansion:
     def _of_operators(
         self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
-        """Permanent ones always, transient ones under the other triggers, in scenarios that come to them."""
+        """Permanent mutants always, transient ones under the other triggers, in scenarios that execute
+        them.
+        """
         permanent = always(armed_after_s=self.armed_after_s)
         for one in mutants:
             if scenario not in one.scenarios:
@@ -239,14 +243,15 @@ class Expansion:
                         yield made
 
     def _trigger(self, method: Method, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
-        """What a method makes of a context row for one fault."""
         if method is Method.RANDOM:
             return self._random(scenario, fault, number, row)
         return row
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
-        """The random partner of a row's trigger, the same in every reading but for when times begin."""
-        assert self.campaign.random_until_s is not None  # the file has it where times are random
+        """The random partner of a row's trigger, the same in every reading except for the first possible
+        time.
+        """
+        assert self.campaign.random_until_s is not None  # the file requires it for random times
         time = draw_time(
             self.seed,
             f"{scenario}/{fault.spec}/{number}/{row.name}",
@@ -275,7 +280,7 @@ class Expansion:
 
     def _scenario_file(self, scenario: str) -> Path:
         known = self.workspace.scenarios
-        if scenario not in known:  # a file from anywhere could change, or be another one elsewhere
+        if scenario not in known:  # a file elsewhere could change or differ on another machine
             raise self.campaign.error(
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
@@ -286,7 +291,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """An unknown name is reported at the campaign's `keys`; mistakes in other files stay there."""
+        """Report an unknown name at the campaign's `keys`; mistakes in other files keep their place."""
         try:
             yield
         except MutatorError as err:

@@ -29,11 +29,11 @@ _ALLOWED = (
 
 
 def compile_filter(text: str, columns: Collection[str]) -> Predicate:
-    """A predicate over rows.
+    """Compile a filter into a predicate over rows.
 
-    Allowed: the columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`, and/or/not,
-    parentheses, `match(column, "glob*")`. An empty cell is equal to nothing but `None`, and neither less nor
-    greater than anything. MutatorError shows the text, what is wrong with it and the known columns.
+    Allowed: columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`, and/or/not,
+    parentheses, `match(column, "glob*")`. An empty cell equals only `None`, and is neither less nor greater
+    than anything. MutatorError shows the text, the mistake and the known columns.
     """
     if len(text) > _LONGEST:
         raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")
@@ -50,7 +50,7 @@ def _error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError
 
 
 class _Compiler:
-    """Turns the nodes of one expression into closures."""
+    """Compiles the nodes of one expression into closures."""
 
     def __init__(self, text: str, columns: Collection[str]) -> None:
         self.text = text

@@ -1,4 +1,4 @@
-"""A plan becomes a run folder: frozen, with what it was made from, so that it is run as it was planned."""
+"""Freeze a plan into a run folder, together with its sources."""
 
 import csv
 import io
@@ -34,20 +34,20 @@ from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
-_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # what a killed freeze leaves
+_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # left by a killed freeze
 
 
 def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
     """Write the plan (and plan.csv) into the run folder `out`, made if missing.
 
-    A folder that holds the same plan is left as it is; another plan, or other sources than it was frozen
-    with, is a MutatorError, as is a folder in use or one that holds other things.
+    A folder with the same plan is left unchanged. MutatorError for another plan, changed sources, a folder in
+    use, or other content.
     """
     return freeze_and_tell(plan, out, workspace)[0]
 
 
 def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
-    """As `freeze`; also what the plan comes to."""
+    """As `freeze`; also returns the plan's totals."""
     is_new = not out.exists()
     make_run_folder(out)
     try:
@@ -60,7 +60,7 @@ def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> t
 
 
 def make_run_folder(out: Path) -> None:
-    """Make `out` unless it is a run folder; MutatorError when it holds anything else."""
+    """Make `out` unless it is a run folder; MutatorError if it holds anything else."""
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
         strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
@@ -76,7 +76,7 @@ def make_run_folder(out: Path) -> None:
 
 
 def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
-    """As `freeze_and_tell`, by who owns the folder already."""
+    """As `freeze_and_tell`, for the folder's owner."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
         tally, found = _counted(plan)
@@ -93,12 +93,12 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
     tally, found, places, files = _written(plan, out)
     head = json_bytes(_head(plan, tally, found, workspace, places))
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
-    write_atomic(out / HEAD, head)  # last: from now on it is a run folder
+    write_atomic(out / HEAD, head)  # last: this makes it a run folder
     return RunFolder.open(out), tally
 
 
 def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: None) -> tuple[Tally, str]:
-    """What a plan comes to, and its digest; `each` is called with each part of it."""
+    """A plan's totals and digest; `each` is called with each part."""
     tally, made = plan.empty_tally(), PlanDigest()
     for part in plan.parts():
         tally.add(part)
@@ -109,8 +109,7 @@ def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: 
 
 
 def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, Digest]]:
-    """Write the plan's files part by part: what it comes to, its digest, where the chunks are, and what each
-    file is."""
+    """Write the plan's files part by part; returns totals, digest, chunk positions and file digests."""
     plan_file.make_folder(out)
     write_atomic(out / CAMPAIGN, plan.campaign.source)
     with ExitStack() as stack:
@@ -184,7 +183,7 @@ def _head(
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
-    """The rows of experiments in plan.csv, after the line with the names of its columns or without."""
+    """The rows of experiments in plan.csv, with or without column names."""
     writer = csv.writer(text := io.StringIO(), lineterminator="\n")
     if head:
         writer.writerow(PLAN_COLUMNS)
@@ -194,5 +193,5 @@ def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes
 
 
 def plan_csv(plan: Plan) -> bytes:
-    """What plan.csv holds."""
+    """The content of plan.csv."""
     return csv_bytes(plan.experiments, head=True)

@@ -1,4 +1,6 @@
-"""What computes here: Python, operating system, processor, BLAS, packages; and the state of git clones."""
+"""What a run computes with: Python, operating system, processor, BLAS, packages; and the state of git
+clones.
+"""
 
 import json
 import os
@@ -23,13 +25,13 @@ _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threa
 
 
 def surroundings() -> list[Any]:
-    """All that may change what a run of the target computes, apart from its sources: any of the installed
-    packages may be the target's."""
+    """Everything except its sources that may change what a target computes, including all installed
+    packages.
+    """
     return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
 
 
 def python() -> str:
-    """`CPython 3.11.7`."""
     return f"{platform.python_implementation()} {platform.python_version()}"
 
 
@@ -44,14 +46,16 @@ def cpu() -> str | None:
 
 
 def threads() -> dict[str, str]:
-    """How many threads the environment of the target's process allows numerical libraries."""
+    """The thread limits for numerical libraries in the target's environment."""
     return dict.fromkeys(THREADS, "1")
 
 
 @lru_cache(maxsize=1)
 def blas() -> tuple[dict[str, Any], ...]:
-    """The BLAS that numpy loads in an environment like that of the target's process: `library`, `version`,
-    `kernel` that it chose for this processor, `threads`. Nothing where there is no numpy."""
+    """The BLAS that numpy loads in the target's environment; empty without numpy.
+
+    `library`, `version`, `threads`, and the `kernel` chosen for this processor.
+    """
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-P", "-s", "-c", _BLAS],
@@ -67,7 +71,9 @@ def blas() -> tuple[dict[str, Any], ...]:
 
 @lru_cache(maxsize=1)
 def _installed() -> dict[str, tuple[str, list[str]]]:
-    """Version and requirements of each installed package; of one installed twice, of what is imported."""
+    """Version and requirements of each installed package; of one installed twice, those of the imported
+    one.
+    """
     found: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
         told = distribution.metadata
@@ -85,8 +91,10 @@ def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
 
 
 def required() -> frozenset[str]:
-    """The packages that mutator needs to run, with those that they need. Where mutator is not installed, and
-    so says of none, every installed one."""
+    """The packages that mutator needs, with their dependencies.
+
+    If mutator is not installed, so that its needs are unknown, all installed packages.
+    """
     installed = _installed()
     seen: set[tuple[str, str]] = set()
     waiting = [("mutator", "")]
@@ -102,16 +110,17 @@ def required() -> frozenset[str]:
 
 
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
-    """The packages that these top-level modules come from, sorted; modules of none are left out."""
+    """The packages that provide these top-level modules, sorted; others are left out."""
     providers = metadata.packages_distributions()
-    # of a package that is installed as a link to its sources only its own name may be known
+    # a package installed as a link to its sources may be known only by its own name
     names = (name for module in modules for name in providers.get(module, [module]))
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
 
 
 def clone_state(folder: Path) -> dict[str, Any] | None:
-    """`commit` of the git clone that has this folder, and whether anything in the folder was `changed` since;
-    None without git, and for a folder that no commit has."""
+    """`commit` of the git clone of this folder, and whether the folder has `changed` since; None if
+    unknown.
+    """
     head = git(folder, "rev-parse", "HEAD", "HEAD:./")
     changes = git(folder, "status", "--porcelain", "--", ".")
     if head is None or changes is None:
@@ -120,7 +129,7 @@ def clone_state(folder: Path) -> dict[str, Any] | None:
 
 
 def git(folder: Path, *words: str) -> str | None:
-    """What git says in a folder; None when it cannot."""
+    """The output of a git command in a folder; None if it fails."""
     outside = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "--no-optional-locks", "-C", str(folder), *words]
     try:

@@ -1,5 +1,4 @@
-"""What a campaign takes of mutation operators: the faults of one selection, where they are driven, and when
-they are active."""
+"""The faults that a campaign takes from mutation operators, with their scenarios and activation."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,17 +25,17 @@ class OperatorFault:
 
 
 class OperatorFaults:
-    """The faults of selections, for any seed; what was enumerated is kept for the next one."""
+    """The faults of selections, for any seed; enumerations are kept for the next seed."""
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
         self._found: dict[tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], Found] = {}
-        self.told: dict[str, None] = {}  # how many there were and what was left out, each text once
+        self.told: dict[str, None] = {}  # how many there were and what was left out, without duplicates
 
     def of(
         self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str
     ) -> list[OperatorFault]:
-        """The faults of a selection, driven in these scenarios. MutatorError where there are none."""
+        """The faults of a selection in these scenarios. MutatorError if there are none."""
         executed = dict(
             zip(drives, lines_of(self._manifest, list(drives.values()), self._limits), strict=True)
         )

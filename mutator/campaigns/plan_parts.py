@@ -1,4 +1,4 @@
-"""Plans in parts, a part for each seed: what is counted and hashed of a plan needs one part at a time."""
+"""Plans in parts, one per seed, so that counting and hashing need only one part at a time."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.model import Experiment, Fault
 from mutator.store.run_folder import GoldenRun
 
-# First part of every plan digest. Digests are cited, so this text stays whatever becomes of the run schema.
+# Start of every plan digest. Digests are cited, so this text never changes, whatever the run schema.
 _DIGEST_PREFIX = "run/1"
 
 Group = tuple[str, str, str]  # module, fault type, method
@@ -18,8 +18,9 @@ Group = tuple[str, str, str]  # module, fault type, method
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """Experiments in the order they are run, the lengths of their chunks, and how many runs they take: one
-    that several scenarios have in common is run once."""
+    """Experiments in run order, the lengths of their chunks, and the number of runs; scenarios may share a
+    run.
+    """
 
     experiments: Sequence[Experiment]
     chunks: Sequence[int]
@@ -28,8 +29,10 @@ class Part:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """What is known of a plan once all its parts were added. With `several_seeds` each has golden runs of its
-    own. `variants` has a fault of each."""
+    """Totals of a plan once all its parts were added.
+
+    With `several_seeds` each seed has its own golden runs. `variants` has one fault per variant.
+    """
 
     canary: Experiment
     several_seeds: bool
@@ -51,13 +54,13 @@ class Tally:
             self.variants[fault.spec] = fault
 
     def needed(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that is needed, the canary's included."""
+        """Every fault-free run needed, including the canary's."""
         own = GoldenRun.of(self.canary, several_seeds=self.several_seeds)
         return tuple(dict.fromkeys((*self.goldens, own)))
 
 
 class PlanDigest:
-    """The digest that follows from ids and chunks of the experiments, the canary's id, and the campaign."""
+    """The digest of the ids and chunks of the experiments, the canary's id, and the campaign."""
 
     def __init__(self) -> None:
         self._hash = sha256(f"[{canonical(_DIGEST_PREFIX)},[".encode())
@@ -70,14 +73,14 @@ class PlanDigest:
             self._joint = ","
 
     def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-        """The digest, once all were added."""
+        """The digest, once all ids were added."""
         rest = [chunks, canary, plain(campaign.canary), plain(campaign.limits)]
         self._hash.update(f"],{canonical(rest)[1:]}".encode())
         return self._hash.hexdigest()
 
 
 def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-    """The digest of a plan with these ids, chunks, and id of the canary."""
+    """The digest of a plan with these ids, chunks, and canary id."""
     made = PlanDigest()
     made.add(ids)
     return made.end(chunks, canary, campaign)

@@ -1,4 +1,4 @@
-"""What a plan warns of: experiments that can show nothing."""
+"""Warn of experiments that can show nothing."""
 
 import warnings
 from collections.abc import Sequence
@@ -12,7 +12,7 @@ _NAMED = 3  # faults that a warning names
 
 
 class IdleValues:
-    """Faults whose value changes nothing, with how many experiments have one."""
+    """Faults whose value changes nothing, with the number of their experiments."""
 
     def __init__(self, models: FaultModels) -> None:
         self._models = models
@@ -20,7 +20,7 @@ class IdleValues:
         self._count = self._of = 0
 
     def add(self, experiments: Sequence[Experiment]) -> None:
-        """Look at more experiments."""
+        """Check more experiments."""
         faults = {experiment.fault.id: experiment.fault for experiment in experiments}
         idle = {name: fault for name, fault in faults.items() if changes_nothing(fault, self._models)}
         self._labels += [fault.label for fault in idle.values()]
@@ -28,7 +28,7 @@ class IdleValues:
         self._of += len(experiments)
 
     def warn(self) -> None:
-        """A MutatorWarning, if there are any."""
+        """Issue a MutatorWarning if there are any."""
         if labels := list(dict.fromkeys(self._labels)):
             more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
             warnings.warn(
@@ -40,5 +40,5 @@ class IdleValues:
 
 
 def changes_nothing(fault: Fault, models: FaultModels) -> bool:
-    """Whether a fault leaves everything as it is, with the value that it has."""
+    """Whether a fault with its value changes nothing."""
     return all(models.get(one.model).changes_nothing(dict(one.params)) for one in fault.injections)

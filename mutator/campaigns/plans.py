@@ -1,4 +1,4 @@
-"""Plans: the frozen, ordered list of a campaign's experiments, and what running them will take."""
+"""Plans: the frozen, ordered list of a campaign's experiments, and the cost of running them."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -34,22 +34,22 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
-RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario and its changes
-_DEFAULT_CPU_S = 1.4  # one run on the reference engine, interpreter start included
+RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario with its changes
+_DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter start
 _START_S = 3.0  # of a campaign, before and after its runs
 _BYTES_PER_EXPERIMENT = 9_000  # its series, patch, record and rows
 _BYTES_PER_GOLDEN = 1_200_000
-_IN_MEMORY = 50_000  # experiments at most of a plan that is read as a whole
+_IN_MEMORY = 50_000  # the largest plan that is read as a whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choices:
-    """What was chosen on top of the campaign file; None: as the file says.
+    """Options on top of the campaign file; None: as in the file.
 
-    `only` and `exclude` are filter expressions (`mutator.campaigns.filters`) over the columns known before
-    running; `limit` keeps that many experiments, spread as a campaign's `sample` but guided and random ones
-    in pairs; `shard` (`k/n`) is the share of the plan that its run folder will run; `series_mb` is the budget
-    of its series, 0 for none.
+    * `only`, `exclude`: filters (`mutator.campaigns.filters`) over the columns known before running
+    * `limit`: how many experiments are kept, spread like a campaign's `sample`, but in pairs
+    * `shard` (`k/n`): the share of the plan that the run folder runs
+    * `series_mb`: the budget of its series, 0 for none
     """
 
     seed: int | None = None  #: seed of the sample, of drawn values and of random triggers
@@ -73,9 +73,9 @@ class Choices:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """Expected cost of running a plan: one core's seconds, wall seconds on `workers`, bytes on disk.
+    """Expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk.
 
-    `measured` says whether the rate was measured (goldens of this run folder) or is a default.
+    `measured` says whether the rate was measured by this run folder's golden runs or is a default.
     """
 
     cpu_s: float
@@ -87,10 +87,10 @@ class Cost:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plan:
-    """Experiments in the order they are run, and how they are cut into chunks (lengths, in order).
+    """Experiments in run order, and the lengths of their chunks.
 
-    `runs` is how many runs they take: one that several scenarios have in common is run once.
-    `run_cpu_s` is the measured CPU time of one run, if there is one.
+    `runs` is the number of runs; scenarios may share one. `run_cpu_s` is the measured CPU time of one run, if
+    known.
     """
 
     campaign: Campaign  #: the campaign file, read
@@ -116,18 +116,18 @@ class Plan:
 
     @cached_property
     def tally(self) -> Tally:
-        """What it comes to."""
+        """Its totals."""
         found = self.empty_tally()
         for part in self.parts():
             found.add(part)
         return found
 
     def empty_tally(self) -> Tally:
-        """A tally of no part yet."""
+        """A tally without parts."""
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[Part]:
-        """All of it, as one part."""
+        """The plan as one part."""
         yield Part(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
 
     def _repr_html_(self) -> str:
@@ -144,19 +144,19 @@ class Plan:
         return pd.DataFrame(self.rows()).set_index("experiment_id")
 
     def groups(self) -> Counter[Group]:
-        """How many experiments there are of each (module, fault type, method)."""
+        """The number of experiments for each (module, fault type, method)."""
         return self.tally.groups
 
     def rows(self) -> list[dict[str, object]]:
-        """One dict per experiment: the columns of the results table that are known before running."""
+        """One dict per experiment: the result columns known before running."""
         return [plan_row(experiment) for experiment in self.experiments]
 
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that is needed, the canary's included."""
+        """Every fault-free run needed, including the canary's."""
         return self.tally.needed()
 
     def cost(self, workers: int = 2) -> Cost:
-        """Expected time and disk of all of it."""
+        """Expected time and disk space."""
         goldens = len(self.goldens())
         runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
@@ -170,7 +170,7 @@ class Plan:
 
 
 class Planning:
-    """A campaign with what was chosen, checked, which is expanded seed by seed.
+    """A campaign with checked choices, expanded seed by seed.
 
     MutatorError for a choice that does not fit the campaign.
     """
@@ -199,18 +199,18 @@ class Planning:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """How many mutants of operators there were, and what was left out, once the parts were made."""
+        """How many mutants of operators there were, and what was left out; known after making the parts."""
         return self._expansion.told
 
     def empty_tally(self) -> Tally:
-        """A tally of no part yet."""
+        """A tally without parts."""
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[Part]:
-        """The experiments of each seed that has any.
+        """Yield the experiments of each seed that has any.
 
-        MutatorError when none is left of all seeds, and for more shards than chunks; MutatorWarning for
-        values that change nothing.
+        MutatorError if no seed has any, and for more shards than chunks; MutatorWarning for values that
+        change nothing.
         """
         idle, chunks = IdleValues(self._workspace.fault_models()), 0
         limit = self.choices.limit
@@ -236,7 +236,7 @@ class Planning:
         idle.warn()
 
     def _part(self, seed: int, most: int | None) -> Part:
-        """The experiments of a seed, at most so many."""
+        """The experiments of a seed, at most `most`."""
         found = self._expansion.with_seed(seed).experiments()
         once = in_turn(runs(self._manifest, _choose(found, self.campaign, self.choices, seed, most)))
         return Part(
@@ -256,15 +256,15 @@ class Planning:
 
 
 def _seeds(campaign: Campaign, choices: Choices) -> range:
-    """The campaign's, or the one that was chosen."""
+    """The seeds of the campaign, or the chosen one."""
     return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
 
 
 def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
-    """Expand a campaign (a name of the library or a file) into its plan; nothing is written or run.
+    """Expand a campaign (a library name or a file) into its plan, without writing or running anything.
 
-    MutatorError for a choice that does not fit the campaign, and when no experiment is left; MutatorWarning
-    for values that change nothing.
+    MutatorError for a choice that does not fit the campaign, and if no experiment is left; MutatorWarning for
+    values that change nothing.
     """
     planning = Planning(workspace, campaign, choices)
     parts = tuple(planning.parts())
@@ -288,7 +288,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
 def _choose(
     experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
 ) -> tuple[Experiment, ...]:
-    """What of a seed's experiments is planned, at most so many."""
+    """Select from a seed's experiments, at most `most`."""
     if campaign.sample is not None:
         experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
@@ -312,8 +312,10 @@ def _sample(
 
 
 def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
-    """The frozen plan of a run folder (workers read single chunks instead); `tally` is what it comes to, if
-    that is known. Of a very large one no experiment is kept in memory."""
+    """The frozen plan of a run folder; `tally` has its totals, if known.
+
+    Of a very large plan no experiment is kept in memory. Workers read single chunks instead.
+    """
     head = folder.head
     large = head["experiments"] > _IN_MEMORY
     plan = Plan(
@@ -332,5 +334,5 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
         told=tuple(head.get("operators", ())),
     )
     if tally is not None:
-        vars(plan)["tally"] = tally  # what the cached property would find out, experiment by experiment
+        vars(plan)["tally"] = tally  # sets the cached property, which would read every experiment
     return plan

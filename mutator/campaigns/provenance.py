@@ -1,4 +1,4 @@
-"""What a run depends on: digests of its sources, versions of what runs them."""
+"""What a run depends on: digests of its sources, versions of its software."""
 
 import platform
 from collections.abc import Iterable, Mapping
@@ -21,11 +21,11 @@ from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
 _REMEDY = "undo the change, or run into another folder"
-_OWN = Path(__file__).parents[1]  # the harness itself
+_OWN = Path(__file__).parents[1]  # the harness
 
 
 def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
-    """Digest of everything outside the plan that a result depends on, by name."""
+    """Digest by name of everything outside the plan that a result depends on."""
     return {
         "target": manifest.tree.digest,
         "manifest": digest(manifest.path.read_bytes()),
@@ -35,7 +35,7 @@ def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str])
 
 
 def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> None:
-    """MutatorError when a source is no longer what it was when the plan was frozen."""
+    """Raise MutatorError if a source has changed since the plan was frozen."""
     changed = [name for name in frozen if now.get(name) != frozen[name]]
     if changed:
         raise MutatorError(
@@ -47,9 +47,9 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
 
 
 def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None:
-    """MutatorError when a run folder is of another schema or version of mutator than this one.
+    """Raise MutatorError for a run folder of another schema or mutator version.
 
-    Such a folder can be read in every way, but not be run on: all its results come from one program.
+    Such a folder can be read but not resumed, since all its results must come from one program.
     """
     if (schema, provenance["mutator"]) != (SCHEMA, VERSION):
         raise MutatorError(
@@ -61,8 +61,10 @@ def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None
 
 
 def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...]:
-    """How Python and packages differ here from the last stretch of work in a run folder: nothing where
-    nothing was driven yet. MutatorError when they do, unless that is accepted."""
+    """How Python and packages differ from the folder's last session; empty if nothing has run yet.
+
+    MutatorError for any difference that is not accepted.
+    """
     if not folder.stretches:
         return ()
     found = differences(folder.stretches[-1], machine.python(), _packages(folder))
@@ -72,25 +74,27 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
 
 
 def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
-    """The error (not raised) that the versions are not the same; `what` begins it."""
+    """An error (not raised) about different versions; `what` begins it."""
     return MutatorError(
         f"{what} other versions: {'; '.join(found)}",
         where=run,
         argument="accept_versions",
         expected="the same Python and packages for a whole run",
-        remedy="go back to them, or say that others will do: `accept_versions`",
+        remedy="restore them, or accept other versions: `accept_versions`",
     )
 
 
 def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
-    """Versions here of what the harness requires, of what the golden runs of a folder loaded, and of more."""
+    """Versions of the harness's requirements, of what a folder's golden runs loaded, and of `more`."""
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
 def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
-    """Note in run.json what this session runs with, once its checks have passed and before it drives any
-    experiment. `records` is the glob of its files. MutatorError as `check_versions`."""
+    """Record in run.json what this session runs with, after its checks and before its first experiment.
+
+    `records` is the glob of its files. MutatorError as in `check_versions`.
+    """
     manifest = workspace.manifest(folder.head["target"])
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
     places |= {"overlay": manifest.overlay} if manifest.overlay else {}

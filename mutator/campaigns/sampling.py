@@ -1,4 +1,4 @@
-"""A small part of many experiments that still shows everything: picked evenly, the same each time."""
+"""Draw a small, even and reproducible sample of many experiments."""
 
 import random
 from collections import Counter, defaultdict, deque
@@ -12,21 +12,25 @@ _Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigg
 
 
 def spread(count: int, wanted: int) -> list[int]:
-    """`wanted` of the indices 0 ... count-1, evenly over them."""
+    """`wanted` of the indices 0 ... count-1, evenly spread."""
     if wanted >= count:
         return list(range(count))
     return [(2 * i + 1) * count // (2 * wanted) for i in range(wanted)]
 
 
 def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """`count` of the experiments, in their order: each spec's variant as often as any other, and within a
-    variant each method, scenario and trigger; which values, and ties, by a hash of seed and id."""
+    """`count` of the experiments, in order, balanced over variants, then over method, scenario and trigger.
+
+    A hash of seed and id selects values and breaks ties.
+    """
     return _pick(experiments, [[experiment] for experiment in experiments], count, seed)
 
 
 def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """As `pick`, but guided experiments and their random partners are taken together, as far as both are
-    among the experiments. Where whole pairs do not come to `count`, the last one is cut."""
+    """As `pick`, but guided experiments are taken with their random partners if both are present.
+
+    If whole pairs do not add up to `count`, the last one is split.
+    """
     pairs: dict[Hashable, list[Experiment]] = defaultdict(list)
     for experiment in experiments:
         pairs[experiment.scenario, _pair(experiment)].append(experiment)
@@ -37,7 +41,7 @@ def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tupl
 def _pick(
     experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    """As `pick`, from units that are taken whole."""
+    """As `pick`, from units that stay whole."""
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
@@ -60,7 +64,7 @@ def _pick(
 
 
 def _whole(experiment: Experiment) -> Experiment:
-    """The experiment as one that goes on, so that a campaign which stops its runs draws the same ones."""
+    """The experiment without `after_hazard`, so that campaigns that stop their runs draw the same sample."""
     goes_on = experiment.after_hazard is AfterHazard.GO_ON
     return experiment if goes_on else replace(experiment, after_hazard=AfterHazard.GO_ON)
 
@@ -72,7 +76,7 @@ def _cell(unit: Sequence[Experiment]) -> _Cell:
 
 
 def _marks(cell: _Cell) -> Iterable[Hashable]:
-    """What is counted for a cell, from what matters most to what matters least."""
+    """What is counted for a cell, the most important first."""
     variant, method, scenario, trigger = cell
     yield variant
     yield variant, method
@@ -89,10 +93,10 @@ def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
 
 
 def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """`count` of the experiments, in their order, guided and random ones in pairs: of each fault type in
-    each scenario in proportion to its number, but at least one pair; a systematic sample within each.
+    """`count` of the experiments, in order, guided and random ones in pairs.
 
-    A ValueError tells a count that is too small for that, or that does not come out in whole pairs.
+    Each fault type and scenario is represented in proportion to its number by a systematic sample of at least
+    one pair. ValueError for a count that is too small or not a whole number of pairs.
     """
     if count >= len(experiments):
         return tuple(experiments)
@@ -119,14 +123,15 @@ _Pair = tuple[str, str, str]  # variant, row of the context table, fault
 
 
 def _pair(experiment: Experiment) -> _Pair:
-    """What a guided experiment and its random partner have in common within a scenario."""
+    """What a guided experiment and its random partner share within a scenario."""
     row = experiment.trigger.name.removeprefix("random/")
     return (experiment.fault.spec, row, experiment.fault.id)
 
 
 def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
-    """`total` seats for strata of these sizes, one each and then by Sainte-Lague's rule (1910), as for the
-    seats of a parliament: the next goes to whom it brings nearest to its share."""
+    """Allot `total` seats to strata: one each, then by the Sainte-Lague method (1910) for parliamentary
+    seats.
+    """
     seats = dict.fromkeys(sizes, 1)
     while sum(seats.values()) < total:
         next_one = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))

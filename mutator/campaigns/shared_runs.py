@@ -1,4 +1,4 @@
-"""Runs that several scenarios have in common: planned side by side, run once, counted in each."""
+"""Runs that several scenarios share: planned together, run once, counted in each."""
 
 from collections.abc import Hashable, Iterable, Sequence
 
@@ -8,21 +8,23 @@ from mutator.triggers.kinds import time_of
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
-    """The same for experiments that are one and the same run: all but the scenario is equal, and a change
-    makes their scenarios the same (`same_in` of the manifest; the checks before a campaign prove it)."""
+    """A key that is equal for experiments that are the same run.
+
+    They differ only in scenarios that a change makes the same (`same_in` of the manifest, proved by
+    preflight).
+    """
     scenarios = same_in(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
     return (experiment.fault.id, experiment.trigger, experiment.seed, experiment.changes, place)
 
 
 def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
-    """The scenarios that are the same under these changes; empty: none is like another."""
+    """The scenarios that these changes make the same; empty if none."""
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
 
 
 def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
-    """The runs in the order that shares most work between one and the next: those of a golden run together,
-    of these the ones with the same trigger, then the others by their times."""
+    """Order runs to share the most work: by golden run, then the same trigger, then by time."""
 
     def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]
@@ -32,7 +34,7 @@ def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
 
 
 def runs(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:
-    """The experiments of each run, in the order of their firsts."""
+    """The experiments of each run, ordered by the first of each."""
     found: dict[Hashable, list[Experiment]] = {}
     for experiment in experiments:
         found.setdefault(run_key(manifest, experiment), []).append(experiment)

@@ -1,7 +1,7 @@
-"""Studies that are installed: published work that a campaign may reproduce, each a package of its own.
+"""Installed studies: published work that a campaign may reproduce, each in its own package.
 
-A package registers its study as an entry point of the group `mutator.studies`; a campaign asks for it by name
-(`study:`). What a study adds to a report is in `mutator.report.studies`.
+A package registers its study as an entry point of the group `mutator.studies`; a campaign names it
+(`study:`). `mutator.report.studies` has what a study adds to a report.
 """
 
 from collections.abc import Iterable
@@ -14,8 +14,9 @@ from mutator.workspace import Workspace
 GROUP = "mutator.studies"
 FUNCTIONS = ("check", "published", "drawings")
 PARTS = ("about", "panels", *FUNCTIONS)
-"""What an entry point's object must have: the fields of `mutator.report.studies.Study`, which this layer may
-not import."""
+"""Required attributes of an entry point's object: the fields of `mutator.report.studies.Study`, which this
+layer may not import.
+"""
 
 
 class Study(Protocol):
@@ -32,8 +33,7 @@ def study_names() -> tuple[str, ...]:
 
 
 def find_study(name: str) -> Study:
-    """The study of that name, loaded; MutatorError that lists the others if it is not installed, cannot be
-    loaded or is no study."""
+    """Load the study of that name; MutatorError if it is not installed, cannot be loaded or is invalid."""
     found = entry_points(group=GROUP, name=name)
     if not found:
         remedy = "correct the name, or install the package that provides the study"
@@ -42,7 +42,7 @@ def find_study(name: str) -> Study:
     remedy = "correct or reinstall the package that provides it"
     try:
         loaded = point.load()
-    except Exception as err:  # importing it runs a stranger's code
+    except Exception as err:  # importing it runs third-party code
         why = f"{type(err).__name__}: {err}"
         raise _refused(name, f"study '{name}' cannot be loaded: {point.value}: {why}", remedy) from err
     if wrong := _wrong(loaded):
@@ -51,12 +51,14 @@ def find_study(name: str) -> Study:
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
-    """What a study finds wrong with its data in a fault library. A check that itself fails is a problem."""
+    """The problems that a study finds in its data in a fault library; a check that fails is a problem,
+    too.
+    """
     try:
         problems = list(study.check(workspace))
     except MutatorError as error:
         return [error]
-    except Exception as err:  # a stranger's code
+    except Exception as err:  # third-party code
         return [_bad_check(name, f"fails: {type(err).__name__}: {err}")]
     if strangers := [problem for problem in problems if not isinstance(problem, MutatorError)]:
         return [_bad_check(name, f"gives {strangers[0]!r}, which is no MutatorError")]
@@ -74,7 +76,7 @@ def _bad_check(name: str, what: str) -> MutatorError:
 
 
 def _wrong(loaded: Any) -> str:
-    """What keeps an object from being used as a study; empty if nothing does."""
+    """Why an object cannot be used as a study; empty if it can."""
     if missing := [part for part in PARTS if not hasattr(loaded, part)]:
         return f"is a {type(loaded).__name__} without {', '.join(missing)}"
     if isinstance(loaded, type):

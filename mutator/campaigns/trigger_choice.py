@@ -1,4 +1,4 @@
-"""Which triggers a campaign uses, as its file says it: contexts of a table, or a list of its own."""
+"""The triggers of a campaign file: contexts of a table, or a list."""
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -12,8 +12,8 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition
 from mutator.triggers.kinds import always, at_time
 
-EVERY_READING = "*"  # what holds in all of them, where a file does not tell them apart
-MOST = 1_000_000_000  # of a limit or a time: no machine has more, and no run takes longer
+EVERY_READING = "*"  # all readings, if a file does not distinguish them
+MOST = 1_000_000_000  # of a limit or a time, beyond any machine or run
 _LIST: Keys = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
@@ -21,7 +21,7 @@ _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListedTrigger:
-    """A trigger of a campaign's own list: at a time (s), while a condition holds, or (neither) always."""
+    """A trigger of a campaign's list: at a time (s), while a condition holds, or (neither) always."""
 
     at_s: float | None
     when: str | None
@@ -29,26 +29,26 @@ class ListedTrigger:
 
 
 def by_reading(given: object) -> object:
-    """What is told of each reading; what is told once is told of all."""
+    """Values by reading; a single value applies to all."""
     return given if isinstance(given, dict) else {EVERY_READING: given}
 
 
 def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of something that may be told of each reading."""
+    """The JSON schema of a value that may be given by reading."""
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
 class _ListedModel(StrictModel, title="A trigger"):
-    """One of `always`, `at_s` and `when`; the word `always` alone will do."""
+    """One of `always`, `at_s` and `when`; the text `always` is enough."""
 
-    always: bool = Field(False, description="`true`: from when on triggers are armed, to the end.")
-    at_s: Seconds | None = Field(None, description="From that time on, to the end, in s.")
+    always: bool = Field(False, description="`true`: from when triggers are armed to the end.")
+    at_s: Seconds | None = Field(None, description="From that time to the end, in s.")
     when: str | None = Field(
         None,
         description="While this condition holds, over `t` (s) and the values that the target observes.",
     )
     hold_s: float | None = Field(
-        None, gt=0.0, allow_inf_nan=False, description="Not longer than this, once triggered."
+        None, gt=0.0, allow_inf_nan=False, description="The maximum duration, once triggered."
     )
 
     @model_validator(mode="after")
@@ -69,9 +69,10 @@ _Listed = Annotated[_ListedModel, BeforeValidator(_in_words, json_schema_input_t
 
 
 class TriggersModel(StrictModel, title="Triggers"):
-    """When faults become active. Guided experiments wait for the contexts of a table or for the triggers of a
-    list, random ones for a time that is drawn. `triggers` may be the list itself: `triggers: [always, {at_s:
-    3}, {when: speed > 5}]`."""
+    """When faults become active. Guided experiments wait for the contexts of a table or the triggers of a
+    list, random ones for a drawn time. `triggers` may be the list itself: `triggers: [always, {at_s: 3},
+    {when: speed > 5}]`.
+    """
 
     table: str | None = Field(None, description="A context table, by its name.")
     rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
@@ -85,7 +86,7 @@ class TriggersModel(StrictModel, title="Triggers"):
         min_length=1,
         description="Before that time no trigger fires and no random time is drawn, in s since the start "
         "of a run: one number, or one for each reading by its name. Without it, that of the target's "
-        "manifest. An `at_s` is not held up by it.",
+        "manifest. It does not delay an `at_s`.",
     )
     random_until_s: float | None = Field(
         None,
@@ -115,7 +116,7 @@ class TriggersModel(StrictModel, title="Triggers"):
         return self
 
     def triggers(self) -> tuple[ListedTrigger, ...]:
-        """Those of its list."""
+        """The triggers of its list."""
         return tuple(ListedTrigger(at_s=t.at_s, when=t.when, hold_s=t.hold_s) for t in self.listed or ())
 
 
@@ -123,14 +124,14 @@ def _as_it_is(given: object) -> object:
     return given
 
 
-# a list has become the mapping when this is checked, so that errors have its lines
+# a list was converted to the mapping before this check, so that errors have its lines
 Triggers = Annotated[
     TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Written])
 ]
 
 
 def with_list(source: Source) -> Source:
-    """A campaign whose `triggers` are the list itself, as one that has it under `list`."""
+    """Convert a campaign whose `triggers` are a list to one with that list under `list`."""
     given = source.data.get("triggers")
     if not isinstance(given, list):
         return source
@@ -147,9 +148,10 @@ def listed_triggers(
     armed_after_s: float,
     hold_s: float | None,
 ) -> tuple[Trigger, ...]:
-    """The triggers of a campaign's list, which stands in `source`; `hold_s` is for those that have none of
-    their own. MutatorError at its line for a condition over what the target does not observe, and for a
-    trigger that stands there twice."""
+    """The triggers of a campaign's list in `source`; `hold_s` is the default hold.
+
+    MutatorError at its line for a condition over unobserved values, and for a duplicate trigger.
+    """
     found: dict[str, Trigger] = {}
     for i, one in enumerate(listed):
         with source.placing((*_LIST, i, "when")):

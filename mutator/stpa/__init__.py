@@ -1,4 +1,4 @@
-"""The hazard analysis: context tables, unsafe control actions, their checks, coverage and drawings.
+"""The hazard analysis: context tables, unsafe control actions, checks, coverage, drawings.
 
-Nothing here runs a target or looks at results.
+This package does not run targets or read results.
 """

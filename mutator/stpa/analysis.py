@@ -1,8 +1,7 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-Each file is read with its own lines, so that whatever is wrong with it is told there. What one file says
-about another (a link, an action, a context) is checked on load; what the analysis says about fault specs and
-target is checked by `stpa_checks`.
+References between the files are checked on load, with file and line. `stpa_checks` compares the analysis with
+fault specs and target.
 """
 
 from collections.abc import Collection, Mapping
@@ -20,7 +19,7 @@ _WIDEST = 100  # rows and columns of the drawing
 
 
 class Kind(StrEnum):
-    """What a component of the control structure is."""
+    """The kinds of components in the control structure."""
 
     HUMAN = "human"
     CONTROLLER = "controller"
@@ -44,7 +43,7 @@ class VariableModel(StrictModel, title="A variable"):
 
     about: str = Field(description="What it is.")
     observed: str | None = Field(
-        description="The variable that a trigger may ask in its place; `null` if none."
+        description="The observed variable that stands for it in triggers; `null` if none."
     )
 
 
@@ -74,11 +73,13 @@ class LinkModel(StrictModel, title="A link"):
     from_: str = Field(alias="from", description="The component it comes from.")
     to: str = Field(description="The component it goes to.")
     label: str = Field(description="What it carries.")
-    studied: bool = Field(True, description="`false`: it is drawn dashed, and no part of fault paths.")
+    studied: bool = Field(
+        True, description="`false`: the link is drawn dashed and is not part of fault paths."
+    )
 
 
 class ActionModel(StrictModel, title="A control action"):
-    """What a controller does to what it controls."""
+    """What a controller does to the process that it controls."""
 
     link: str = Field(description="The link that carries it.")
     channel: str = Field(description="The recorded channel that shows it.")
@@ -86,7 +87,7 @@ class ActionModel(StrictModel, title="A control action"):
 
 
 class StructureModel(StrictModel, title="control_structure.yaml"):
-    """Who controls what, by which actions, and what is fed back."""
+    """Who controls what, by which actions, and with which feedback."""
 
     about: str = Field(description="What is shown.")
     components: dict[str, ComponentModel] = Field(description="Name -> component.")
@@ -98,10 +99,12 @@ class UnsafeActionModel(StrictModel, title="An unsafe control action"):
     """One way in which a control action leads to a hazard."""
 
     action: str = Field(description="The control action.")
-    category: Category = Field(strict=False, description="In which of four ways it is unsafe.")
+    category: Category = Field(strict=False, description="Which of the four ways of being unsafe.")
     about: str = Field(description="What happens.")
     hazards: list[str] = Field(min_length=1, description="The hazards that follow.")
-    contexts: list[str] = Field(min_length=1, description="The contexts in which they do, as `table/row`.")
+    contexts: list[str] = Field(
+        min_length=1, description="The contexts in which they follow, as `table/row`."
+    )
 
 
 class UnsafeActionsModel(StrictModel, title="unsafe_control_actions.yaml"):
@@ -119,12 +122,12 @@ class FactorModel(StrictModel, title="A causal factor"):
     where: list[str] = Field(min_length=1, description="Links or components of the control structure.")
     at: list[str] = Field(default_factory=list, description="Where in the target, as `file::function`.")
     leads_to: list[str] = Field(min_length=1, description="The unsafe control actions it may lead to.")
-    faults: list[str] = Field(default_factory=list, description="The fault specs that stand for it.")
-    no_fault: str | None = Field(None, description="Why none does.")
+    faults: list[str] = Field(default_factory=list, description="The fault specs that represent it.")
+    no_fault: str | None = Field(None, description="Why no fault spec represents it.")
 
 
 class FactorsModel(StrictModel, title="causal_factors.yaml"):
-    """What may bring a controller to an unsafe action, and which faults stand for it."""
+    """What can make a controller act unsafely, and which faults represent it."""
 
     about: str = Field(description="What is listed.")
     causal_factors: dict[str, FactorModel] = Field(description="Id -> causal factor.")
@@ -132,7 +135,7 @@ class FactorsModel(StrictModel, title="causal_factors.yaml"):
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """The whole analysis, its names consistent; `*_source` point at the files."""
+    """The whole analysis with consistent names; `*_source` point at the files."""
 
     hazards: HazardList
     structure: StructureModel
@@ -145,14 +148,15 @@ class Analysis:
 
 
 def load_structure(path: Path) -> StructureModel:
-    """The control structure of a file; MutatorError with file and line for a mistake in it."""
+    """Read a control structure; MutatorError with file and line for a mistake in it."""
     structure, source = read(path, StructureModel, "control_structure/1")
     _check_structure(structure, source)
     return structure
 
 
 def load_analysis(folder: Path) -> Analysis:
-    """Read hazards, control structure, unsafe control actions, their tables and causal factors of `folder`.
+    """Read hazards, control structure, unsafe control actions, context tables and causal factors from
+    `folder`.
 
     MutatorError with file and line for the first dangling name, uncovered context or other mistake.
     """
@@ -179,7 +183,7 @@ def load_analysis(folder: Path) -> Analysis:
 
 
 def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[str]) -> None:
-    """A MutatorError at `keys` unless `name` is known."""
+    """Raise MutatorError at `keys` unless `name` is known."""
     if name not in known:
         raise source.error(
             keys,
@@ -204,7 +208,7 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
 
 
 def _check_grid(structure: StructureModel, source: Source) -> None:
-    """Every component has fields of its own in the drawing's grid."""
+    """Check that components do not overlap in the drawing's grid."""
     taken: dict[tuple[int, int], str] = {}
     for name, component in structure.components.items():
         row, column, width = component.drawn
@@ -214,7 +218,7 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
             raise source.error(
                 ("components", name, "drawn"),
                 f"'{name}' drawn at {component.drawn}" + (f", where '{other}' is" if other else ""),
-                expected=f"row, column and width up to {_WIDEST}, a width from 1, and fields of its own",
+                expected=f"row, column and width up to {_WIDEST}, a width from 1, and no overlap",
             )
         taken.update(dict.fromkeys(fields, name))
 
@@ -222,7 +226,7 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
 def _tables(
     folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
 ) -> dict[str, ContextTable]:
-    """The tables the unsafe actions come from; each judges control actions of the structure alone."""
+    """Load the context tables of the unsafe actions; they may only judge control actions of the structure."""
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     tables = {}
     for i, name in enumerate(unsafe.tables):

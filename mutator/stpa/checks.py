@@ -1,4 +1,4 @@
-"""Is the hazard analysis complete and without contradiction, and does the fault library follow from it?"""
+"""Check that the hazard analysis is complete and consistent, and that the fault library follows from it."""
 
 import ast
 from collections.abc import Iterator
@@ -18,11 +18,11 @@ Specs = dict[str, FaultSpec]
 def check_analysis(
     analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> list[MutatorError]:
-    """Every gap and contradiction, in the order of the files; empty when all is well.
+    """List every gap and contradiction in the order of the files.
 
-    Hazards follow from unsafe actions, unsafe actions agree with the context tables and these with them, each
-    action is judged in all four categories, each unsafe action has a causal factor, each factor's faults are
-    where it says, aim at hazards it leads to, and each spec of the library stands for a factor.
+    * Each hazard follows from an unsafe action; unsafe actions and context tables agree.
+    * Each action is judged in all four categories; each unsafe action has a causal factor.
+    * Each factor's faults are where it says and aim at hazards it leads to; each spec belongs to a factor.
     """
     by_name = {spec.name: spec for spec in specs}
     return [
@@ -77,7 +77,7 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
 
 
 def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Process models that name what the target does not observe."""
+    """Yield process model variables that the target does not observe."""
     known = manifest.observation.variables
     for name, component in analysis.structure.components.items():
         for variable, model in component.process_model.items():
@@ -91,7 +91,7 @@ def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator
 
 
 def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
-    """Contexts that ask for a variable which no controller has in its process model."""
+    """Yield contexts with a variable that is in no process model."""
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
     for table in analysis.tables.values():
@@ -118,7 +118,7 @@ def _categories(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
-    """Unsafe actions that the context tables do not call hazardous."""
+    """Yield unsafe actions that the context tables do not call hazardous."""
     for name, action in analysis.unsafe.items():
         for i, context in enumerate(action.contexts):
             row = _row(analysis, context)
@@ -135,7 +135,7 @@ def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
-    """Hazardous cells of the context tables that are no unsafe action."""
+    """Yield hazardous cells of the context tables that match no unsafe action."""
     known = {
         (context, action.action, action.category, hazard)
         for action in analysis.unsafe.values()
@@ -161,7 +161,7 @@ def _row(analysis: Analysis, context: str) -> ContextRow:
 
 
 def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
-    """The hazards the row knows for an action of that category: wrong timing and duration end as either."""
+    """The row's hazards for an action of that category; wrong timing or duration can mean either column."""
     verdicts = row.actions.get(action.action)
     if verdicts is None:
         return set()
@@ -185,7 +185,7 @@ def _causeless(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Modules of components and places of factors that the target does not have."""
+    """Yield modules of components and places of factors that the target lacks."""
     files = manifest.tree.files
     for name, component in analysis.structure.components.items():
         for i, path in enumerate(component.modules):
@@ -236,7 +236,7 @@ def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
 
 
 def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """A factor's faults are where it says they are, no more and no less."""
+    """Check that a factor's places are exactly those of its faults."""
     actual = {place for fault in factor.faults for place in injected(specs[fault])}
     if actual != set(factor.at):
         yield analysis.factors_source.error(
@@ -248,7 +248,7 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
 
 
 def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """Every fault aims at a hazard that the factor leads to."""
+    """Check that every fault aims at a hazard that the factor leads to."""
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:
@@ -278,6 +278,6 @@ def _unreached(analysis: Analysis, specs: tuple[FaultSpec, ...]) -> Iterator[Mut
         if spec.name not in reached:
             yield spec.source.error(
                 (),
-                f"fault spec '{spec.name}' stands for no causal factor",
+                f"fault spec '{spec.name}' belongs to no causal factor",
                 remedy=f"name it in {path.parent.name}/{path.name}",
             )

@@ -1,4 +1,4 @@
-"""STPA as data: hazards and context tables, from which the guided triggers come."""
+"""Hazards and context tables, the source of guided triggers."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -20,7 +20,7 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """For one control action in one context: the hazard if it is given, and if it is not (None: none)."""
+    """For one control action in one context: the hazard if it is provided, and if it is not (None: none)."""
 
     provided: str | None
     not_provided: str | None
@@ -28,8 +28,9 @@ class Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContextRow:
-    """A context: its id (`C1`), its condition over observed variables with the constants put in, and for
-    each control action whether giving it or not giving it is hazardous."""
+    """A context: its id (`C1`), its condition with constants inserted, and the verdict for each control
+    action.
+    """
 
     id: str
     condition: str
@@ -39,7 +40,9 @@ class ContextRow:
 
 @dataclass(frozen=True, kw_only=True)
 class ContextTable:
-    """A context table of the hazard analysis. Its rows cover everything exactly once, as `coverage` says."""
+    """A context table of the hazard analysis. Its rows cover everything exactly once, as `coverage`
+    reports.
+    """
 
     name: str
     about: str
@@ -50,7 +53,7 @@ class ContextTable:
     source: Source
 
     def check(self, variables: Collection[str]) -> None:
-        """MutatorError, with its line, for a row that asks for what is not among the target's variables."""
+        """Raise MutatorError, with its line, for a row that uses an unknown variable."""
         _check_names(self.rows, variables, self.source)
 
     def triggers(
@@ -60,8 +63,10 @@ class ContextTable:
         armed_after_s: float = 0.0,
         rows: tuple[str, ...] | None = None,
     ) -> tuple[Trigger, ...]:
-        """One trigger per row (or row named in `rows`), named as the row: it holds while its condition does,
-        or for `hold_s` from then on. MutatorError for an unknown row."""
+        """One trigger per row (or per row in `rows`), named like the row; MutatorError for an unknown row.
+
+        It is active while the row's condition holds, or for `hold_s` from then on.
+        """
         by_id = {row.id: row for row in self.rows}
         unknown = [name for name in rows or () if name not in by_id]
         if unknown:
@@ -82,7 +87,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards: id -> description; hazards also name the accidents they may lead to."""
+    """Accidents and hazards by id with descriptions; hazards also name the accidents they may lead to."""
 
     source: Source
     accidents: Mapping[str, str]
@@ -93,7 +98,7 @@ class HazardList:
 class _VerdictsModel(StrictModel, title="A verdict"):
     """For one control action in one context; `null` where there is no hazard."""
 
-    provided: str | None = Field(description="The hazard that follows if the action is given.")
+    provided: str | None = Field(description="The hazard that follows if the action is provided.")
     not_provided: str | None = Field(description="The hazard that follows if it is not.")
 
 
@@ -101,7 +106,7 @@ class _RowModel(StrictModel, title="A context"):
     when: str = Field(
         description="A condition over `t` (s), the values that the target observes, and the constants."
     )
-    about: str = Field(description="What it is, in words.")
+    about: str = Field(description="A description.")
     actions: dict[str, _VerdictsModel] = Field(
         description="Control action -> verdict; every row judges the same actions."
     )
@@ -111,7 +116,7 @@ class TableModel(StrictModel, title="contexts/*.yaml"):
     """A context table. Its rows cover everything exactly once: [what is
     proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table)."""
 
-    name: str = Field(description="Its name, that of the file.")
+    name: str = Field(description="The name, equal to the file's.")
     about: str = Field("", description="What it is about.")
     constants: dict[str, float] = Field(description="Name -> number, for use in the conditions.")
     contexts: dict[str, _RowModel] = Field(description="Id -> context.")
@@ -130,11 +135,10 @@ class HazardsModel(StrictModel, title="hazards.yaml"):
 
 
 def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
-    """Read a context table; every condition is checked as a trigger condition, over the target's `variables`
-    (None: any, `ContextTable.check` tells later).
+    """Read a context table; conditions are checked as triggers over `variables` (None: any, checked later).
 
-    MutatorError also for contexts that leave something uncovered or overlap, where that can be proved, and
-    for rows that do not judge the same control actions.
+    MutatorError also for contexts that provably overlap or leave a gap, and for rows that judge different
+    control actions.
     """
     model, source = read(path, TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
@@ -217,7 +221,7 @@ def _condition(text: str, constants: Mapping[str, float], source: Source, row: s
 
 
 def load_hazards(path: Path) -> HazardList:
-    """Read the accidents and hazards; a hazard that leads to an unknown accident is an error."""
+    """Read accidents and hazards; MutatorError for a hazard that leads to an unknown accident."""
     model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
     for name, hazard in model.hazards.items():
         for i, accident in enumerate(hazard.leads_to):

@@ -1,10 +1,9 @@
-"""Do the conditions of a context table cover everything exactly once? Proved by cells, not sampled.
+"""Prove that the conditions of a context table cover everything exactly once.
 
-Where every condition compares one observed variable with a constant, the constants cut each variable's line
-into points and open intervals, and no condition can tell two places of one cell apart. So it is enough to
-test one place of every cell, borders and the outermost cells (which reach to infinity) included. Variables
-are taken as independent of each other, though some may be made from others: a table that passes is right,
-one that is only right because of that dependence does not pass.
+If every condition compares one variable with a constant, the constants cut each variable's line into points
+and open intervals. Conditions are constant within such a cell, so testing one place per cell, including the
+outermost, is a proof. Variables count as independent even if some are derived from others: a table that
+passes is complete; one that is complete only because of such a dependence fails.
 """
 
 import ast
@@ -15,12 +14,12 @@ from itertools import pairwise, product
 
 from mutator.triggers.conditions import evaluate
 
-MAX_TESTS = 400_000  # of a context in a cell
+MAX_TESTS = 400_000  # contexts times cells
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """A piece of a variable's line: `value` lies in it, `text` says it (`gap > 2.0`)."""
+    """A piece of a variable's line: `value` is in it, `text` describes it (`gap > 2.0`)."""
 
     value: float
     text: str
@@ -28,9 +27,9 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coverage:
-    """What was found: how many cells were tested, and a first place that is covered not exactly once.
+    """The number of tested cells, and the first place that is not covered exactly once.
 
-    `beyond` says why nothing could be proved, if so; `rows` are the contexts that hold at `place`.
+    `beyond` says why nothing could be proved; `rows` are the contexts that hold at `place`.
     """
 
     cells: int = 0
@@ -48,7 +47,7 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
     try:
         cuts = _cuts(conditions.values())
     except _BeyondError as error:
-        return Coverage(beyond=f"{error} is no comparison of one variable with a constant")
+        return Coverage(beyond=f"{error} is not a comparison of one variable with a constant")
     lines = [_cells(name, sorted(values)) for name, values in cuts.items()]
     total = math.prod(len(line) for line in lines)
     if total * len(conditions) > MAX_TESTS:
@@ -64,7 +63,7 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
 
 
 def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
-    """The constants each variable is compared with."""
+    """The constants that each variable is compared with."""
     found: dict[str, set[float]] = {}
     for condition in conditions:
         for node in ast.walk(ast.parse(condition, mode="eval")):
@@ -84,7 +83,7 @@ def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
 
 
 def _constant(node: ast.expr) -> float | None:
-    """The number a sign and a numeral make; None for anything else."""
+    """The value of a signed number; None for anything else."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         value = _constant(node.operand)
         return None if value is None else -value
@@ -97,7 +96,7 @@ def _cells(name: str, cuts: list[float]) -> list[Cell]:
     for low, high in pairwise(cuts):
         cells.append(Cell(value=low, text=f"{name} = {low}"))
         middle = low + (high - low) / 2.0
-        if low < middle < high:  # else no number lies between the two
+        if low < middle < high:  # otherwise no number lies between them
             cells.append(Cell(value=middle, text=f"{low} < {name} < {high}"))
     cells.append(Cell(value=cuts[-1], text=f"{name} = {cuts[-1]}"))
     return [*cells, Cell(value=math.inf, text=f"{name} > {cuts[-1]}")]

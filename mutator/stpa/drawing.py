@@ -1,4 +1,4 @@
-"""The control structure as an SVG picture, with the places where faults are injected standing out."""
+"""Draw the control structure as SVG, with the places where faults are injected highlighted."""
 
 from collections.abc import Iterator
 from html import escape
@@ -15,7 +15,7 @@ FILLS = {
     Kind.PROCESS: "#f3f3f3",
 }
 INK = "#222222"
-# Okabe and Ito's palette, told apart by colour-blind readers; dashes and width tell the same again.
+# Okabe and Ito's palette, for colour-blind readers; dashes and width carry the same information.
 ACTION, FEEDBACK, FAULT = "#0072b2", "#555555", "#d55e00"
 LEGEND = 54  # px at the foot
 STYLE = (
@@ -27,7 +27,7 @@ STYLE = (
 
 
 def draw(analysis: Analysis) -> str:
-    """The SVG's text; the same analysis gives the same text."""
+    """The SVG text, the same for the same analysis."""
     layout = lay_out(analysis.structure)
     height = layout.height + LEGEND
     lines = [
@@ -49,7 +49,7 @@ def draw(analysis: Analysis) -> str:
 
 
 def faulty_places(analysis: Analysis) -> dict[str, list[str]]:
-    """Links and components where faults of the library come in, with the causal factors they stand for."""
+    """Links and components where faults enter, with the causal factors of those faults."""
     places: dict[str, list[str]] = {}
     for name, factor in analysis.factors.items():
         for place in factor.where if factor.faults else ():

@@ -1,16 +1,16 @@
-"""Where the labels of arrows stand: next to their arrow, clear of boxes, other arrows and other labels.
+"""Place the labels of arrows: next to their arrow, clear of boxes, other arrows and other labels.
 
-All lengths are in px, y points down. A label has two lines: what the arrow carries, and what a picture adds
-to it.
+Lengths are in px, y points down. A label has two lines: what the arrow carries, and an addition of the
+drawing.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-_STEP = 6  # between the places that are tried
-_BESIDE, _ACROSS = 17, 25  # from line to line, beside an arrow or with the arrow in between
-_LETTER = 7  # about the width of a letter
+_STEP = 6  # between places that are tried
+_BESIDE, _ACROSS = 17, 25  # from line to line, next to an arrow or across it
+_LETTER = 7  # average width of a letter
 _SHORTEST = 126  # room for `1092 of 1128, 97 %`
 _ASCENT, _DESCENT = 12, 4
 
@@ -20,7 +20,7 @@ Area = tuple[float, float, float, float]  # left, top, right, bottom
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Label:
-    """The foot of a label's first line, the `anchor` of its lines as in SVG, and how far they are apart."""
+    """The baseline of a label's first line, the SVG `anchor` of its lines, and their distance."""
 
     at: Point
     anchor: str
@@ -30,8 +30,9 @@ class Label:
 def place_labels(
     words: Mapping[str, str], arrows: Mapping[str, Sequence[Point]], boxes: Iterable[Area]
 ) -> dict[str, Label]:
-    """A place for the label of each arrow, whose corners `arrows` has. Where no place is clear, the one that
-    an arrow likes best."""
+    """A place for the label of each arrow with corners in `arrows`; the preferred one if no place is
+    clear.
+    """
     taken = list(boxes)
     lines = {name: [_around(a, b) for a, b in pairwise(points)] for name, points in arrows.items()}
     found: dict[str, Label] = {}
@@ -47,7 +48,7 @@ def place_labels(
 
 
 def _bearer(points: Sequence[Point]) -> tuple[Point, Point]:
-    """The part of an arrow that bears the label: a level one where there is one."""
+    """The segment of an arrow that bears the label, level if possible."""
     return next((pair for pair in pairwise(points) if pair[0][1] == pair[1][1]), (points[0], points[-1]))
 
 
@@ -56,8 +57,11 @@ def _length(start: Point, end: Point) -> float:
 
 
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
-    """Places for a label, the best first: around the middle of a level part; beside an upright one, near its
-    tip, where fewest others cross."""
+    """Yield places for a label, the best first.
+
+    These are around the middle of a level segment, or next to an upright one, near its tip where fewest
+    others cross.
+    """
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:
         middle, free = (x1 + x2) / 2, max(abs(x1 - x2) - width, 0) / 2

@@ -1,9 +1,8 @@
-"""Where the boxes and arrows of a control structure go: rows of boxes, channels with one track an arrow.
+"""Lay out a control structure: rows of boxes, channels with one track per arrow.
 
-All lengths are in px, y points down. Boxes stand in the grid that the file gives. Arrows leave and enter a
-box at ports on its edges; one that cannot go straight up or down gets a track of its own in a channel between
-two rows, so that no two run on top of each other. One that would have to go through a box takes the left
-margin.
+Lengths are in px, y points down. Boxes stand in the grid of the file. Arrows leave and enter a box at ports
+on its edges. An arrow that cannot go straight up or down gets its own track in a channel between two rows;
+one that would cross a box takes the left margin.
 """
 
 from collections import defaultdict
@@ -14,19 +13,19 @@ from mutator.stpa.analysis import ComponentModel, LinkModel, StructureModel
 from mutator.stpa.labels import Label, Point, place_labels
 
 PITCH = 212  # from column to column
-GAP = 88  # between boxes side by side
-MARGIN = 110  # left of the first column, for arrows that go past the rows
+GAP = 88  # between adjacent boxes
+MARGIN = 110  # left of the first column, for arrows around the rows
 EDGE = 20
 BOX_HEIGHT = 46
 LINE = 17  # one more line of text in a box
 TRACK = 44
-CHANNEL = 64  # a channel without any track
-APART = 24  # between arrows that run side by side
+CHANNEL = 64  # a channel without tracks
+APART = 24  # between parallel arrows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
-    """A drawn component: left, top, width, height, and the lines of text in it."""
+    """A drawn component: left, top, width, height, and its lines of text."""
 
     x: float
     y: float
@@ -40,13 +39,13 @@ class Box:
         return self.y + self.height
 
     def holds(self, x: float) -> bool:
-        """Whether an arrow at `x` would meet the box well inside its edges."""
+        """Whether an arrow at `x` meets the box well inside its edges."""
         return self.x + 8 <= x <= self.x + self.width - 8
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Arrow:
-    """A drawn link: its corners from tail to tip, and where its label stands."""
+    """A drawn link: its corners from tail to tip, and the place of its label."""
 
     points: tuple[Point, ...]
     label: Label
@@ -63,7 +62,7 @@ class Layout:
 
 
 def lay_out(structure: StructureModel, lines: int = 1) -> Layout:
-    """Place every component and link; each box has room for so many `lines`, or for its own."""
+    """Place every component and link; each box has room for `lines` lines, or more if it needs them."""
     boxes = _boxes(structure, lines)
     ports = _ports(structure.links, boxes)
     points: dict[str, tuple[Point, ...]] = {}
@@ -119,7 +118,7 @@ def _boxes(structure: StructureModel, lines: int) -> dict[str, Box]:
 
 
 def _tracks(structure: StructureModel, row: int) -> int:
-    """How many arrows need a track below `row`: their ends have no column in common."""
+    """How many arrows need a track below `row`, i.e. have ends without a common column."""
     count = 0
     for link in structure.links.values():
         (row1, first1, width1), (row2, first2, width2) = (
@@ -137,7 +136,7 @@ def _lines(component: ComponentModel) -> tuple[str, ...]:
 
 
 def _ports(links: dict[str, LinkModel], boxes: dict[str, Box]) -> dict[str, tuple[float, float]]:
-    """x of each link's tail and tip: one above the other where that can be, else apart from all others."""
+    """x of each link's tail and tip: above each other if possible, else apart from all others."""
     ports = dict.fromkeys(links, (0.0, 0.0))
     edges: dict[tuple[str, bool], list[str]] = defaultdict(list)  # (box, lower edge?) -> its links
     for name, link in links.items():
@@ -173,7 +172,7 @@ def _spread(
     links: dict[str, LinkModel],
     boxes: dict[str, Box],
 ) -> float:
-    """x of a link at the box `own`: the links of an edge evenly, in the order of what they lead to."""
+    """x of a link at the box `own`: an edge's links are spread evenly, in the order of their other ends."""
     other = links[name].to if links[name].from_ == own else links[name].from_
     mates = edges[own, boxes[own].row < boxes[other].row]
     mates = sorted(mates, key=lambda mate: _middle(boxes, links[mate], own))
@@ -181,9 +180,9 @@ def _spread(
 
 
 def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
-    """The place next to `x` on the box's edge that keeps its distance from `others`; it is noted there.
+    """The place nearest to `x` on the box's edge that keeps its distance from `others`, to which it is added.
 
-    It is sought on the side of the other end, `toward`, first, which saves a crossing.
+    The side of the other end, `toward`, is tried first, which saves a crossing.
     """
     side = 1.0 if toward > x else -1.0
     edge = range(int(box.x) + 10, int(box.x + box.width) - 9)
@@ -199,7 +198,7 @@ def _middle(boxes: dict[str, Box], link: LinkModel, own: str) -> float:
 
 
 def _blocked(ports: tuple[float, float], tail: Box, tip: Box, boxes: Iterable[Box]) -> bool:
-    """Whether a box of the rows between stands where the long vertical part of the arrow would be."""
+    """Whether a box between the rows blocks the long vertical part of the arrow."""
     upper, lower = sorted((tail.row, tip.row))
     x = ports[0] if tail.row > tip.row else ports[1]
     return any(upper < box.row < lower and box.x - 8 <= x <= box.x + box.width + 8 for box in boxes)

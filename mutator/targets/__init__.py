@@ -1,4 +1,4 @@
-"""What the harness knows of a controller: its manifest, observed values, channels and source tree.
+"""What the harness knows about a controller: manifest, observed values, channels, source tree.
 
-Nothing here imports, runs or changes a target's code.
+This package does not import, run or change a target's code.
 """

@@ -1,4 +1,4 @@
-"""What a target records: channels, the part that each plays, and the file that they are in."""
+"""What a target records: channels, their roles, and the trace file."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -9,14 +9,12 @@ from pydantic import Field
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.triggers.conditions import RESERVED
 
-ROUNDING = (
-    1e-9  # of a channel's unit: what is less is left by sums in another order, no matter to any physics
-)
+ROUNDING = 1e-9  # of a channel's unit: less comes from the order of sums and has no physical meaning
 SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 
 class Role(StrEnum):
-    """What a channel is to a verdict: a fault manifests where an `actuator` differs from golden."""
+    """A channel's role in a verdict: a fault manifests when an `actuator` differs from golden."""
 
     ACTUATOR = "actuator"
     TRUTH = "truth"
@@ -24,17 +22,19 @@ class Role(StrEnum):
 
     @property
     def tolerance(self) -> float:
-        """By how much a channel that says nothing else may differ from golden: actuators are exact."""
+        """The default tolerance; 0 for actuators."""
         return 0.0 if self is Role.ACTUATOR else ROUNDING
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Channel:
-    """A recorded channel. `unit` is for axis labels, `-` for none; `tolerance` says by how much it may differ
-    from golden (0: exact); `component` names the part of the controller that it is of.
+    """A recorded channel.
 
-    `time` is the channel with its own times, where it is not there in each step. `source` is what the trace
-    calls it, where that is another name.
+    * `unit`: for axis labels, `-` for none
+    * `tolerance`: how much it may differ from golden (0: exact)
+    * `component`: the part of the controller it belongs to
+    * `time`: the channel with its times, if it is not recorded in each step
+    * `source`: its name in the trace, if different
     """
 
     name: str
@@ -48,29 +48,29 @@ class Channel:
 
     @property
     def in_trace(self) -> str:
-        """What the trace calls it."""
+        """Its name in the trace."""
         return self.source or self.name
 
 
 class ChannelModel(StrictModel, title="A channel"):
-    """By the name that conditions, tables and plots use."""
+    """A channel, by the name that conditions, tables and plots use."""
 
     unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
     role: Role = Field(
         Role.INTERNAL,
         strict=False,
-        description="`actuator`: what the controller commands; one that differs from golden means that the "
+        description="`actuator`: what the controller commands; if it differs from golden, the "
         "fault manifested. `truth`: the state of the world. `internal`: what the controller believes.",
     )
     component: str = Field(
-        "", description="The component that it belongs to, of the control structure where there is one."
+        "", description="The component that it belongs to, from the control structure if there is one."
     )
     tolerance: float | None = Field(
         None,
         ge=0.0,
         allow_inf_nan=False,
-        description="By how much it may differ from golden and still count as the same. An actuator beyond "
-        "it has manifested; a fault has reached a component with a channel beyond it. Default: 0 for "
+        description="How much it may differ from golden and still count as equal. An actuator that exceeds "
+        "it has manifested; a fault has reached a component if a channel of it does so. Default: 0 for "
         f"actuators, {ROUNDING:g} of the unit for others, so that rounding does not count.",
     )
     about: str = Field("", description="What it is.")
@@ -82,7 +82,7 @@ class ChannelModel(StrictModel, title="A channel"):
     from_: str = Field(
         "",
         alias="from",
-        description="What the trace calls it, if not by this name. In an `.mcap` file: the topic and the "
+        description="Its name in the trace, if different. In an `.mcap` file: the topic and the "
         "field of its JSON messages, `/car/state:speed`.",
     )
 
@@ -103,7 +103,7 @@ class TraceModel(StrictModel, title="The trace"):
 
 
 def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: Source) -> tuple[Channel, ...]:
-    """The channels of a manifest, in its order; MutatorError for a trace or a channel that cannot be."""
+    """Read a manifest's channels, in order; MutatorError for an invalid trace or channel."""
     if Path(trace.file).name != trace.file or Path(trace.file).suffix not in SUFFIXES:
         raise source.error(
             ("trace", "file"),
@@ -116,7 +116,7 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
             ("channels",),
             "no channel with `role: actuator`",
             expected="what the controller commands: a fault manifests where it differs from golden",
-            remedy="say of one channel that it is an actuator",
+            remedy="give a channel the role actuator",
         )
     return tuple(_channel(name, model, trace, source) for name, model in models.items())
 
@@ -130,7 +130,7 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
             keys,
             f"'{name}'",
             expected=f"a name that formulas do not have already: {', '.join(RESERVED)}",
-            remedy=f"call it otherwise, with `from: {name}`",
+            remedy=f"choose another name, with `from: {name}`",
         )
     in_topics = trace.file.endswith(".mcap")
     if in_topics and not all(model.from_.partition(":")):

@@ -1,4 +1,4 @@
-"""How a target is run and filmed, as its manifest says it: modules, arguments, changes of a scenario."""
+"""How a manifest says to run and film a target: modules, arguments, changes of a scenario."""
 
 from collections.abc import Collection
 
@@ -10,19 +10,20 @@ from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, chec
 
 
 class ChangeModel(StrictModel, title="A change"):
-    """A change is a list of further arguments, or this, where it makes scenarios the same run."""
+    """A change is a list of further arguments, or this, if it makes scenarios identical."""
 
     args: list[str] = Field(description="Further arguments.")
     same_in: list[str] = Field(
-        min_length=2, description="Scenarios that the change makes the same run: it is driven once."
+        min_length=2, description="Scenarios that the change makes identical: they share one run."
     )
 
 
 class EntryModel(StrictModel, title="The entry"):
-    """Anywhere in an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for
-    trace and record, and `{cache}` a folder that all runs of the target share. It may be missing, unwritable
-    or damaged, and `mutator cache` deletes from it: a run must come to the same bytes all the same. `{root}`
-    is the target's root, for what lies there beside its files; a run reads it, and never writes there."""
+    """In an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for trace
+    and record. `{cache}` is a folder that all runs of the target share. It may be missing, unwritable or
+    damaged, and `mutator cache` deletes from it; results must not depend on it. `{root}` is the target's
+    root, from which a run may read other files, but never write.
+    """
 
     module: str = Field(description="Run as `python -m`, from the root.")
     args: list[str] = Field(
@@ -31,13 +32,12 @@ class EntryModel(StrictModel, title="The entry"):
     )
     stepwise: str | None = Field(
         None,
-        description="A function of the module (or `Class.method`) that takes these arguments and gives a run "
-        "that is driven step by step: what [faster engines](../explanation/performance.md#which-engine-runs) "
-        "need.",
+        description="A function of the module (or `Class.method`) that takes these arguments and returns a "
+        "steppable run, for [faster engines](../explanation/performance.md#which-engine-runs).",
     )
     independent: list[str] = Field(
         default_factory=list,
-        description="More arguments, of a run that takes nothing from what other runs left behind: those of "
+        description="More arguments, for a run that uses nothing that other runs left: those of "
         "the equivalence check, and of mutants of a file in `reads_itself`.",
     )
     changes: dict[str, list[str] | ChangeModel] = Field(
@@ -47,22 +47,23 @@ class EntryModel(StrictModel, title="The entry"):
 
 class FilmModel(StrictModel, title="Films"):
     """What `mutator show --video` and `--still` need. In `run`, `{film}` is the folder for the film. In
-    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of what happened,
-    `{out}` the file to write, and `{t}` the time in s of a still picture."""
+    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events, `{out}`
+    the file to write, and `{t}` the time of a still in s.
+    """
 
-    run: list[str] = Field(description="More arguments of the entry, which make a run leave a film.")
+    run: list[str] = Field(description="More arguments of the entry, with which a run writes a film.")
     module: str = Field(description="Run as `python -m` to show two films.")
     args: list[str] = Field(description="Its arguments.")
-    still: list[str] = Field(description="More of them for a still picture.")
+    still: list[str] = Field(description="More arguments for a still.")
     pictures: list[str] = Field(
         default_factory=list,
-        description="Changes with which the controller sees the camera's pictures: when a run is done, the "
-        "worst of its experiments with one of these get stills by themselves.",
+        description="Changes with which the controller uses the camera's images: after a run, the "
+        "worst of its experiments with one of these get stills automatically.",
     )
 
 
 def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) -> None:
-    """MutatorError with the line of a module, a placeholder or a change that will not do."""
+    """Raise MutatorError with the line of an invalid module, placeholder or change."""
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -111,7 +112,7 @@ def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> N
 
 
 def read_film(model: FilmModel | None) -> Film | None:
-    """The film of a manifest; None where there is none."""
+    """Convert the film of a manifest; None without one."""
     if model is None:
         return None
     return Film(

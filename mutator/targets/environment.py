@@ -1,4 +1,4 @@
-"""The environment of a target's processes: what the harness sets, and what a manifest adds to it."""
+"""The environment of a target's processes: what the harness sets, and what a manifest adds."""
 
 import re
 from collections.abc import Mapping
@@ -6,23 +6,24 @@ from collections.abc import Mapping
 from mutator.config.yaml_files import Source
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's: starting Python needs them
+KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's, needed to start Python
 FIXED = {
     "LC_ALL": "C.UTF-8",
     "PYTHONUTF8": "1",
     "PYTHONDONTWRITEBYTECODE": "1",
     **dict.fromkeys(THREADS, "1"),
-    # pyarrow, which pandas brings, starts a thread for its allocator: a process with it cannot be forked
+    # pyarrow, imported by pandas, starts a thread for its allocator, which prevents forking
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
-_PREFIXES = ("PYTHON", "LD_")  # of variables that change what an interpreter is, or what it loads
+_PREFIXES = ("PYTHON", "LD_")  # of variables that change the interpreter or what it loads
 _OWN = ("TMPDIR", *KEPT, *FIXED)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
 def check_environment(env: Mapping[str, str], source: Source) -> None:
-    """MutatorError for a variable of a manifest's `env` that cannot be set, or is the harness's to set; one
-    that has the harness's own value may be there."""
+    """Check a manifest's `env`; MutatorError for a variable that cannot be set or that the harness sets
+    otherwise.
+    """
     for name, value in env.items():
         if FIXED.get(name) == value:
             continue

@@ -1,4 +1,4 @@
-"""Conditions and formulas of a manifest over what a run records."""
+"""Conditions and formulas of a manifest over recorded values."""
 
 from collections.abc import Collection
 
@@ -7,8 +7,9 @@ from mutator.triggers.conditions import check_condition, check_formula
 
 
 def condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """A condition in its canonical text ('' where there is none), over the names `known`; MutatorError at the
-    place `keys` of the manifest."""
+    """A condition over the names `known` in canonical text ('' for none); MutatorError at `keys` of the
+    manifest.
+    """
     if text is None:
         return ""
     with source.placing(keys):
@@ -16,7 +17,7 @@ def condition(text: str | None, known: Collection[str], source: Source, keys: Ke
 
 
 def formula(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """A formula, as `condition`."""
+    """A formula, like `condition`."""
     if text is None:
         return ""
     with source.placing(keys):

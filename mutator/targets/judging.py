@@ -1,4 +1,4 @@
-"""Hazards and metrics as data: what a run must not come to, and the numbers that tell how bad it was."""
+"""Hazards and metrics as data: what a run must avoid, and numbers for how bad it was."""
 
 import ast
 from collections.abc import Collection
@@ -19,8 +19,10 @@ _WORSE = Literal["higher", "lower"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """A number for each run: an aggregate of `formula` over the steps where `where` holds, up to the end of
-    the drive (the first terminal hazard, if one comes)."""
+    """A number for each run: an aggregate of `formula` over the steps where `where` holds.
+
+    Steps after the end of the drive (the first terminal hazard) do not count.
+    """
 
     name: str
     aggregate: Aggregate
@@ -34,12 +36,12 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hazard:
-    """A hazard and how it is found in a trace. One without `when` and `stl` is what the record says.
+    """A hazard and how to find it in a trace. Without `when` and `stl` the record reports it.
 
-    It comes where `when` has held for `for_s` seconds, or where the STL formula `stl` is violated (and all is
-    seen that it looks at). `margin` is how far a step is from it, in `unit` (of `stl`, its robustness). Once
-    `terminal` holds, the drive is over: later steps are in no metric ('' never; `True`: from the hazard on).
-    Hazards count all the same.
+    It occurs when `when` has held for `for_s` seconds, or when the STL formula `stl` is violated and
+    everything it looks at is known. `margin` is how far a step is from it, in `unit` (for `stl`, the
+    robustness). Once `terminal` holds, the drive is over: later steps are in no metric ('' never; `True`:
+    from the hazard on). Later hazards still count.
     """
 
     name: str
@@ -53,12 +55,12 @@ class Hazard:
 
     @property
     def recorded(self) -> bool:
-        """Whether the target itself judges it."""
+        """Whether the target judges it."""
         return not (self.when or self.stl)
 
     @property
     def metric(self) -> Metric | None:
-        """The least margin of a run, where there are margins: a metric `margin_<hazard>`."""
+        """The least margin of a run, as the metric `margin_<hazard>`; None without margins."""
         if not (self.margin or self.stl):
             return None
         return Metric(
@@ -72,17 +74,17 @@ class Hazard:
 
 
 class HazardModel(StrictModel, title="A hazard"):
-    """By its name. With neither `when` nor `stl` it is taken from the record."""
+    """A hazard by its name. Without `when` and `stl` it is taken from the record."""
 
     about: str = Field("", description="What it is.")
     when: str | None = Field(
         None,
-        description="The condition that makes it, over channels and derived values: what triggers may ask "
-        "for, and `ever(CONDITION)` (it has held by now) and `rate(x)` (change in a second).",
+        description="The condition of the hazard, over channels and derived values: as in triggers, "
+        "plus `ever(CONDITION)` (it has held so far) and `rate(x)` (change per second).",
     )
     stl: str | None = Field(
         None,
-        description="Instead of `when`: a formula of signal temporal logic that must hold, as rtamt has it "
+        description="Instead of `when`: a formula of signal temporal logic that must hold, as rtamt reads it "
         "(`pip install rtamt`), with even steps. The hazard comes at the first step where it does not; with "
         "a formula that looks ahead, as long after that step as it looks ahead.",
     )
@@ -92,33 +94,34 @@ class HazardModel(StrictModel, title="A hazard"):
     margin: str | None = Field(
         None,
         description="How far a step is from the hazard, in `unit`; negative in it. Where `when` is one "
-        "comparison, the difference of its two sides if nothing else is said.",
+        "comparison, the default is the difference of its two sides.",
     )
     unit: str = Field("-", description="The unit of the margin.")
     terminal: bool | str = Field(
         False,
-        description="Whether the drive is over with it, as with a collision; or the condition that ends it.",
+        description="Whether the hazard ends the drive, like a collision; or the condition that ends it.",
     )
 
 
 class MetricModel(StrictModel, title="A metric"):
-    """A column of the results, by its name. Exactly one of the aggregates is given, over the whole drive up
-    to the first terminal hazard. Steps whose value is infinite or NaN are skipped."""
+    """A column of the results, by its name. Give exactly one of the aggregates. They cover the drive up to
+    the first terminal hazard, and skip steps whose value is infinite or NaN.
+    """
 
-    min: str | None = Field(None, description="The least value of this formula over channels.")
-    max: str | None = Field(None, description="Its largest.")
+    min: str | None = Field(None, description="The minimum of this formula over channels.")
+    max: str | None = Field(None, description="Its maximum.")
     mean: str | None = Field(None, description="Its mean over the steps.")
     last: str | None = Field(None, description="Its value in the last step.")
     integral: str | None = Field(None, description="Its integral over time.")
-    duration: str | None = Field(None, description="For how many seconds this condition holds.")
+    duration: str | None = Field(None, description="How many seconds this condition holds.")
     at_end: str | None = Field(
-        None, description="Its value in the step of the first terminal hazard; empty where none came."
+        None, description="Its value in the step of the first terminal hazard; empty if there is none."
     )
-    where: str | None = Field(None, description="Only steps count in which this condition holds.")
+    where: str | None = Field(None, description="Only steps in which this condition holds count.")
     unit: str = Field(description="Its unit; `-` for none.")
     worse: _WORSE = Field(description="Whether a `higher` or a `lower` value is worse.")
-    about: str = Field(description="What it tells.")
-    source: str = Field("", description="Where the formula is from.")
+    about: str = Field(description="What it measures.")
+    source: str = Field("", description="The source of the formula.")
 
 
 def read_hazards(
@@ -129,8 +132,11 @@ def read_hazards(
     recorded: bool,
     step_s: float,
 ) -> tuple[Hazard, ...]:
-    """The hazards of a manifest. `known` are the names that formulas may use; `recorded` says that the target
-    leaves a record; a step has `step_s` seconds. MutatorError with the line of whatever is wrong."""
+    """Read a manifest's hazards; MutatorError with the line of a mistake.
+
+    `known` are the names that formulas may use, `recorded` says that the target writes a record, a step has
+    `step_s` seconds.
+    """
     if isinstance(models, list):
         hazards = tuple(Hazard(name=name) for name in models)
     else:
@@ -140,8 +146,8 @@ def read_hazards(
         raise source.error(
             keys,
             f"hazard '{left[0]}' without `when`, in a manifest without `record`",
-            expected="the condition that makes it, or a record in which the target tells",
-            remedy="say `when`, or name the record",
+            expected="the condition of the hazard, or a record in which the target reports it",
+            remedy="add `when`, or name the record",
         )
     return hazards
 
@@ -195,7 +201,7 @@ def _margin_of(when: str) -> str:
 def read_metrics(
     models: dict[str, MetricModel], known: Collection[str], source: Source
 ) -> tuple[Metric, ...]:
-    """The metrics of a manifest; arguments and errors as for `read_hazards`."""
+    """Read a manifest's metrics; arguments and errors as for `read_hazards`."""
     return tuple(_metric(name, model, known, source) for name, model in models.items())
 
 

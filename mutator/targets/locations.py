@@ -1,4 +1,4 @@
-"""Where in a target a fault may be injected."""
+"""Check where in a target a fault may be injected."""
 
 from mutator.errors import MutatorError
 from mutator.model import FaultLocation
@@ -8,12 +8,12 @@ from mutator.targets.source_tree import matches
 
 
 def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
-    """MutatorError (without place) unless a fault may be injected into the location's file."""
+    """Raise MutatorError (without place) unless a fault may be injected into the location's file."""
     check_file(manifest, location.path)
 
 
 def check_file(manifest: TargetManifest, named: str) -> None:
-    """MutatorError (without place) unless faults may be injected into the file of that name."""
+    """Raise MutatorError (without place) unless faults may be injected into the named file."""
     path = inside(named)
     if path != named or not path.endswith(".py") or path not in manifest.tree.files:
         raise MutatorError(
@@ -24,12 +24,12 @@ def check_file(manifest: TargetManifest, named: str) -> None:
     if path in manifest.tree.overlaid:
         raise MutatorError(
             f"file '{path}' is in the overlay of target {manifest.name}",
-            expected="a file of the controller: glue is no place for a fault",
+            expected="a file of the controller: faults are not injected into glue",
             remedy="inject somewhere else",
         )
     if matches(path, manifest.forbid):
         raise MutatorError(
-            f"file '{path}' is forbidden to faults",
+            f"faults are forbidden in file '{path}'",
             expected=f"a file that `forbid` of {manifest.path.name} does not match",
             remedy="inject somewhere else",
         )

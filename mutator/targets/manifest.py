@@ -1,4 +1,4 @@
-"""The target manifest: all that the harness knows of a controller tree."""
+"""The target manifest: everything the harness knows about a controller tree."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,69 +28,69 @@ _DELTA_V = Metric(
     worse="higher",
     about="change of the own speed in the contact, from contact speed and masses",
 )
-FILM = "film"  # folder in the output of a run that is filmed
+FILM = "film"  # output folder of a filmed run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """How a target's runs are made watchable: what makes a run leave a film, and what shows two of them."""
+    """How to film a target's runs and show two films."""
 
     run_args: tuple[str, ...]  # of the entry module, with {film}
     module: str  # run as `python -m`
     args: tuple[str, ...]  # with {golden}, {faulty} (films), {events}, {out}
-    still_args: tuple[str, ...]  # more of them for a still picture, with {t}
-    pictures: tuple[str, ...]  # changes with which the controller sees the camera's pictures
+    still_args: tuple[str, ...]  # more arguments for a still, with {t}
+    pictures: tuple[str, ...]  # changes with which the controller uses the camera's images
 
 
 @dataclass(frozen=True, kw_only=True)
 class TargetManifest:
-    """A target: its tree, how to run it, what it records. `root` is absolute.
+    """A target: its tree, how to run it, what it records.
 
-    An instance is a snapshot: `tree` is read once, so one manifest object never mixes two states of the
-    target's sources. Load the manifest again to see an edit.
+    An instance is a snapshot: `tree` is read once, so an object never mixes two states of the sources. Load
+    the manifest again to see an edit.
     """
 
     name: str
     path: Path  # the manifest file
-    root: Path  # absolute source root: goes on sys.path
+    root: Path  # absolute source root, added to sys.path
     packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
-    files: tuple[str, ...]  # globs, relative to root: what makes up the tree
-    overlay: Path | None  # absolute: a folder of glue that is laid over the root
-    forbid: tuple[str, ...]  # globs: no fault may be injected there
+    files: tuple[str, ...]  # globs, relative to root: the files of the tree
+    overlay: Path | None  # absolute: a folder of glue laid over the root
+    forbid: tuple[str, ...]  # globs: no faults there
     env: Mapping[str, str]  # variables of every process that runs the target
     requires: tuple[Requirement, ...]  # installed packages that the target needs
     entry_module: str  # run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
-    stepwise: str | None  # function of the entry module: its arguments -> a run to be driven step by step
-    independent: tuple[str, ...]  # more arguments, of a run that takes nothing from what others left behind
-    reads_itself: tuple[str, ...]  # globs: files that a run reads while it runs, so they must be the mutant's
+    stepwise: str | None  # function of the entry module: arguments -> a steppable run
+    independent: tuple[str, ...]  # more arguments, for a run that uses nothing that others left
+    reads_itself: tuple[str, ...]  # globs: files that a run reads, which must then be the mutant's
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
-    armed_after_s: float  # triggers wait so long where nothing else is said: until the controller is at work
-    trace_file: str  # in {out}; its suffix says what kind of file it is
+    armed_after_s: float  # triggers wait until then by default: until the controller works
+    trace_file: str  # in {out}; its suffix gives the format
     time_channel: str
     channels: tuple[Channel, ...]
-    record_file: str | None  # a JSON in {out}, where the target leaves one
+    record_file: str | None  # a JSON in {out}, if the target writes one
     observation: Observation
     rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
-    contact: Contact | None  # what makes a contact severe
+    contact: Contact | None  # how severe a contact is
     scene: Scene | None
-    alerts: tuple[str, ...]  # alerts that count in experiments
+    alerts: tuple[str, ...]  # alerts that count
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
-    # change -> scenarios that it makes the same: their traffic, say, is all they differ in, and it is gone
+    # change -> scenarios that it makes the same, e.g. because they only differ in the traffic that it removes
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def package(self) -> str | None:
-        """The package to which mutants add the probe; None: it is a module of its own beside several."""
+        """The package to which mutants add the probe; None if the probe is a top-level module."""
         first, *others = self.packages
         return None if others or first.endswith(".py") else first
 
     @property
     def import_names(self) -> tuple[str, ...]:
-        """The top-level names of its modules: a run must import them from its own tree."""
+        """The top-level names of its modules, which a run must import from its own tree."""
         laid_over = sorted(path for path in self.tree.overlaid if path.endswith(".py"))
         names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
         return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
@@ -112,7 +112,7 @@ class TargetManifest:
 
     @cached_property
     def compared(self) -> tuple[Channel, ...]:
-        """Actuator outputs: one that differs from golden means that the fault manifested."""
+        """Actuator channels: a fault manifests when one differs from golden."""
         return tuple(channel for channel in self.channels if channel.role is Role.ACTUATOR)
 
     @cached_property
@@ -122,7 +122,7 @@ class TargetManifest:
 
     @cached_property
     def judged(self) -> tuple[Channel, ...]:
-        """The channels that hazards and metrics are judged by."""
+        """The channels that hazards and metrics use."""
         channels = [channel.name for channel in self.channels]
         known = self.observation.judgeable(channels)
         needed = self.observation.inputs(_names_of(self.rules, self.metrics, known))
@@ -135,17 +135,17 @@ class TargetManifest:
 
     @cached_property
     def measures(self) -> tuple[Metric, ...]:
-        """All numbers that a run is given: the margins of its hazards, its metrics, delta-v."""
+        """All numbers of a run: the margins of its hazards, its metrics, delta-v."""
         margins = [hazard.metric for hazard in self.rules if hazard.metric]
         return (*margins, *self.metrics, *([_DELTA_V] if self.contact else []))
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """The files that a run leaves in {out}."""
+        """The files that a run writes into {out}."""
         return (self.trace_file, *([self.record_file] if self.record_file else []))
 
     def reads_any(self, paths: Iterable[str]) -> bool:
-        """Whether a run itself reads one of these files: what it caches follows from their content."""
+        """Whether a run itself reads one of these files, so that its caches depend on them."""
         return any(matches(path, self.reads_itself) for path in paths)
 
     def arguments(
@@ -157,7 +157,7 @@ class TargetManifest:
         changes: tuple[str, ...] = (),
         independent: bool = False,
     ) -> tuple[str, ...]:
-        """The entry module's arguments for one run; MutatorError for a change the target does not know."""
+        """The entry module's arguments for one run; MutatorError for an unknown change."""
         values = {"scenario": str(scenario), "seed": str(seed), "out": str(out)}
         values |= {"film": str(out / FILM), "cache": str(caches.of_target(self.name)), "root": str(self.root)}
         extra = [*self.independent] if independent else []
@@ -173,19 +173,19 @@ class TargetManifest:
         return tuple(filled((*self.entry_args, *extra), values))
 
     def filming(self) -> "TargetManifest":
-        """The same target, whose runs leave a film; MutatorError for a target that cannot be filmed."""
+        """The same target with runs that write a film; MutatorError if it cannot be filmed."""
         if self.film is None:
             raise MutatorError(
                 f"target {self.name} cannot be filmed",
                 where=self.path,
                 expected="`film` in its manifest",
-                remedy="say there which commands take and show a film",
+                remedy="add the commands that record and show a film",
             )
         return replace(self, entry_args=(*self.entry_args, *self.film.run_args))
 
 
 def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
-    """What the formulas of hazards and metrics ask for, `known` being all that they can."""
+    """The names in `known` that the formulas of hazards and metrics use."""
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
     in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))

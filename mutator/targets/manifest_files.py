@@ -1,4 +1,4 @@
-"""Target manifests as YAML: `fault_library/targets/<name>.yaml`, checked and read into a `TargetManifest`."""
+"""Read target manifests, `fault_library/targets/<name>.yaml`, into `TargetManifest`."""
 
 from collections.abc import Collection
 from pathlib import Path
@@ -24,14 +24,14 @@ SCHEMA = NEW
 
 
 class ManifestModel(StrictModel, title="The file"):
-    """How a target is found, run and observed, and what its runs leave behind."""
+    """How to find, run and observe a target, and what its runs write."""
 
-    name: str = Field(description="Its name, which campaigns use.")
+    name: str = Field(description="The name that campaigns use.")
     about: str = Field("", description="What the target is.")
     root: str = Field(
         description="The folder that goes on `sys.path`, relative to this file; or `shipped:target`, the "
-        "controller that ships with mutator; or `installed:NAME`, the folder in which pip put the import "
-        "package `NAME`, of which nothing else is part of the tree. `--target` overrides it."
+        "controller that ships with mutator; or `installed:NAME`, the folder where pip installed the import "
+        "package `NAME`; nothing else there is part of the tree. `--target` overrides it."
     )
     package: str | None = Field(
         None, description="The import package in it. The probe is added to it as `_fi.py`."
@@ -39,84 +39,83 @@ class ManifestModel(StrictModel, title="The file"):
     packages: list[str] | None = Field(
         None,
         min_length=1,
-        description="Instead of `package`: several import packages, or modules that lie in no package "
-        "(`drive.py`). The probe is then a module of its own beside them, `_fi.py`.",
+        description="Instead of `package`: several import packages, or modules outside of packages "
+        "(`drive.py`). The probe is then a module next to them, `_fi.py`.",
     )
     files: list[str] | None = Field(
         None,
         min_length=1,
-        description="Globs, relative to the root: what makes up the tree. `**` stands for any folders. "
-        "Without it, all files of the packages, data too, and the modules. Links count as what they lead to.",
+        description="Globs, relative to the root: the files of the tree. `**` stands for any folders. "
+        "Default: all files of the packages, including data, and the modules. Links count as their targets.",
     )
     overlay: str | None = Field(
         None,
-        description="A folder of glue, relative to this file or to the library, that is laid over the root: "
+        description="A folder of glue, relative to this file or to the library, laid over the root: "
         "all its files are part of the tree, and no fault may be injected there. The entry module and the "
         "observation may lie in it.",
     )
     forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
     reads_itself: list[str] = Field(
         default_factory=list,
-        description="Globs: files that a run reads while it runs, as what it caches follows from them. A "
+        description="Globs: files that a run reads, as what it caches depends on them. A "
         "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
     )
     env: dict[str, str] = Field(
         default_factory=dict,
-        description="Environment variables of every process that runs the target, beside the few that the "
-        "harness sets; nothing else of the user's environment gets there.",
+        description="Environment variables of every process that runs the target, besides the few that "
+        "the harness sets; nothing else of the user's environment is passed on.",
     )
     requires: list[str] = Field(
         default_factory=list,
-        description="Installed packages that the target needs, as pip takes them: `gymnasium>=1.0`. One "
-        "that is missing or of another version is told by `check`, `doctor`, and before a run.",
+        description="Installed packages that the target needs, in pip's syntax: `gymnasium>=1.0`. `check`, "
+        "`doctor` and `run` report missing packages and wrong versions.",
     )
     step_s: float = Field(ge=1e-6, allow_inf_nan=False, description="The length of a step of simulation.")
     armed_after_s: float = Field(
         0.0,
         ge=0.0,
         allow_inf_nan=False,
-        description="When `mutator try` arms triggers, where nothing else is said.",
+        description="When `mutator try` arms triggers by default.",
     )
     entry: EntryModel = Field(description="How a run is started.")
     trace: TraceModel | None = Field(None, description="The numbers that a run records.")
     record: str | None = Field(
         None,
-        description="The record's name in `{out}`: a JSON file in which the target tells of hazards and "
+        description="The record's name in `{out}`: a JSON file in which the target reports hazards and "
         "alerts, see [another controller tree](../how-to/add-a-target.md#what-a-run-leaves-behind).",
     )
     channels: dict[str, ChannelModel] = Field(description="What is recorded, and which part it plays.")
     observation: ObservationModel = Field(description="Where ground truth is read.")
     hazards: list[str] | dict[str, HazardModel] = Field(
-        description="What a run must not come to: by name how it is found in the trace, or a list of names "
-        "that the record has."
+        description="What a run must avoid: names with how to find each in the trace, or a list of names "
+        "in the record."
     )
     metrics: dict[str, MetricModel] = Field(
-        default_factory=dict, description="Numbers that each run is given: columns of the results."
+        default_factory=dict, description="Numbers computed for each run: columns of the results."
     )
     severity: SeverityModel | None = Field(
-        None, description="How hard a contact is; without it no result has a class of severity."
+        None, description="How severe a contact is; without it no result has a class of severity."
     )
     scene: SceneModel | None = Field(None, description="How a drive looks from above.")
     alerts: list[str] = Field(
         default_factory=list,
-        description="Names of the alerts that count; others that a record has are left out.",
+        description="Names of the alerts that count; others in a record are ignored.",
     )
-    film: FilmModel | None = Field(None, description="How runs are made watchable; without it they are not.")
+    film: FilmModel | None = Field(None, description="How to film runs; without it they cannot be filmed.")
 
 
 def upgrade_manifest(path: Path) -> Upgrade | None:
-    """A manifest of the older schema as one of today's; None for one that is. MutatorError for a file that is
-    neither."""
+    """Upgrade a manifest of the older schema; None if it is current. MutatorError if it is neither."""
     source = load(path)
     if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
         read(path, ManifestModel, SCHEMA)
         return None
-    load_manifest(path, root=path.parent)  # its tree need not be there
+    load_manifest(path, root=path.parent)  # its tree may be missing
     return upgraded_text(source)
 
 
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
-    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override those that it names."""
+    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override the file's."""
     model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
@@ -187,7 +186,7 @@ def _check_record(model: ManifestModel, source: Source) -> None:
 
 
 def _check_recorded(source: Source, hidden: Collection[str]) -> None:
-    """Hazards and metrics are judged on the trace: what is observed and not recorded is in none."""
+    """Check that hazards and metrics only use recorded values, since they are judged on the trace."""
     for key in ("hazards", "metrics"):
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():
@@ -196,14 +195,14 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
                 if found and field not in ("about", "unit", "source"):
                     raise source.error(
                         (key, name, field),
-                        f"'{found[0]}', which is observed and not recorded",
+                        f"'{found[0]}', which is observed but not recorded",
                         expected="what follows from the channels",
                         remedy=f"have the run record it, as a channel `{found[0]}` with `role: truth`",
                     )
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:
-    """Hazards and alerts have names that tables can take, each once."""
+    """Check that names of hazards and alerts are valid in tables and unique."""
     for key in ("hazards", "alerts"):
         seen = set[str]()
         names = getattr(model, key)

@@ -1,4 +1,4 @@
-"""What is observed of a target: values at one place in each step, and what follows from them."""
+"""What is observed of a target: values at one place in each step, and values derived from them."""
 
 import ast
 import keyword
@@ -27,8 +27,9 @@ _ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  #
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """An observed value: `text` is an expression at the place, or, derived, a formula over the values before
-    it. `unit` is for tables, `-` for none.
+    """An observed value: `text` is an expression at the place, or, if derived, a formula over earlier values.
+
+    `unit` is for tables, `-` for none.
     """
 
     name: str
@@ -39,9 +40,7 @@ class Value:
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """Where a target is observed. `time` is an expression for the time (s) at the place; None: steps are
-    counted.
-    """
+    """Where a target is observed. `time` is an expression for the time (s) there; None: steps are counted."""
 
     location: FaultLocation
     time: str | None
@@ -50,17 +49,17 @@ class Observation:
 
     @property
     def expressions(self) -> tuple[tuple[str, str], ...]:
-        """What the target is asked for at the place: names, and expressions valid there."""
+        """Names and expressions that the probe evaluates at the place."""
         time = () if self.time is None else ((TIME, self.time),)
         return (*time, *((value.name, value.text) for value in self.values))
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
-        """What conditions may ask for: time, the observed values, the derived ones."""
+        """Variables for conditions: time, the observed values, the derived ones."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
     def inputs(self, names: Iterable[str]) -> frozenset[str]:
-        """These names, and those that their formulas are over, if they are derived values."""
+        """These names, and the inputs of those that are derived values."""
         found = set(names)
         for value in reversed(self.derived):
             if value.name in found:
@@ -68,8 +67,9 @@ class Observation:
         return frozenset(found)
 
     def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
-        """What formulas over a trace with these channels can ask for: time, the channels, and the derived
-        values that follow from them."""
+        """What formulas over a trace with these channels can use: time, channels, and values derived from
+        them.
+        """
         known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
         for value in self.derived:
             if all(name in known for name in names_in(value.text)):
@@ -84,29 +84,30 @@ class _ValueModel(StrictModel, title="A value"):
 
 
 class ObservationModel(StrictModel, title="The observation"):
-    """Where ground truth is read, once in each step: time goes on from one to the next, or starts again with
-    another run."""
+    """Where ground truth is read, once in each step. Time increases from step to step, or restarts with
+    another run.
+    """
 
     at: AtModel = Field(description="The place; values are read there.")
     time: str | None = Field(
         None,
         description="Time in s, as an expression like those of values. Without it steps are counted: the "
-        "n-th observation is at (n - 1) times `step_s`, and a process cannot drive a second run.",
+        "n-th observation is at (n - 1) times `step_s`, and a process cannot simulate a second run.",
     )
     values: dict[str, _ValueModel] = Field(
         default_factory=dict,
-        description="Name -> what is read at the place: names, attributes, items with constant keys, "
+        description="Name -> an expression at the place: names, attributes, items with constant keys, "
         "numbers, arithmetic, comparisons, and calls of `abs`, `min`, `max`, `hypot`, `float`, `len`.",
     )
     derived: dict[str, _ValueModel] = Field(
         default_factory=dict,
-        description="Name -> a formula over the values above it: arithmetic, `abs`, `min`, `max`, `hypot`, "
-        "`inf`, and a choice, `a if b > 0 else c`. Division by 0 is infinite or NaN, and no error.",
+        description="Name -> a formula over the values before it: arithmetic, `abs`, `min`, `max`, `hypot`, "
+        "`inf`, and a choice, `a if b > 0 else c`. Division by 0 is infinite or NaN, not an error.",
     )
 
 
 def read_observation(model: ObservationModel, source: Source) -> Observation:
-    """The observation of a manifest; errors point into `source`."""
+    """Read a manifest's observation; errors point into `source`."""
     location = model.at.location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(
@@ -164,12 +165,12 @@ def _read(text: str, source: Source, keys: tuple[str, ...]) -> str:
             shown(text),
             expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
             f"calls of {', '.join(_FUNCTIONS)}",
-            remedy="say where the value is at that statement",
+            remedy="write where that statement finds the value",
         ) from None
 
 
 def _expression(text: str) -> str:
-    """The text of an expression that does nothing but read and reckon; ValueError for any other."""
+    """Check that an expression only reads and computes; ValueError otherwise."""
     if len(text) > _LONGEST:
         raise ValueError(text)
     tree = ast.parse(text.strip(), mode="eval").body
@@ -206,7 +207,7 @@ def _is_plain(node: ast.AST) -> bool:
 
 
 class _Hypot(ast.NodeTransformer):
-    """The place need not know `hypot`; the probe does."""
+    """Replaces `hypot` by the probe's, as the place may not know it."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
@@ -216,6 +217,6 @@ class _Hypot(ast.NodeTransformer):
 
 
 def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
-    """Unit and meaning of everything that a condition may ask for."""
+    """Unit and meaning of everything that a condition can use."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

@@ -1,4 +1,4 @@
-"""Paths that come from data: relative, and never out of their folder."""
+"""Paths from data files: relative, and confined to their folder."""
 
 from pathlib import PurePosixPath
 
@@ -9,7 +9,7 @@ def inside(path: str) -> str:
     """`path` as a clean relative path below a target's root; MutatorError (without place) if it leads
     elsewhere.
 
-    Links are no way out: a target's files are read once, and never written to.
+    Links are allowed: a target's files are read once and never written.
     """
     pure = PurePosixPath(path)
     if not path or pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path:

@@ -1,4 +1,4 @@
-"""Placeholders in the arguments of a target's commands: `{out}`, anywhere in an argument."""
+"""Placeholders such as `{out}` in the arguments of a target's commands."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ def filled(arguments: Iterable[str], values: Mapping[str, str]) -> list[str]:
 
 
 def check_placeholders(arguments: Sequence[str], known: Sequence[str], source: Source, keys: Keys) -> None:
-    """MutatorError, at the argument's line below `keys`, for a placeholder that is none of the `known`."""
+    """Raise MutatorError, at the argument's line below `keys`, for an unknown placeholder."""
     for i, argument in enumerate(arguments):
         for name in _PLACEHOLDER.findall(argument):
             if name not in known:

@@ -1,4 +1,4 @@
-"""The installed packages that a target needs: PEP 508 requirements, and what of them is not there."""
+"""The installed packages that a target needs, as PEP 508 requirements."""
 
 from collections.abc import Iterable, Sequence
 from importlib import metadata
@@ -15,7 +15,7 @@ MISSING = "not installed"
 
 
 def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement, ...]:
-    """A manifest's `requires`; MutatorError with the line of what is no requirement."""
+    """Read a manifest's `requires`; MutatorError with the line of an invalid requirement."""
     found = []
     for i, text in enumerate(texts):
         try:
@@ -31,8 +31,9 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
 
 
 def shortcoming(wanted: Requirement) -> str:
-    """What is wrong with the installed version of a package: `not installed`, or which version there is;
-    empty if nothing is, or if it is not wanted on this machine."""
+    """What is wrong with a package: `not installed`, or the installed version; empty if it is fine or not
+    needed here.
+    """
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return ""
     try:
@@ -44,8 +45,9 @@ def shortcoming(wanted: Requirement) -> str:
 
 
 def check_requirements(manifest: "TargetManifest") -> None:
-    """MutatorError that names every package that the target needs and that is missing or of another version,
-    with the command that installs them."""
+    """Raise MutatorError if packages are missing or have wrong versions, with the command that installs
+    them.
+    """
     found = {wanted: problem for wanted in manifest.requires if (problem := shortcoming(wanted))}
     if found:
         first = manifest.requires.index(next(iter(found)))

@@ -1,5 +1,4 @@
-"""Where a target lies: its root (a folder, the shipped controller, an installed package), its packages, its
-overlay."""
+"""Find a target's root (a folder, the shipped controller, an installed package), packages and overlay."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -12,12 +11,14 @@ from mutator.config.locations import PROBE_NAME
 from mutator.config.yaml_files import Source
 from mutator.targets.requirements import pip_install
 
-INSTALLED = "installed:"  # before the name of an import package, as `root` of a manifest
+INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a manifest
 
 
 def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
-    """The folder that `root` of a manifest means, whether there is one or not. An installed package is found,
-    not imported; where it is missing, the error says to install `requires`, or what it is called."""
+    """The folder that `root` of a manifest means, which may not exist.
+
+    An installed package is located without importing it; if missing, the error says what to install.
+    """
     if root == SHIPPED_TARGET:
         return shipped_folder() / "target"
     if not root.startswith(INSTALLED):
@@ -37,7 +38,7 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
 
 
 def find_overlay(overlay: str | None, source: Source) -> Path | None:
-    """The folder that is laid over the root, relative to the manifest or to its library."""
+    """The overlay folder, relative to the manifest or its library."""
     path = source.path
     if overlay is None:
         return None
@@ -53,7 +54,7 @@ def find_overlay(overlay: str | None, source: Source) -> Path | None:
 
 
 def read_packages(package: str | None, packages: Sequence[str] | None, source: Source) -> tuple[str, ...]:
-    """The target's packages and modules, each once."""
+    """The target's packages and modules, without duplicates."""
     if (package is None) == (packages is None):
         raise source.error(
             ("packages",),
@@ -86,7 +87,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
 
 
 def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: Source) -> None:
-    """MutatorError if the tree would have more of the folder of an installed package than the package."""
+    """Raise MutatorError if the tree would have files outside an installed package."""
     name = root.removeprefix(INSTALLED)
     if name == root:
         return
@@ -95,8 +96,8 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
             raise source.error(
                 ("packages",) if "packages" in source.data else ("package",),
                 f"'{package}' beside {root}",
-                expected=f"'{name}' alone: what lies beside it is other people's",
-                remedy="leave it out; what is yours goes into an `overlay`",
+                expected=f"'{name}' alone: other files there belong to other packages",
+                remedy="leave it out; put your own files into an `overlay`",
             )
     for i, glob in enumerate(files):
         if glob != f"{name}.py" and not glob.startswith(f"{name}/"):
@@ -106,7 +107,7 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
 
 
 def installed_at(name: str) -> Path | None:
-    """The folder or the file of an import package or module; None where there is no one such place."""
+    """The folder or file of an import package or module; None if there is no single place."""
     try:
         found = find_spec(name)
     except (ImportError, ValueError):

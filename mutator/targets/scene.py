@@ -1,4 +1,4 @@
-"""A scene: what a drive looks like from above, in channels. It is checked here; the report draws it."""
+"""A scene: how to draw a drive from above. The report draws it."""
 
 import math
 from collections.abc import Collection
@@ -15,9 +15,12 @@ Shape = Literal["box", "circle"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actor:
-    """Something that moves: its middle at (`x`, `y`) in m, turned by `heading` (rad, left positive), each a
-    formula over channels; `width` is a circle's diameter. It is there while `visible` holds; one that is
-    `believed` is where the controller takes something to be."""
+    """Something that moves, with formulas over channels: its middle (`x`, `y`) in m and `heading` (rad, left
+    positive).
+
+    `width` is a circle's diameter. It exists while `visible` holds. A `believed` actor is where the
+    controller assumes something.
+    """
 
     name: str
     shape: Shape
@@ -33,7 +36,7 @@ class Actor:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Line:
-    """A line on the ground: points (x, y) in m, or one that runs along x at `y`, a formula over channels."""
+    """A line on the ground: points (x, y) in m, or a formula `y` for a line along x."""
 
     name: str
     points: tuple[tuple[float, float], ...]
@@ -43,8 +46,10 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """What can be drawn of a drive. `follow` is the actor that the view stays with ('' none), `speed` a
-    formula for how fast the origin moves along x (m/s)."""
+    """What can be drawn of a drive. `follow` is the actor that the view follows ('' none).
+
+    `speed` is a formula for the speed of the origin along x (m/s).
+    """
 
     actors: tuple[Actor, ...]
     lines: tuple[Line, ...]
@@ -61,16 +66,16 @@ class _ActorModel(StrictModel, title="An actor"):
     x: str = Field(description="Of its middle, m: a formula over channels and derived values.")
     y: str = Field("0", description="Of its middle, m, left positive.")
     heading: str = Field("0", description="rad, left positive.")
-    visible: str = Field("True", description="The condition while which it is there.")
+    visible: str = Field("True", description="The condition under which it is drawn.")
     believed: bool = Field(
-        False, description="Whether it is where the controller takes something to be: drawn as an outline."
+        False, description="Whether it is where the controller assumes something: drawn as an outline."
     )
     about: str = Field("", description="What it is.")
 
 
 class _LineModel(StrictModel, title="A line"):
     points_m: list[list[float]] | None = Field(
-        None, min_length=2, description="The points [x, y] that it joins; or else `y`."
+        None, min_length=2, description="The points [x, y] that it joins; alternatively `y`."
     )
     y: str | None = Field(None, description="Of a line along x, m: a formula over channels.")
     dashed: bool = Field(False, description="Whether it is drawn dashed.")
@@ -81,16 +86,16 @@ class SceneModel(StrictModel, title="The scene"):
 
     actors: dict[str, _ActorModel] = Field(min_length=1, description="What moves, by name.")
     lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lines on the ground, by name.")
-    follow: str | None = Field(None, description="The actor that the view stays with.")
+    follow: str | None = Field(None, description="The actor that the view follows.")
     speed: str = Field(
         "0",
-        description="How fast the origin moves along x, m/s: a formula, for a drive whose poses are relative "
-        "to the car. The road then passes by, and a car that falls behind the golden run is seen to.",
+        description="The speed of the origin along x in m/s: a formula, for a drive whose poses are relative "
+        "to the car. The road then moves, and a car that falls behind the golden run visibly does so.",
     )
 
 
 def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
-    """The scene of a manifest, `known` being the names that formulas may use; MutatorError with the line."""
+    """Read a manifest's scene; formulas may use the names `known`. MutatorError with the line."""
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),
@@ -128,7 +133,7 @@ def _line(name: str, model: _LineModel, known: Collection[str], source: Source) 
     keys: Keys = ("scene", "lines", name)
     if (model.points_m is None) == (model.y is None):
         raise source.error(
-            keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="say one of them"
+            keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="give one of them"
         )
     for i, point in enumerate(model.points_m or ()):
         if len(point) != 2 or not all(map(math.isfinite, point)):

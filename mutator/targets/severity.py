@@ -1,4 +1,4 @@
-"""Severity of a contact: delta-v of the own car, and the class that a scale gives it."""
+"""Severity of a contact: delta-v of the ego car, and its class on a scale."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +19,11 @@ _KPH = UNITS["kph"].factor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """How hard a contact is: it comes with the terminal hazard `hazard`, at the closing speed that the metric
-    `speed` has (m/s), between masses in kg; `scale` names what makes a class of it."""
+    """How severe a contact is.
+
+    It occurs with the terminal hazard `hazard`, at the closing speed in the metric `speed` (m/s), between
+    masses in kg; `scale` names the scale that classifies it.
+    """
 
     hazard: str
     speed: str
@@ -29,15 +32,18 @@ class Contact:
     scale: str
 
     def delta_v(self, closing: float) -> float:
-        """Change of the own speed, m/s, in an inelastic collision along the line of travel: momentum is kept,
-        and both go on as one. Where they do not close in (0 or less) nothing changes."""
+        """Change of the ego speed in m/s, in an inelastic collision along the line of travel.
+
+        It is 0 if the closing speed is not positive.
+        """
         return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """A class for each delta-v. `classes` are (name, least delta-v in m/s, meaning), the mildest first, from
-    0; `source` says where the bounds are from."""
+    """Classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, from 0; `source` cites
+    the bounds.
+    """
 
     name: str
     about: str
@@ -46,28 +52,29 @@ class Scale:
 
     @classmethod
     def from_plain(cls, data: Mapping[str, Any]) -> "Scale":
-        """The scale that `plain` gave."""
+        """The scale that `plain` returned."""
         classes = tuple((name, float(least), about) for name, least, about in data["classes"])
         return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
 
     def plain(self) -> dict[str, Any]:
-        """The scale as JSON has it, for run.json and pages."""
+        """The scale as JSON types, for run.json and pages."""
         told = {"name": self.name, "about": self.about, "source": self.source}
         return told | {"classes": [list(one) for one in self.classes]}
 
     def class_of(self, delta_v: float) -> str:
-        """The class of a delta-v in m/s, 0 or more; one that is just on a bound is in the upper class."""
+        """The class of a delta-v in m/s, 0 or more; a value on a bound is in the upper class."""
         return [name for name, least, _ in self.classes if delta_v >= least][-1]
 
 
 class SeverityModel(StrictModel, title="Severity"):
-    """How hard a contact is. Delta-v of the own car, `contact_speed * other_mass_kg / (mass_kg +
-    other_mass_kg)`, is a metric, `delta_v`; the scale gives it a class."""
+    """How severe a contact is. Delta-v of the own car, `contact_speed * other_mass_kg / (mass_kg +
+    other_mass_kg)`, is the metric `delta_v`; the scale classifies it.
+    """
 
     contact: str = Field(description="The terminal hazard that is a contact with another vehicle.")
     contact_speed: str = Field(
-        description="The metric that is the closing speed there: one with `at_end`, in m/s. Below 0 the two "
-        "part, and delta-v is 0."
+        description="The metric with the closing speed there: one with `at_end`, in m/s. Below 0 the cars "
+        "separate, and delta-v is 0."
     )
     mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the own car.")
     other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the other vehicle.")
@@ -82,24 +89,24 @@ class _ClassModel(StrictModel, title="A class"):
 
 
 class ScaleModel(StrictModel, title="severity/*.yaml"):
-    """What class a delta-v is in. A library may have several, and bounds of its own."""
+    """The bounds of each class. A library can define several scales."""
 
     about: str = Field("", description="What it is for.")
-    source: str = Field(description="Where the bounds are from.")
+    source: str = Field(description="The source of the bounds.")
     classes: dict[str, _ClassModel] = Field(description="S0, S1, S2 and S3, each from a higher delta-v.")
 
 
 def read_contact(
     model: SeverityModel, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
 ) -> Contact:
-    """What a manifest says of severity; MutatorError with the line of a hazard or metric that will not do."""
+    """Read a manifest's severity; MutatorError with the line of an unsuitable hazard or metric."""
     terminal = [hazard.name for hazard in hazards if hazard.terminal]
     if model.contact not in terminal:
         raise source.error(
             ("severity", "contact"),
             f"'{model.contact}'",
             expected=f"a hazard with `terminal`: {', '.join(terminal) or 'there is none'}",
-            remedy="correct the name, or say `terminal: true` of the hazard",
+            remedy="correct the name, or add `terminal: true` to the hazard",
         )
     speeds = [m.name for m in metrics if m.aggregate == "at_end" and m.unit == "m/s"]
     if model.contact_speed not in speeds:

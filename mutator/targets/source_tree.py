@@ -1,4 +1,4 @@
-"""A target's files in memory: read once, digested once, and what others derive from each of them."""
+"""A target's files in memory: read once, digested once, with cached derived data."""
 
 import os
 import re
@@ -26,7 +26,7 @@ class SourceTree:
     root: Path
     files: Mapping[str, bytes]
     digest: str
-    _entries: Mapping[str, str] = field(repr=False)  # what the digest is made of
+    _entries: Mapping[str, str] = field(repr=False)  # input of the digest
     overlay: Path | None = None
     overlaid: frozenset[str] = frozenset()
     _derived: dict[tuple[str, Callable[..., Any]], Any] = field(
@@ -34,10 +34,10 @@ class SourceTree:
     )
 
     def derived(self, path: str, make: Callable[[str, bytes, Path], T]) -> T:
-        """What `make(path, data, root)` returns for a file of the target; called once for each path. `root`
-        is the folder that it was read from.
+        """Return `make(path, data, root)` for a file of the target, called once per path; `root` is the
+        file's folder.
 
-        MutatorError when the target has no file at `path`; errors of `make` pass through.
+        MutatorError if the target has no file at `path`; errors of `make` pass through.
         """
         key = (path, make)
         if key not in self._derived:
@@ -53,7 +53,7 @@ class SourceTree:
         return cast("T", self._derived[key])
 
     def named(self, where: str) -> str:
-        """A place in the target's folders as specs name it: relative to them."""
+        """A path in the target's folders as specs write it, relative to them."""
         for folder in (self.root, self.overlay or self.root):
             where = where.removeprefix(f"{folder}{os.sep}")
         return where
@@ -69,7 +69,7 @@ class SourceTree:
 
 
 def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
-    """What each file puts into its tree's digest: its path and its own, as canonical text."""
+    """What each file adds to the digest: its path and digest, as canonical text."""
     return {path: canonical([path, digest(data)]) for path, data in files.items()}
 
 
@@ -79,10 +79,9 @@ def _digest(entries: Mapping[str, str]) -> str:
 
 
 def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
-    """Read the files of `root` that match, and all of `overlay`; bytecode is never part of a tree.
+    """Read the files of `root` that match, and all of `overlay`, but no bytecode.
 
-    Links count as what they lead to. MutatorError for one that leads nowhere, and for a path that both
-    folders have.
+    Links count as their targets. MutatorError for a dangling link, and for a path that both folders have.
     """
     files = _read(root, tuple(globs))
     laid_over = _read(overlay, ("**",)) if overlay else {}
@@ -91,7 +90,7 @@ def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> 
             raise MutatorError(
                 f"'{path}' is in the overlay and in {root}",
                 where=overlay,
-                expected="files that the root has not",
+                expected="files that the root does not have",
                 remedy="rename the overlay's file",
             )
     files |= laid_over
@@ -115,10 +114,10 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
         check_is_text(path)
         if path.is_symlink() and not path.exists():
             raise MutatorError(
-                f"a link to {path.readlink()}, where nothing is",
+                f"a dangling link to {path.readlink()}",
                 where=path,
                 expected="a file",
-                remedy="mend or remove it, or leave it out of `files`",
+                remedy="correct or remove it, or leave it out of `files`",
             )
         if path.is_file():
             files[found[path]] = path.read_bytes()
@@ -126,8 +125,7 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
 
 
 def _below(folder: Path, above: tuple[Path, ...] = ()) -> Iterator[Path]:
-    """Everything below a folder that is no folder itself, but for bytecode; a link that leads back to a
-    folder above it is not followed."""
+    """Yield all files below a folder except bytecode; a link to a folder above it is not followed."""
     here = folder.resolve()
     try:
         inside = list(folder.iterdir()) if folder.is_dir() and here not in above else []

@@ -1,4 +1,4 @@
-"""How a run is ended at its first terminal hazard: the manifest's conditions as code for its process."""
+"""Generate code that ends a run at its first terminal hazard, from the manifest's conditions."""
 
 import ast
 from inspect import getsource
@@ -9,16 +9,16 @@ from mutator.targets.judging import Hazard
 from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import TIME, divide, names_in, parse, to_code
 
-_REMEDY = "leave `after_hazard` out of the campaign, so that runs go on"
+_REMEDY = "leave `after_hazard` out of the campaign, so that runs continue"
 
 
 def stop_source(manifest: TargetManifest) -> str:
-    """Source of a function `over(recorded)`: whether a terminal hazard holds in a step, of which `recorded`
-    has the numbers by their names in the trace. `math` must be there, and `min` and `max` that pass on NaN.
+    """Source of a function `over(recorded)`: whether a terminal hazard holds in a step.
 
-    MutatorError at what cannot be told of one step alone: a hazard that must last or asks for the steps
-    before, one that the record or temporal logic tells, a channel that is not there in each step; and for a
-    target without a terminal hazard or `entry.stepwise`.
+    `recorded` has the step's values by their names in the trace. The code needs `math`, and `min` and `max`
+    that propagate NaN. MutatorError for hazards that one step cannot decide: a hazard that must last or looks
+    at earlier steps, one judged by the record or temporal logic, a channel not recorded in each step; and for
+    a target without a terminal hazard or `entry.stepwise`.
     """
     if manifest.stepwise is None:
         raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")
@@ -45,19 +45,19 @@ def stop_source(manifest: TargetManifest) -> str:
 
 
 def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
-    """The condition that ends the drive with a hazard."""
+    """The condition under which a hazard ends the drive."""
     own = hazard.terminal != "True"
     text = hazard.terminal if own else hazard.when
     keys = ("hazards", hazard.name)
     if not text:
         judge = "temporal logic" if hazard.stl else "the target itself"
-        raise _refused(manifest, keys, f"{hazard.name}, which {judge} tells", "a condition, `when`")
+        raise _refused(manifest, keys, f"{hazard.name}, which is judged by {judge}", "a condition, `when`")
     if hazard.for_s and not own:
         raise _refused(manifest, (*keys, "for_s"), f"{hazard.name} must last", "a condition of one step")
     calls = {ast.unparse(node.func) for node in ast.walk(parse(text)) if isinstance(node, ast.Call)}
     if earlier := calls & {"ever", "rate"}:
         got = f"{hazard.name} asks for `{min(earlier)}`"
-        raise _refused(manifest, keys, got, "a condition of one step alone")
+        raise _refused(manifest, keys, got, "a condition of a single step")
     return text
 
 

@@ -1,4 +1,4 @@
-"""Manifests of the schema target/1, whose observed values were the same four for every target."""
+"""Upgrade manifests of the schema target/1, which observed the same four values for every target."""
 
 import re
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from mutator.config.yaml_files import Keys, Source, parse
 from mutator.errors import MutatorError
 
 OLD, NEW = "target/1", "target/2"
-# key of target/1 -> keys of target/2 that are written in its place
+# key of target/1 -> keys of target/2 that replace it
 _REPLACED: dict[str, tuple[str, ...]] = {
     "schema": ("schema",),
     "observation": ("observation",),
@@ -37,8 +37,9 @@ _DERIVED = {
 
 
 def upgraded(source: Source) -> Source:
-    """The manifest as one of target/2; its values keep their lines. MutatorError for one that lacks what
-    target/1 asked for."""
+    """The manifest as target/2; its values keep their lines. MutatorError if it lacks what target/1
+    required.
+    """
     data, lines = dict(source.data), dict(source.lines)
     _check_complete(data, _REQUIRED, source, ())
     if isinstance(observation := data["observation"], dict):
@@ -75,8 +76,10 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
-    """Of `compare` and `plot`, which leave `data`: actuators, and what the target told no role of. What is in
-    both was compared."""
+    """Convert `compare` and `plot`, which are removed from `data`: actuators, and channels without a role.
+
+    A channel in both was compared.
+    """
     channels = dict[str, Any]()
     for key, role in (("compare", "actuator"), ("plot", "internal")):
         for name, channel in data.pop(key, {}).items():
@@ -91,15 +94,17 @@ def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Upgrade:
-    """A manifest as text of target/2; `lost` are comments within what had to be written anew."""
+    """A manifest as text of target/2; `lost` are comments within rewritten parts."""
 
     text: str
     lost: tuple[str, ...]
 
 
 def upgraded_text(source: Source) -> Upgrade:
-    """The file of a target/1 manifest with what changed written anew, and all else as it is; or all of it
-    anew, where its keys do not stand on lines of their own. It says what `upgraded` says, or MutatorError."""
+    """The file of a target/1 manifest with only the changed keys rewritten, checked against `upgraded`.
+
+    Everything is rewritten if keys do not stand on their own lines. MutatorError if the text would not match.
+    """
     text = no_pipe(source.path).read_bytes().decode()
     new = upgraded(source).data
     for upgrade in (_line_by_line, _anew):
@@ -107,7 +112,7 @@ def upgraded_text(source: Source) -> Upgrade:
         if _says(done.text, source.path) == new:
             return done
     raise MutatorError(
-        "cannot be written anew without a change of what it says",
+        "cannot be rewritten without changing its meaning",
         where=source.path,
         remedy=f"write it by hand: `schema: {NEW}`",
     )
@@ -149,7 +154,7 @@ def _line_by_line(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
 
 
 def _comments(text: str) -> list[tuple[int, str]]:
-    """Line (from 0) and text of each comment: no `#` in a value is one."""
+    """Line (from 0) and text of each comment; a `#` in a value does not count."""
     masked = list(text)
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
         if isinstance(token, yaml.ScalarToken):
@@ -160,7 +165,7 @@ def _comments(text: str) -> list[tuple[int, str]]:
 
 
 def _end_of(lines: list[str], begin: int) -> int:
-    """Where what comes before line `begin` ends: comments right above a key belong to it."""
+    """The end of the part before line `begin`: comments directly above a key belong to the key."""
     while begin and lines[begin - 1].startswith("#"):
         begin -= 1
     return begin
@@ -172,6 +177,6 @@ def _dumped(key: str, value: Any) -> str:
         sort_keys=False,
         allow_unicode=True,
         width=110,
-        default_flow_style=None if isinstance(value, dict) else False,  # short mappings in one line
+        default_flow_style=None if isinstance(value, dict) else False,  # short mappings on one line
     )
     return text

@@ -56,7 +56,7 @@ def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> No
     factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
     answer = cli("--root", CLONE, "--library", library, "stpa")
     assert answer.code == 1
-    assert "lens_mud.yaml:1: fault spec 'vision_weather/lens_mud' stands for no causal factor" in answer.out
+    assert "lens_mud.yaml:1: fault spec 'vision_weather/lens_mud' belongs to no causal factor" in answer.out
     assert "name it in stpa/causal_factors.yaml" in answer.out
     assert answer.out.splitlines()[-1] == "1 problem"
 
@@ -85,7 +85,7 @@ def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path)
     answer = cli("--root", CLONE, "--library", library, "check")
     assert answer.code == 1
     assert "fault spec 'vision_input/blurr'" in answer.out
-    assert "blur.yaml:1: fault spec 'vision_input/blur' stands for no causal factor" in answer.out
+    assert "blur.yaml:1: fault spec 'vision_input/blur' belongs to no causal factor" in answer.out
 
 
 @pytest.mark.parametrize(

@@ -151,7 +151,7 @@ def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> 
 @pytest.mark.parametrize(
     ("old", "new", "line", "told"),
     [
-        ("spec: sensor/*", "spec: sensr/*", 7, "no fault in the library is named like 'sensr/*'"),
+        ("spec: sensor/*", "spec: sensr/*", 7, "no fault in the library matches 'sensr/*'"),
         ("spec: sensor/*", "spec: sensor/lane", 7, "write 'sensor/lane/*' for all its variants"),
         ("[A, B]", "[A, Z]", 5, "no scenario 'Z'"),
         ("table: near_far", "table: nowhere", 10, "no context table 'nowhere'"),

@@ -52,7 +52,7 @@ def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> Non
     """Two different specs of one name would be one in every table; the library's own file may be named."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
-    with pytest.raises(MutatorError, match="is called sensor/lane, as a spec of the library is"):
+    with pytest.raises(MutatorError, match="has the name sensor/lane of a spec in the library"):
         make_plan(toycar, mine)
     own = toycar.library / "faults" / "sensor" / "lane.yaml"
     text = mine.read_text().replace("specs/drifting.yaml", str(own)).replace("drifting/", "lane/")

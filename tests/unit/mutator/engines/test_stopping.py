@@ -132,12 +132,12 @@ def test_a_drive_that_ends_after_the_fault_where_golden_ends(
     ("old", "new", "message"),
     [
         ("terminal: true", "terminal: true, for_s: 1", "H1 must last; expected a condition of one step"),
-        ("25 >= near", "ever(25 >= near)", "H1 asks for `ever`; expected a condition of one step alone"),
+        ("25 >= near", "ever(25 >= near)", "H1 asks for `ever`; expected a condition of a single step"),
         ("25 >= near", "rate(near) > 5", "H1 asks for `rate`"),
         (
             '{about: contact, when: "25 >= near and hypot(speed, 0) > 0", terminal: true}',
             "{terminal: true}",
-            "H1, which the target itself tells; expected a condition, `when`",
+            "H1, which is judged by the target itself; expected a condition, `when`",
         ),
         (
             "speed: {unit: m/s, role: truth}",

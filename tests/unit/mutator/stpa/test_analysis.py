@@ -154,7 +154,7 @@ def test_what_does_not_fit_together_is_refused(
             "faults: [car_sensors/steer]",
             "car_sensors/steer/angle aims at H3",
         ),
-        (FACTORS, "faults: [radar/chaff]", "no_fault: none", "'radar/chaff' stands for no causal factor"),
+        (FACTORS, "faults: [radar/chaff]", "no_fault: none", "'radar/chaff' belongs to no causal factor"),
         (
             FACTORS,
             "[vision_output/path_model]",

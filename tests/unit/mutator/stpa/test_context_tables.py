@@ -126,4 +126,6 @@ def test_what_cannot_be_proved_is_accepted_and_said(toy: Workspace) -> None:
     path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
     table = load_context_table(path)
     assert table.coverage.cells == 0
-    assert table.coverage.beyond == "'v_ego' with 'v_lead' is no comparison of one variable with a constant"
+    assert (
+        table.coverage.beyond == "'v_ego' with 'v_lead' is not a comparison of one variable with a constant"
+    )
