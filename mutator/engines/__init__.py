@@ -1,4 +1,4 @@
-"""How one run of a target is carried out: the reference engine, and the faster ones.
+"""How to run a target once: the reference engine, and faster ones.
 
-What a run's output means never lives here.
+This package does not interpret a run's output.
 """

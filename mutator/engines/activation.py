@@ -1,6 +1,6 @@
 """When a fault is first active: its trigger, evaluated on the ground truth of the golden run.
 
-Until then a mutant's run is the golden run, so its probe observes the same values, double for double.
+Until then a mutant's run equals the golden run, so its probe observes exactly the same values.
 """
 
 import ast
@@ -17,12 +17,12 @@ from mutator.mutants.probe import decision_in
 from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # looked up by identity: there are thousands
+@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity: there are thousands
 class Observed:
     """What a probe observes in a golden run.
 
-    `values` are time and observed values of each observation, `before` is the number of observations before
-    each step, `libraries` are the modules that the run imports on its way.
+    `values` are time and observed values of each observation, `before` the number of observations before each
+    step, `libraries` the modules imported during the run.
     """
 
     values: tuple[tuple[float, ...], ...]
@@ -35,7 +35,7 @@ class Observed:
         return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
-        """The step in which that observation was made; none is made before the first step."""
+        """The step of that observation; none is made before the first step."""
         return bisect_right(self.before, observation) - 1
 
 
@@ -43,7 +43,7 @@ class Observed:
 class Start:
     """Where a mutant leaves the golden run: before this step, after `observed` observations.
 
-    The run began with one at time `began` (s), and the last of them was at `t`; None: there was none.
+    The first of these was at time `began` (s), the last at `t`; None: there was none.
     """
 
     step: int
@@ -53,14 +53,14 @@ class Start:
 
 
 def first_active(own: str, seen: Observed) -> Start | None:
-    """Where a mutant must leave the golden run; None when its trigger never holds.
+    """Where a mutant must leave the golden run; None if its trigger never holds.
 
     `own` is the source of its probe's own part (`probe.parts_of`).
     """
     return _first_active(*decision_in(own), seen)
 
 
-@lru_cache(maxsize=64)  # faults share their triggers: contexts of the hazard analysis
+@lru_cache(maxsize=64)  # faults share triggers, the contexts of the hazard analysis
 def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
     if not seen.values:
         return None
@@ -74,13 +74,13 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
         return None
     step = seen.step_of(int(at[0]))
     done = seen.before[step]
-    times = seen.columns[0, :done].tolist()  # a run that starts again does so no later
+    times = seen.columns[0, :done].tolist()  # a restarted run restarts no later
     last = times[-1] if done else None
     return Start(step=step, observed=done, began=min(times, default=None), t=last)
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """Whether a probe's condition holds in each observation; numpy computes with doubles as Python does."""
+    """Whether a probe's condition holds in each observation; numpy's doubles equal Python's."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):
@@ -92,7 +92,7 @@ def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """What an expression of `conditions.to_code` gives: an array, or one value for all observations."""
+    """The value of an expression of `conditions.to_code`: an array, or one value for all observations."""
 
     def of(node: ast.expr) -> Any:
         return _value(node, values)
@@ -127,7 +127,7 @@ def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
 
 
 def _least(*terms: Any) -> Any:
-    """As Python's `min`, NaN included."""
+    """Like Python's `min`, including NaN."""
     return reduce(lambda least, term: np.where(term < least, term, least), terms)
 
 

@@ -1,4 +1,4 @@
-"""The pristine tree that runs have their files from, as links: copies cost as much as a tenth of a run."""
+"""The pristine tree that runs link their files from: copying takes up to a tenth of a run."""
 
 import os
 import shutil
@@ -12,8 +12,8 @@ _Stamp = tuple[int, int, int, int]
 class BaseTree:
     """The tree in the folder `folder`, made by `prepare_base`.
 
-    A run may write through its links. Then the tree is made pristine again, and each run that took place
-    meanwhile is to be driven again, on a tree without links.
+    A run may write through its links. Then the tree is restored, and each run of that time is repeated on a
+    tree without links.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -22,7 +22,7 @@ class BaseTree:
         self._stamps = self._look()
 
     def lay_out(self, tree: Path, *, linked: bool) -> None:
-        """Make the new folder `tree`, with the files of this one."""
+        """Make the new folder `tree` with the files of this one."""
         if linked:
             shutil.copytree(self._folder, tree, copy_function=_link_or_copy)
             return
@@ -32,8 +32,9 @@ class BaseTree:
             place.write_bytes(data)
 
     def was_changed(self) -> bool:
-        """Whether a file was written to, or mended by another process, since this was last asked; it is
-        pristine now."""
+        """Whether a file was changed, or restored by another process, since the last call; it is pristine
+        now.
+        """
         if (stamps := self._look()) == self._stamps:
             return False
         for path in self._files:
@@ -49,7 +50,7 @@ class BaseTree:
             return False
 
     def _mend(self, path: Path) -> None:
-        """Another file in its place, at once: others may be linking it just now."""
+        """Replace the file atomically, since others may be linking it now."""
         whole = self._folder.with_name(f"{self._folder.name}-mended.{os.getpid()}")
         whole.write_bytes(self._files[path])
         whole.chmod(self._stamps[path][0])
@@ -62,7 +63,6 @@ class BaseTree:
 
 
 def _link_or_copy(source: str, dest: str) -> None:
-    """One file of the pristine tree in a run's own."""
     try:
         os.link(source, dest)
     except OSError as err:

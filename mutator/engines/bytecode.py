@@ -1,7 +1,7 @@
-"""Trees with bytecode that cannot be stale: each .pyc carries the hash of its source, checked on import.
+"""Trees with bytecode that cannot be stale: each .pyc has the hash of its source, checked on import.
 
-The usual .pyc is trusted when size and time of the source match, so a copied __pycache__ beside a changed
-file of equal size could run the pristine code.
+A usual .pyc is trusted if size and time of the source match, so a copied __pycache__ next to a changed file
+of equal size could run the pristine code.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,7 @@ def write_compiled(files: Mapping[str, bytes], dest: Path) -> None:
 
 
 def put(files: Mapping[str, bytes], tree: Path) -> None:
-    """Put files into a tree in place of what is there (links, maybe); their bytecode is dropped."""
+    """Replace files (or links) of a tree; their bytecode is deleted."""
     for name, data in files.items():
         path = tree / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -32,7 +32,7 @@ def put(files: Mapping[str, bytes], tree: Path) -> None:
 
 
 def _compile(path: Path, name: str) -> None:
-    """Compile one file; one that does not compile is left for its import to complain about."""
+    """Compile a file; if that fails, its import will report the error."""
     try:
         compile(str(path), dfile=name, doraise=True, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
     except PyCompileError:

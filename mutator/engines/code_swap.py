@@ -1,11 +1,10 @@
-"""Which functions of a loaded program a mutant changes, and whether their code can be swapped.
+"""Find the functions of a loaded program that a mutant changes, and whether their code can be swapped.
 
-A mutant's files differ from the pristine ones by inserted lines alone, so outside functions nothing differs
-but the import of the probe, and lines that tell it which constants and defaults to set. Between two steps of
-a run no function of the target is at work. The code of the changed functions can then be swapped in place,
-and whatever refers to them (methods, closures, names imported elsewhere) goes on with the new code. Until its
-trigger first holds, such a program does what the pristine one does: the probe guards every inserted
-statement, and no mutant is built in which one of them changes what a name means.
+A mutant's files differ from the pristine ones only by inserted lines. Outside functions these are the import
+of the probe and lines that tell it which constants and defaults to set. Between two steps of a run no
+function of the target is active, so the code of changed functions can be swapped in place. Methods, closures
+and names imported elsewhere then use the new code. Until its trigger first holds, such a program acts like
+the pristine one: the probe guards every inserted statement, and no mutant changes what a name means.
 """
 
 import re
@@ -42,12 +41,12 @@ class FunctionSwap:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CodeSwap:
-    """All that turns a loaded pristine program into the mutant.
+    """Everything that turns a loaded pristine program into the mutant.
 
     The parts of `probe` run one after the other; `own` is the source of the first (`probe.parts_of`).
-    `imports` are modules that injected lines import; they may be loaded beforehand. `settings` are modules,
-    and the code of their lines that tell the probe what to set; they must be loaded already, since a module
-    that is being loaded reads its own constants.
+    `imports` are modules that injected lines import; they may be loaded beforehand. `settings` are modules
+    and the code of their lines that tell the probe what to set; they must be loaded already, since a loading
+    module reads its own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
@@ -60,7 +59,7 @@ class CodeSwap:
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
     """What turns the loaded pristine program, whose tree is the folder `tree`, into the mutant with `files`.
 
-    NotSwappable when the result might differ from the mutant started on its own.
+    NotSwappable if the result might differ from the mutant started alone.
     """
     functions: list[FunctionSwap] = []
     settings: list[tuple[str, CodeType]] = []
@@ -81,14 +80,14 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
         raise NotSwappable("there is no probe")
     own, common = parts_of(files[probe_file].decode())
     name = f"{tree}/{probe_file}"
-    # the shared part takes ten times as long to compile, and is compiled once
+    # the shared part takes ten times as long to compile, so it is compiled once
     probe = (compile(own, name, "exec", dont_inherit=True), _compiled(common.encode(), name))
     return CodeSwap(
         functions=tuple(functions), settings=tuple(settings), probe=probe, own=own, imports=tuple(imports)
     )
 
 
-@lru_cache(maxsize=256)  # every mutant changes the file that observes, most of them in no other way
+@lru_cache(maxsize=256)  # every mutant changes the observing file, mostly in the same way
 def _in_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
@@ -105,7 +104,7 @@ def _in_file(
 
 
 def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
-    """The module of a file and the code of its lines that tell the probe what to set, if it has any."""
+    """The module of a file, and the code of its lines that tell the probe what to set, if any."""
     if not sets_values(mutated):
         return []
     lines = _only(mutated, sets=True)
@@ -113,7 +112,7 @@ def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeT
 
 
 def _only(mutated: bytes, *, sets: bool) -> bytes:
-    """A file's lines that tell the probe what to set, or the others, each where it was."""
+    """A file's lines that tell the probe what to set, or the others, with line numbers kept."""
     if not sets and not sets_values(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
@@ -142,7 +141,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         if tag and tag.of_fault and tag.was is None and not tag.sets:
             indent = len(tag.code) - len(tag.code.lstrip())
             if tag.id == before and indent == margin and tag.opens_original:
-                before = ""  # what else is injected must ask again
+                before = ""  # other injected lines must ask again
                 continue
             if tag.id != before or indent <= margin:
                 margin = indent
@@ -159,7 +158,7 @@ def changed_functions(
 ) -> Iterator[tuple[tuple[str, ...], CodeType, CodeType]]:
     """Names, old code and new code of the functions that differ in a module, or in its class `names`.
 
-    `old` and `new` are the bodies to compare. NotSwappable if anything but functions differs.
+    `old` and `new` are the bodies to compare. NotSwappable if anything except functions differs.
     """
     before, after = _inner(old), _inner(new)
     if [code.co_name for code in before] != [code.co_name for code in after]:
@@ -180,7 +179,7 @@ def changed_functions(
 
 
 def _check(old: CodeType, new: CodeType, name: str) -> None:
-    """NotSwappable unless a function with `new` code does what it did with `old`, until a trigger holds."""
+    """Raise NotSwappable unless a function with `new` code acts as with `old` until a trigger holds."""
     if old.co_name.startswith("<"):
         raise NotSwappable(f"{name} is a function without a name")
     if new.co_flags & _SUSPENDED:
@@ -203,17 +202,17 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def same(one: CodeType, other: CodeType) -> bool:
-    """Whether two functions do the same, on whatever lines they are."""
+    """Whether two functions do the same, on any lines."""
     return essence(one) == essence(other)
 
 
 def essence(code: CodeType) -> tuple[object, ...]:
-    """What a function's code and those in it do, equal for functions that do the same."""
+    """A key of what a function's code and nested code do, equal for functions that do the same."""
     return (*_essence(code), *map(essence, _inner(code)))
 
 
 def _essence(code: CodeType) -> tuple[object, ...]:
-    """What a function's code does, without its line numbers and the functions in it."""
+    """What a function's code does, without line numbers and nested functions."""
     values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

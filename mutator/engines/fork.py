@@ -1,9 +1,9 @@
-"""The fork engine: a mutant is a fork of its golden run, taken right before its fault is first active.
+"""The fork engine: a mutant is a fork of its golden run, made right before its fault is first active.
 
-Same results as the reference engine's, byte for byte, or the reference engine is what runs: for mutants that
-cannot be put into a loaded program, and again for runs that did not end well, so the words about these are
-its own. `warm` forks before the first step of every run, as this does of those that end at a terminal hazard
-where that is in their golden run, too.
+The results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be put
+into a loaded program, and repeats failed runs, so that messages are its own. `warm` forks before the first
+step of every run; so does this engine for runs that end at a terminal hazard that is also in their golden
+run.
 """
 
 import marshal
@@ -91,7 +91,7 @@ class ForkEngine:
             return _lost(str(why), folder)
 
     def refusal(self, job: Job) -> Refused | None:
-        """Why nothing can be forked of the golden run of a job, up to its last step; None if it can."""
+        """Why a job's golden run cannot be forked up to its last step; None if it can."""
         assert job.golden is not None
         try:
             if self._unfit:
@@ -122,7 +122,7 @@ class ForkEngine:
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
-        if job.stop and job.golden_ends:  # maybe before the fault is first active: there is no fork of that
+        if job.stop and job.golden_ends:  # maybe before the fault is active: no fork leads there
             return self._from_the_start(job, folder, swap)
         start = first_active(swap.own, seen)
         if start is None:
@@ -130,7 +130,7 @@ class ForkEngine:
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
 
     def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
-        """Have a fork of the loaded target drive the whole run."""
+        """Let a fork of the loaded target run the whole job."""
         first = self._running().first
         first.load(_needed(swap), self._patience_s)
         return self._become(first, job, folder, swap, _FROM_THE_START)
@@ -164,7 +164,7 @@ class ForkEngine:
     def _become(
         self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
-        """Have a waiting process fork a child that finishes the run as the mutant."""
+        """Let a waiting process fork a child that finishes the run as the mutant."""
         out = folder / "out"
         out.mkdir(parents=True)
         inactive(folder).touch()
@@ -187,7 +187,7 @@ class ForkEngine:
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
-        if waiting.key is None:  # it is to begin the run; if it is watched, as waiting ones are begun
+        if waiting.key is None:  # it must begin the run; watch it if the waiting ones were watched
             request["args"] = self._arguments(job, self._running().home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
@@ -201,7 +201,7 @@ class ForkEngine:
         return replace(self._judged(job, folder, ended), start=start.step)
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
-        """What came of a child; Refused where the reference engine is to say it."""
+        """The result of a child; Refused if the reference engine must repeat it."""
         report = read_report(folder / "report.json", threads=list)
         if report is not None:
             self._check(job, report)
@@ -224,7 +224,7 @@ class ForkEngine:
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
-        """Refused unless the child was the job's mutant and left the server as it was."""
+        """Raise Refused unless the child was the job's mutant and left the server unchanged."""
         if report["ended"] == "swap refused":
             raise Refused(str(report.get("why")))
         if report["outside"]:
@@ -236,7 +236,7 @@ class ForkEngine:
             raise Refused(problem)
 
     def _observed(self, job: Job, golden: Path) -> Observed:
-        """What a probe observes in the golden run of a job, which is driven once to know it."""
+        """What a probe observes in a job's golden run, which is run once to find out."""
         key = _key(job)
         if key not in self._seen:
             try:
@@ -249,7 +249,7 @@ class ForkEngine:
         return seen
 
     def _watch(self, job: Job, golden: Path) -> Observed:
-        known = self._work / f"observed-{content_id(_key(job))}"  # shared by the workers of a session
+        known = self._work / f"observed-{content_id(_key(job))}"  # shared by a session's workers
         if known.is_file():
             values, before, libraries = marshal.loads(known.read_bytes())
             return Observed(values=values, before=before, libraries=libraries)
@@ -258,7 +258,7 @@ class ForkEngine:
             swap = plan_swap(self._manifest, self._null, str(self._running().tree))
             null = replace(job, mutant=None, stop=False)
             self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
-            # From before its beginning: what it observed then, no fork of it would have.
+            # From before its beginning: no fork would have what it observed then.
             first = self._running().first
             execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
@@ -289,7 +289,7 @@ _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
 def _needed(swap: CodeSwap) -> list[str]:
-    """Modules to load before the mutant is made: those that it changes, and those that it imports."""
+    """Modules to load before the mutant is made: those it changes and those it imports."""
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imports]
 
 
@@ -303,7 +303,7 @@ def _resolved(scenario: Path) -> str:
 
 
 def _golden(job: Job, golden: Path) -> Execution:
-    """What comes of a mutant whose trigger never holds: what came of the golden run."""
+    """The result of a mutant whose trigger never holds: that of the golden run."""
     return Execution(
         status=Status.OK,
         detail="",
@@ -333,7 +333,7 @@ def make_fork(setting: Setting) -> ForkEngine:
 
 
 def make_warm(setting: Setting) -> ForkEngine:
-    """The same, but each run is a fork of the loaded target, before its first step."""
+    """The same, but each run is a fork of the loaded target before its first step."""
     return _make(setting, warm=True)
 
 

@@ -1,6 +1,6 @@
-"""The harness's side of a fork server: golden runs that wait at their steps, and are asked to fork.
+"""The harness's side of a fork server: golden runs that wait at their steps to be forked.
 
-See fork_server.py for the other side.
+fork_server.py is the other side.
 """
 
 import marshal
@@ -23,19 +23,18 @@ from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
-_MOST = 8  # waiting processes; each keeps some 20 MB of its own
-_NEAR = 100  # steps; a process so little behind is moved on rather than kept: it is soon made again
-_LOOK_UP_S = 0.5  # how often one who waits looks whether its own parent is still there
+_MOST = 8  # waiting processes, each some 20 MB
+_NEAR = 100  # steps; a process that close behind is moved on, as it is soon made again
+_LOOK_UP_S = 0.5  # how often a waiter checks that its parent is alive
 _START_S = 120.0
 
 
 class Lost(Exception):
-    """A process of the server is gone, or does not answer."""
+    """A process of the server is gone or does not answer."""
 
 
 class Refused(Exception):
-    """This target, or this run of it, cannot be forked; the text says why, `remedy` what to do if that is
-    known."""
+    """This target, or this run of it, cannot be forked; the text says why, `remedy` what to do, if known."""
 
     def __init__(self, why: str, remedy: str = "") -> None:
         super().__init__(why, remedy)
@@ -47,27 +46,28 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: its key, and a function that gives the arguments of the entry module that begin it."""
+    """A golden run: its key, and a function for the arguments that begin it."""
 
     key: Hashable
     arguments: Callable[[], list[str]]
 
 
 class Waiting:
-    """A process of the server: the first, before any run (`key` None), or one before `step` of the golden run
-    `key`."""
+    """A process of the server: the first, before any run (`key` None), or one before `step` of the golden
+    run `key`.
+    """
 
     def __init__(self, connection: socket.socket, parent: int | None, key: Hashable = None) -> None:
         self.key = key
         self.step = 0
-        self.loaded: set[str] = set()  # modules, on behalf of mutants
+        self.loaded: set[str] = set()  # modules loaded for mutants
         self.used = 0.0
         self._connection = connection
         self._parent = parent
         connection.settimeout(_LOOK_UP_S)
 
     def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
-        """The reply and the descriptors that came with it."""
+        """The reply, and the descriptors sent with it."""
         data = marshal.dumps(request)
         self._connection.settimeout(patience_s)
         try:
@@ -116,8 +116,8 @@ class Waiting:
 class Pool:
     """A fork server with its waiting processes, in the new scratch folder `home`.
 
-    `base` is the pristine tree; the server has a copy of its own. Refused when the target cannot be loaded or
-    has more than one thread, Lost when the server ends instead of answering.
+    `base` is the pristine tree; the server has a copy. Refused if the target cannot be loaded or has more
+    than one thread, Lost if the server ends instead of answering.
     """
 
     def __init__(self, manifest: TargetManifest, base: Path, home: Path, parent: int | None) -> None:
@@ -213,6 +213,6 @@ class Pool:
 
 
 def _why(failed: dict[str, Any]) -> str:
-    """What a process of the server ran into, in words."""
+    """Describe what failed in a process of the server."""
     raised = raised_in(failed)
     return raised.text if raised else ""

@@ -1,5 +1,4 @@
-"""What a forking engine can run: targets that it can load, faults whose code can be put into a loaded
-program."""
+"""What a forking engine can run: loadable targets, and faults whose code fits into a loaded program."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,7 +15,7 @@ from mutator.triggers.kinds import always
 
 
 def unfit(manifest: TargetManifest) -> Refused | None:
-    """Why nothing of the target can be forked here, as far as is known without loading it."""
+    """Why the target cannot be forked here, as far as known without loading it."""
     why = not_forkable(manifest)
     stepwise = (
         "" if manifest.stepwise else f"name a function that makes a run in steps in {manifest.path.name}"
@@ -25,7 +24,7 @@ def unfit(manifest: TargetManifest) -> Refused | None:
 
 
 def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
-    """Why the target cannot be forked once it is loaded, which is tried; None if it can.
+    """Why the target cannot be forked once loaded, by trying it; None if it can.
 
     `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
     """
@@ -41,7 +40,7 @@ def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | 
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
-    """Variants that the reference engine runs, whatever is asked for, and why; one fault of each is tried."""
+    """Variants that the reference engine always runs, with the reason, by trying one fault of each."""
     variants = {fault.spec: fault for fault in faults}
     if why := not_forkable(manifest):
         return dict.fromkeys(variants, why)
@@ -52,5 +51,5 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
         except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:
-            continue  # the checks before the campaign tell it, or it is not run at all
+            continue  # preflight reports it, or it is not run
     return found

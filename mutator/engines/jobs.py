@@ -13,15 +13,15 @@ from mutator.targets.manifest import TargetManifest
 
 
 class RunMode(StrEnum):
-    """How a run was carried out: in a fresh interpreter, as a fork, or as the golden run itself."""
+    """How a run was done: in a fresh interpreter, as a fork, or as the golden run itself."""
 
     REFERENCE = "reference"
     WARM = "warm"
     FORK = "fork"
-    GOLDEN = "golden"  # the trigger never held, so there was nothing to run
+    GOLDEN = "golden"  # the trigger never held, so nothing was run
 
 
-FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})  # what a proof is for
+FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})  # modes that need a proof
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,30 +33,30 @@ class Job:
     seed: int
     changes: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
-    mutant: str | None = None  # id that the probe must report; None: a tree without probe
+    mutant: str | None = None  # the id that the probe must report; None: a tree without probe
     injections: tuple[str, ...] = ()  # ids that it must report on
     hash_seed: int = 0
-    golden: Path | None = None  # output folder of the run without the fault, where it is known
+    golden: Path | None = None  # output folder of the run without the fault, if known
     observe: bool = False  # keep what the probe observes
-    stop: bool = False  # end it at its first terminal hazard
-    golden_ends: bool = False  # one is in its golden run, too
-    watch: bool = False  # the same as `observe`, and note calls that keep a target from being deterministic
-    lines: bool = False  # note which lines of the tree are executed, from the first observation on
+    stop: bool = False  # end the run at its first terminal hazard
+    golden_ends: bool = False  # whether one is also in its golden run
+    watch: bool = False  # like `observe`, and note calls that make a target nondeterministic
+    lines: bool = False  # note which lines of the tree run from the first observation on
 
     def problem_of(self, report: object) -> str:
-        """What is wrong with what its probe reported; empty if nothing is, or if it has no probe."""
+        """What is wrong with its probe's report; empty if nothing is, or without a probe."""
         return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
 
 
-# (file, line, byte of the line at which what raised begins, -1 if unknown) in the tree, innermost first
+# (file, line, start byte in the line, -1 if unknown) in the tree, innermost first
 Stack = tuple[tuple[str, int, int], ...]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Raised:
-    """The exception that ended a run: its type, its text, and where it passed the tree on its way out.
+    """The exception that ended a run: its type, its text, and where it left the tree.
 
-    `stacks[0]` is its own; the others are those of the exceptions that it came of or that are in it.
+    `stacks[0]` is its own; the others are those of its causes and of the exceptions in it.
     """
 
     kind: str
@@ -65,7 +65,7 @@ class Raised:
 
     @property
     def place(self) -> str:
-        """`file:line` of the innermost line of the target (the probe is none); empty if there is none."""
+        """`file:line` of the innermost target line (without the probe); empty if there is none."""
         return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe(path)), "")
 
     @property
@@ -82,14 +82,13 @@ class Raised:
 class Execution:
     """The result of a job. `out` holds the target's trace and record when status is ok.
 
-    The status says how the run ended; whose doing that is, `outcomes.blame` decides. `raised` is the
-    exception that ended it, and `active` says whether an injection was active in it. `probe` is the probe's
-    report if the tree has one; `log` the tail of what the run printed. `mode` says how it was carried out,
-    and `why` another engine did it than the one that was asked; `start` is the step before which the golden
-    run did its work. `stopped` says that a terminal hazard ended it before its time. `modules` are the top-
-    level modules that the run imported from neither its package nor the standard library, `watched` what a
-    watched one noted, and what its probe observed (`seen`), of the reference engine alone; so are `lines`,
-    the lines (from 1) of each file that were executed.
+    * `status`: how the run ended; `outcomes.blame` decides whose fault that is
+    * `raised`: the exception that ended it; `active`: whether an injection was active in it
+    * `probe`: the probe's report; `log`: the tail of what the run printed
+    * `mode`: how the run was done; `why`: why another engine did it; `start`: the step where it left golden
+    * `stopped`: a terminal hazard ended it early
+    * `modules`: the third-party top-level modules that it imported
+    * `watched`, `seen`, `lines` (from 1, by file): notes of the reference engine
     """
 
     status: Status
@@ -111,9 +110,9 @@ class Execution:
 
 
 class Engine(Protocol):
-    """Runs jobs and yields each with what came of it, in any order; `out` is valid until the next one.
+    """Runs jobs and yields each with its result, in any order; `out` is valid until the next one.
 
-    The output folder of a job whose trigger never holds may be the golden run's: it is not to be touched.
+    The output folder may be the golden run's if the trigger never holds: do not change it.
     """
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...

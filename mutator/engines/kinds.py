@@ -1,14 +1,14 @@
-"""The list of engines: names, words for people, and where each is made. Nothing is imported for it."""
+"""The list of engines, with descriptions and factories. Nothing is imported for it."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineKind:
-    """An engine: its name, what a run of it is, and the function that makes one from a `Setting`.
+    """An engine: its name, a description of its runs, and the function that makes one from a `Setting`.
 
-    `factory` is `module:function`, imported only when the engine is made. `forks` says that the engine
-    needs a target that can be forked.
+    `factory` is `module:function`, imported when the engine is made. `forks` says that the engine needs a
+    forkable target.
     """
 
     name: str

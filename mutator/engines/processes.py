@@ -1,4 +1,4 @@
-"""The processes that targets run in: what they are started with, and how their end is told."""
+"""Processes that targets run in: starting them, and reporting how they ended."""
 
 import json
 import os
@@ -19,21 +19,23 @@ from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.environment import FIXED, KEPT
 
-LOST = "lost"  # nobody is left to say how it ended
-PATIENCE_S = 60.0  # beyond the wall limit of a run, until who guards it must have said how it ended
+LOST = "lost"  # nobody is left to report how it ended
+PATIENCE_S = 60.0  # beyond a run's wall limit, until its guard must report
 _END_S = 10.0
 _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
-_NAMES = ("outside", "modules", "libraries", "threads")  # in a report: texts
+_NAMES = ("outside", "modules", "libraries", "threads")  # lists in a report: texts
 _LOG_TAIL = 4000
-_LEAST_FREE = 4 << 20  # a failed run on a disk with less room than this is not the target's failure
-_TRIAL = 1 << 20  # nor one where so much cannot be written
+_LEAST_FREE = 4 << 20  # a failed run is not blamed on the target if the disk has less room
+_TRIAL = 1 << 20  # nor if so much cannot be written
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """How a run's process ended: exit code (of a signal, its negative number), CPU and wall time, and why it
-    was stopped (WALL or DISK of `guard`, LOST, or "")."""
+    """How a run's process ended: exit code (negative for a signal), CPU and wall time.
+
+    `stopped` is why it was stopped (WALL or DISK of `guard`, LOST, or "").
+    """
 
     code: int
     cpu_s: float
@@ -42,8 +44,10 @@ class Ended:
 
 
 def check_limits(limits: Limits) -> None:
-    """MutatorError where this process may not give a run what its campaign allows it: such a run would end
-    here, but not elsewhere."""
+    """Raise MutatorError if this process's limits are below those of the campaign.
+
+    Such a run would end here, but not elsewhere.
+    """
     wanted = (
         (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
         (resource.RLIMIT_CPU, "cpu_s", limits.cpu_s + guard.HARD_CPU_EXTRA_S, "ulimit -t"),
@@ -63,7 +67,7 @@ def check_limits(limits: Limits) -> None:
 
 
 def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-    """Status and detail of a run, of the right tree if it came to report how it ended."""
+    """Status and detail of a run of the right tree, from its end and its report."""
     if stopped := _judge_stopped(limits, ended):
         return stopped
     if report is not None:
@@ -74,7 +78,7 @@ def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[
 
 
 def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
-    """Status and detail of a run that a limit or somebody else stopped, be it after its report."""
+    """Status and detail of a run stopped by a limit or from outside, even after its report."""
     killed = signal.Signals(-ended.code) if ended.code < 0 else None
     if ended.stopped == LOST:
         return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ended.code})"
@@ -99,7 +103,7 @@ def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
 
 
 def raised_in(report: dict[str, Any]) -> Raised | None:
-    """The exception that a report tells of."""
+    """The exception in a report, if any."""
     error = report["error"]
     if error is None:
         return None
@@ -112,14 +116,14 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
 
 
 def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """The whole environment of a run: nothing of the user's but what starting Python needs, and `more`."""
+    """The whole environment of a run: what starting Python needs, and `more`, nothing else of the user's."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
     return {**kept, **(more or {}), **own}
 
 
 def end(guarding: subprocess.Popen[bytes]) -> None:
-    """Wait for a process that guards others; it ends by itself, as its connection is closed."""
+    """Wait for a guarding process, which ends as its connection is closed."""
     try:
         guarding.wait(_END_S)
     except subprocess.TimeoutExpired:
@@ -128,7 +132,7 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
 
 
 def tail(path: Path) -> str:
-    """The end of what a run printed; nothing if it took its log away."""
+    """The end of what a run printed; empty if it deleted its log."""
     if not path.is_file():
         return ""
     with path.open("rb") as file:
@@ -137,8 +141,10 @@ def tail(path: Path) -> str:
 
 
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
-    """The child's report; None when it did not come to write one, or only a part of it, or when what is there
-    is none: a run may write what it likes, and leave. `more` are what an engine's own reports have."""
+    """The child's report; None if it is missing, partial or invalid.
+
+    A run may write anything, and exit. `more` are an engine's own reports.
+    """
     try:
         report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
         raised_in(report)
@@ -160,7 +166,7 @@ def was_active(folder: Path) -> bool:
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:
-    """Whether a run that failed had too little room, on the disk or in a quota."""
+    """Whether a failed run had too little room, on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
     state = os.statvfs(work)

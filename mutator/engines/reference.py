@@ -1,4 +1,4 @@
-"""The reference engine: a fresh interpreter for each job, on a tree of its own."""
+"""The reference engine: a fresh interpreter for each job, on its own tree."""
 
 import json
 import os
@@ -39,17 +39,17 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
-_LOOK_UP_S = 0.5  # how often a waiting engine looks whether its own parent is still there
-_LONGEST = 4096  # bytes of what the guard tells
+_LOOK_UP_S = 0.5  # how often a waiting engine checks that its parent is alive
+_LONGEST = 4096  # bytes of the guard's report
 
 
 class ReferenceEngine:
-    """A fresh interpreter per job, on a tree of its own, with nothing else of the package to import.
+    """A fresh interpreter per job, on its own tree, with nothing else of the package to import.
 
     `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
-    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). The runs
-    of an `independent` one take nothing from what other runs left behind, where the manifest says how; nor
-    does any run of a mutant whose changed files decide what is left behind.
+    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). Runs of
+    an `independent` engine use nothing that other runs left, if the manifest supports it; nor do runs of a
+    mutant that changes files which decide what is left.
     """
 
     def __init__(
@@ -81,13 +81,13 @@ class ReferenceEngine:
                 remove_folder(folder)
 
     def close(self) -> None:
-        """Nothing is kept."""
+        """Nothing to close."""
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which is left to the caller."""
         with raising_disk_full(self.work):
             ended = self._run(self._prepare(job, folder), folder, job.hash_seed)
-            if self._base_tree.was_changed():  # by this run, or by another one at the same time
+            if self._base_tree.was_changed():  # by this run, or by another at the same time
                 remove_folder(folder)
                 ended = self._run(self._prepare(job, folder, linked=False), folder, job.hash_seed)
         log = tail(folder / "log")
@@ -113,7 +113,7 @@ class ReferenceEngine:
         )
 
     def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
-        """Write tree and request of a job; returns the request's file."""
+        """Write a job's tree and request; returns the request's file."""
         tree, out = folder / "tree", folder / "out"
         self._base_tree.lay_out(tree, linked=linked)
         bytecode.put(job.files, tree)
@@ -152,7 +152,7 @@ class ReferenceEngine:
         return path
 
     def _observation(self) -> tuple[str, list[int]]:
-        """The file that observes, and the lines (from 1) of its statement that does."""
+        """The observing file, and the lines (from 1) of its observing statement."""
         location = self.manifest.observation.location
         first, last = parsed(self.manifest.tree, location.path).span(location)
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
@@ -163,7 +163,7 @@ class ReferenceEngine:
         return holder, [value.name for value in self.manifest.observation.values]
 
     def _run(self, request: Path, folder: Path, hash_seed: int) -> Ended:
-        """Run the job in a process that another one guards; both end when the connection is closed."""
+        """Run the job in a guarded process; both end when the connection is closed."""
         began = time.monotonic()
         ours, theirs = socket.socketpair()
         with ours:
@@ -175,7 +175,7 @@ class ReferenceEngine:
                     stderr=subprocess.STDOUT,
                     env=environment(hash_seed, folder, self.manifest.env),
                     pass_fds=[theirs.fileno()],
-                    start_new_session=True,  # a Ctrl-C at the terminal is ours to answer, not the target's
+                    start_new_session=True,  # a Ctrl-C at the terminal is for us, not the target
                 )
             try:
                 told = self._told(ours, began + self.limits.wall_s + PATIENCE_S)
@@ -188,7 +188,7 @@ class ReferenceEngine:
         return Ended(**json.loads(told))
 
     def _told(self, connection: socket.socket, deadline: float) -> bytes:
-        """How the run ended, in JSON; nothing if nobody tells in time. Leave if our own parent is gone."""
+        """How the run ended, in JSON; nothing if nobody reports in time. Leaves if our own parent is gone."""
         connection.settimeout(_LOOK_UP_S)
         while time.monotonic() < deadline:
             try:
@@ -212,7 +212,7 @@ class ReferenceEngine:
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
-        more = {path for path in report["files"] if path.endswith(".py")}  # a cache of data may be left there
+        more = {path for path in report["files"] if path.endswith(".py")}  # a data cache may be left there
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
@@ -220,7 +220,7 @@ class ReferenceEngine:
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:
-    """The exception in texts that can be kept: a run may give classes and files any name."""
+    """The exception in texts that can be stored: a run may use any names."""
     stacks = tuple(
         tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
     )
@@ -233,7 +233,7 @@ def make_reference(setting: Setting) -> ReferenceEngine:
 
 
 def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
-    """The pristine tree with its bytecode in the folder `dest`, made there unless it is already whole."""
+    """The pristine tree with its bytecode in the folder `dest`, made unless it is complete."""
     if not dest.is_dir():
         half = dest.with_name(f"{dest.name}.{os.getpid()}")
         with raising_disk_full(dest):

@@ -1,4 +1,4 @@
-"""Which engine runs a campaign, and making it."""
+"""Choose and make the engine of a campaign."""
 
 import os
 import sys
@@ -9,13 +9,13 @@ from mutator.engines.kinds import ENGINES, FORK, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-WORTH_IT = 40  # experiments; of fewer, the equivalence check alone would repeat most
+WORTH_IT = 40  # experiments; for fewer, the equivalence check would repeat most
 
 
 def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
-    """Name of the engine for so many experiments: the one asked for, or the fastest that pays off.
+    """The name of the engine for so many experiments: the requested one, or the fastest that pays off.
 
-    MutatorError when the one asked for is unknown or cannot run this target here.
+    MutatorError if the requested one is unknown or cannot run this target here.
     """
     if asked is None:
         return REFERENCE if not_worth_forking(manifest, experiments) else FORK
@@ -28,13 +28,13 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
 
 
 def make_engine(name: str, setting: Setting) -> Engine:
-    """An engine of that name."""
+    """Make an engine by name."""
     engine: Engine = resolve_name(ENGINES[name].factory)(setting)
     return engine
 
 
 def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
-    """Why so many experiments are not forked unless that is asked for; empty if they are."""
+    """Why so many experiments are not forked unless requested; empty if they are."""
     few = f"that pays off from {WORTH_IT} experiments on" if experiments < WORTH_IT else ""
     return not_forkable(manifest) or few
 

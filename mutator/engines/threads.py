@@ -1,8 +1,8 @@
-"""Threads that keep a process from being forked: told by name, with what turns them off."""
+"""Threads that prevent forking: their names, and what turns them off."""
 
 from collections.abc import Sequence
 
-_LISTED = 4  # names; a pool may have dozens
+_LISTED = 4  # names listed; a pool may have dozens
 _NUMBERS = "OMP_NUM_THREADS, OPENBLAS_NUM_THREADS"
 _KNOWN = (  # how a thread's name begins, what it is, what turns it off
     (
@@ -23,7 +23,7 @@ _OTHER = ("", "start it after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:
-    """What is said of a process that has these threads besides its main one."""
+    """The message about a process with these threads besides its main one."""
     told = [*dict.fromkeys(map(_told, others))]
     listed = ", ".join([*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])])
     return f"it has {len(others) + 1} threads, and only one can be forked: besides the main one, {listed}"

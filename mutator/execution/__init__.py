@@ -1,4 +1,4 @@
-"""Running experiments: sessions, workers, pytest, merged shards, single runs.
+"""Run experiments: sessions, workers, pytest, merged shards, single runs.
 
-How results are shown never lives here.
+This package does not present results.
 """

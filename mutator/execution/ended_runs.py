@@ -1,4 +1,4 @@
-"""What a finished run came to, known again without a look at its million records."""
+"""The outcome of a finished run, cached so that its million records need not be read again."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from mutator.verification.equivalence import Proof
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """What every session of a finished run says at its end."""
+    """What every session of a finished run reports at its end."""
 
     outcomes: Counter[str]
     proof: Proof | None
@@ -18,7 +18,7 @@ class Ended:
 
 
 def keep_end(folder: RunFolder, ended: Ended) -> None:
-    """Keep for the next time what a finished run came to."""
+    """Store a finished run's outcome for later sessions."""
     if key := integrity.content_key(folder.path):
         proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
         told = {"outcomes": dict(ended.outcomes), "proof": proof, "seal": ended.seal}
@@ -26,8 +26,7 @@ def keep_end(folder: RunFolder, ended: Ended) -> None:
 
 
 def ended_before(folder: RunFolder) -> Ended | None:
-    """What a finished run came to, where this machine has seen it end with these very bytes, and verified
-    them; else None."""
+    """The stored outcome of a finished run with exactly these verified bytes; else None."""
     if not folder.finished or not (key := integrity.content_key(folder.path)):
         return None
     known = verified_runs.recall(key)

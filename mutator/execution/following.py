@@ -1,4 +1,4 @@
-"""A session's progress, told while it is at work."""
+"""Report a session's progress while it runs."""
 
 import threading
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ def followed(session: Session) -> Iterator[None]:
 
 
 def _stages(session: Session) -> Iterator[Progress]:
-    """Where the run is now, each time one asks: the experiments, and when all have a record, the proof."""
+    """Yield the current progress at each request: experiments, then, once all have a record, the proof."""
     folder = session.folder
     experiments = Tail("experiments", folder.path / "records", folder.planned)
     while (progress := experiments.poll()).done < progress.total:

@@ -1,4 +1,4 @@
-"""Work dealt out on this machine: a pytest session in this process, with the workers of pytest-xdist."""
+"""Distribute work on this machine, as a pytest session in this process with pytest-xdist workers."""
 
 import io
 import os
@@ -15,10 +15,10 @@ _PLUGIN = "mutator.execution.pytest_plugin"
 
 
 class LocalWorkers:
-    """The distributor of `mutator run`: `session.workers` processes, or this one alone when that is 0."""
+    """The distributor of `mutator run`: `session.workers` processes, or this process alone if 0."""
 
     def run(self, session: Session) -> None:
-        """Run the pending pieces as pytest items, without anything of the user's pytest configuration."""
+        """Run the pending pieces as pytest items, ignoring the user's pytest configuration."""
         installed = any(entry.name == "mutator" for entry in metadata.entry_points(group="pytest11"))
         folder = session.folder.path
         arguments = [
@@ -36,7 +36,7 @@ class LocalWorkers:
 
 @contextmanager
 def _without(*names: str) -> Iterator[None]:
-    """Without these variables in the environment, also that of the workers."""
+    """Hide these environment variables, also from the workers."""
     kept = {name: os.environ.pop(name) for name in names if name in os.environ}
     try:
         yield
@@ -45,7 +45,9 @@ def _without(*names: str) -> Iterator[None]:
 
 
 class _Silent:
-    """Pytest plugin: the terminal reporter writes into a buffer, so the terminal is the caller's."""
+    """Pytest plugin that makes the terminal reporter write into a buffer, leaving the terminal to the
+    caller.
+    """
 
     def __init__(self) -> None:
         self.text = io.StringIO()

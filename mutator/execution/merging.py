@@ -1,4 +1,4 @@
-"""Merge the run folders of all shards of a plan into the run folder that one machine would have made."""
+"""Merge the run folders of all shards of a plan into the folder that one machine would have made."""
 
 import os
 import shutil
@@ -37,17 +37,16 @@ from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
-_MARK = f".{HEAD}."  # with a process id: the head as it is half written, from the beginning of a merge
+_MARK = f".{HEAD}."  # with a process id: the half-written head, present from the beginning of a merge
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
 def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
     """Merge the run folders `shards` into the new or empty folder `out`; returns its results.csv.
 
-    MutatorError for a shard that is missing, given twice, unfinished, of another plan, or at work, and,
-    unless `accept_versions`, for one that was driven with another Python or other packages;
-    CheckFailed when the proof of one failed, and when the shards' fault-free runs differ, for then their
-    machines are not alike.
+    MutatorError for a shard that is missing, duplicate, unfinished, in use or of another plan, and, unless
+    `accept_versions`, for one run with another Python or other packages. CheckFailed if a proof failed, or if
+    golden runs differ, which means that the machines do not compute alike.
     """
     if RunFolder.exists(out):
         raise MutatorError(
@@ -81,7 +80,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
 
 
 def _make_empty(out: Path) -> None:
-    """The folder to merge into, without what a merge that was killed left there."""
+    """Make the folder to merge into, without the remains of a killed merge."""
     if any(out.glob(f"{_MARK}*")):
         with owned(out, patience_s=0.0):
             cleaning.clear(out)
@@ -114,7 +113,7 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_numbers(folders: Sequence[RunFolder]) -> None:
-    """Each share of the plan is there exactly once."""
+    """Check that each share of the plan is there exactly once."""
     held: dict[int, RunFolder] = {}
     of: int | None = None
     for folder in folders:
@@ -145,7 +144,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_complete(folder: RunFolder) -> None:
-    """Every experiment of the share has a record that counts, and the proof is whole."""
+    """Check that every experiment of the share has a record that counts, and the proof is complete."""
     records = folder.records()
     done = sum(one.counts for one in endings(records))
     if done < folder.planned:
@@ -166,7 +165,7 @@ def _check_complete(folder: RunFolder) -> None:
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
-    """The fault-free runs are the same bytes everywhere, or the machines' results are no one campaign's."""
+    """Check that fault-free runs are equal everywhere, or the results do not belong together."""
     first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
     for folder in folders[1:]:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
@@ -174,19 +173,21 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
             raise CheckFailed(
                 f"the golden run {differ[0]} is another one than in {folders[0].path}",
                 where=folder.path,
-                expected="machines on which the target drives to the same bytes",
+                expected="machines on which the target computes the same bytes",
                 remedy="run this shard again on such a machine (run.json says what each ran with)",
             )
 
 
 def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
-    """Those of all shards. Python and packages are those that the first shard ended with, or accepted."""
+    """The stretches of all shards. Python and packages must equal the first shard's last ones, or be
+    accepted.
+    """
     first = folders[0]
     for folder in folders:
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
         found = [text for one, other in ends for text in differences(one, other.python, other.packages)]
         if found and not accept:
-            raise other_versions(folder.path, f"not driven as {first.path}, but with", found)
+            raise other_versions(folder.path, f"not run as {first.path}, but with", found)
         assert folder.shard is not None
         for i, stretch in enumerate(folder.stretches):
             yield replace(
@@ -197,7 +198,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 
 
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
-    """Everything of the shards; the head comes last, so a folder half made is no run folder."""
+    """Copy everything of the shards; the head last, so an unfinished folder is not a run folder."""
     first = folders[0]
     ledger = digests.settled(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
@@ -225,7 +226,7 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
 
 
 def _copy_patches(folder: RunFolder, out: Path) -> None:
-    """The patches that the records name."""
+    """Copy the patches that the records name."""
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
     for record in endings(folder.records()):
@@ -238,8 +239,10 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
 
 
 def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
-    """The series of all shards, under the budget of one run. They come before the head: once that is there,
-    nothing makes them any more."""
+    """Pack the series of all shards under one run's budget.
+
+    This must happen before the head is written, since nothing does it later.
+    """
     shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):
         first, rows = folders[0], chain.from_iterable(map(_rows, folders))
@@ -254,7 +257,7 @@ def _rows(folder: RunFolder) -> Iterator[Row]:
 
 
 def _copy_segments(folder: RunFolder, out: Path) -> None:
-    """The lines of a shard's segments, in files whose names tell the shard."""
+    """Copy a shard's segments into files whose names contain the shard."""
     assert folder.shard is not None
     for kind, schema in _SEGMENTS.items():
         if (folder.path / kind).is_dir():

@@ -1,4 +1,4 @@
-"""A run's progress in words: its stage, how much of it is done, how fast it goes, how long it will take."""
+"""Describe a run's progress: stage, share done, rate, remaining time."""
 
 import time
 from collections import Counter
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mutator.store.progress import Progress
 
-LINE_EVERY_S = 15.0  # a line now and then in a log file shows that the run is alive
+LINE_EVERY_S = 15.0  # an occasional line in a log shows that the run is alive
 
 STAGES = {
     "plan": "planning",
@@ -46,12 +46,12 @@ def title(progress: "Progress") -> str:
 
 
 def count(progress: "Progress") -> str:
-    """`12/60`, where there is something to count."""
+    """`12/60`, if there is something to count."""
     return f"{progress.done}/{progress.total}" if progress.total else ""
 
 
 def rate(progress: "Progress") -> str:
-    """`1.5 a second` or, where it takes longer, `24.0 a minute`: how fast it goes, when that is known."""
+    """The rate if known: `1.5 a second`, or if slower `24.0 a minute`."""
     if progress.per_s is None:
         return ""
     if progress.per_s < 1.0:
@@ -65,7 +65,7 @@ def endings(outcomes: Counter[str]) -> str:
 
 
 def remaining(progress: "Progress") -> str:
-    """How long the stage will still take, when that is known."""
+    """The remaining time of the stage, if known."""
     return "" if not progress.remaining_s else f"{duration(progress.remaining_s)} left"
 
 

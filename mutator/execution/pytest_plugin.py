@@ -1,7 +1,6 @@
 """The pytest plugin that runs campaigns: `pytest --campaign FILE --campaign-out DIR -n 2`.
 
-Loaded with every pytest of the environment, so it imports nothing of the harness unless a campaign is asked
-for.
+Every pytest of the environment loads it, so it imports the harness only if a campaign is requested.
 """
 
 from pathlib import Path
@@ -20,22 +19,22 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--campaign-out",
         metavar="DIR",
         type=Path,
-        help="its run folder; an interrupted run goes on there",
+        help="its run folder; an interrupted run resumes there",
     )
     group.addoption(
         "--require-reviewed",
         action="store_true",
-        help="refuse to run what `mutator review` has no approval of",
+        help="refuse to run anything that is not approved by `mutator review`",
     )
     group.addoption(
         "--accept-versions",
         action="store_true",
-        help="go on with another Python or other packages than the run folder was driven with",
+        help="continue with another Python or other packages than the run folder was started with",
     )
     group.addoption(
         "--campaign-cluster",
         metavar="WHERE",
-        help="have the workers of a Dask cluster do the work, as `mutator run --cluster`",
+        help="use the workers of a Dask cluster, as `mutator run --cluster`",
     )
     group.addoption(
         "--insecure-network",

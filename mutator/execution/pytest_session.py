@@ -1,4 +1,4 @@
-"""Campaigns as pytest sessions: the command's side, the xdist worker's side, and the items (chunks)."""
+"""Campaigns as pytest sessions: controller, xdist workers, and items (chunks)."""
 
 import os
 import shlex
@@ -30,17 +30,17 @@ _PROBLEM = "mutator_problem"
 
 
 class Deals(Protocol):
-    """What deals out the work of a session (`mutator.execution.distribution`)."""
+    """Distributes a session's work (`mutator.execution.distribution`)."""
 
     def run(self, session: Session) -> None: ...
 
 
 class HarnessErrors(Exception):
-    """A chunk has experiments that the harness could not judge."""
+    """The harness could not judge experiments of a chunk."""
 
 
 class CampaignItem(pytest.Item):
-    """Some work of a campaign. It fails for harness errors only, and then without a traceback."""
+    """Some work of a campaign. It fails only for harness errors, and then without a traceback."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, HarnessErrors | MutatorError):
@@ -52,8 +52,9 @@ class CampaignItem(pytest.Item):
 
 
 class WorkItem(CampaignItem):
-    """One chunk of the plan, or one experiment of the proof. It fails for harness errors only: a hazard is a
-    result, not a failure."""
+    """One chunk of the plan, or one experiment of the proof. It fails only for harness errors: a hazard is
+    a result.
+    """
 
     def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
@@ -77,7 +78,7 @@ class WorkItem(CampaignItem):
 
 
 class DealItem(CampaignItem):
-    """All of a session's work, which a cluster does."""
+    """All of a session's work, done by a cluster."""
 
     def __init__(self, *, begun: Session, distributor: Deals, **keywords: Any) -> None:
         super().__init__(**keywords)
@@ -100,7 +101,7 @@ def _defect(err: Exception, chunk: str) -> str:
 
 
 class LazyWorker:
-    """This process's Worker, made when the first chunk is run: collecting needs none."""
+    """This process's Worker, made when the first chunk runs, as collecting needs none."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self._workspace = workspace
@@ -127,8 +128,11 @@ def configure(
     accept_versions: bool,
     distributor: "Deals | None" = None,
 ) -> None:
-    """Put the plugin of this process's role in place. Whatever the user's configuration says of files, each
-    worker takes the next piece of work. With a `distributor` no work is dealt out by pytest."""
+    """Register the plugin for this process's role.
+
+    Whatever the user's configuration says about files, each worker takes the next piece of work. With a
+    `distributor`, pytest distributes none.
+    """
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
     given = getattr(config, "workerinput", {}).get(_INPUT)
@@ -143,9 +147,9 @@ def configure(
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
-    """Make chunks, then experiments of the proof, the session's items; nothing is read but what is here.
+    """Make chunks, then experiments of the proof, the session's items, without collecting anything else.
 
-    The proof comes last, in the smallest items: workers without a chunk go on with it, and end together.
+    The proof comes last, in the smallest items, so that workers end together.
     """
     session.items = []
     for work in works:
@@ -159,7 +163,7 @@ def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker:
 
 
 class WorkerSide:
-    """Plugin of an xdist worker: collects what the command found pending, and runs what it is sent."""
+    """Plugin of an xdist worker: collects the pending work, and runs what it is sent."""
 
     def __init__(self, config: pytest.Config, given: dict[str, Any], worker_id: str) -> None:
         bind_to_parent(given["parent"])
@@ -192,7 +196,7 @@ class WorkerSide:
 
 
 class Controller:
-    """Plugin of the command: hands out chunks, or runs them itself without xdist; notes what goes wrong."""
+    """Plugin of the controller: distributes chunks, or runs them itself without xdist, and notes problems."""
 
     def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun
@@ -231,7 +235,7 @@ class Controller:
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         if self.begun is None:
             return
-        if type(excinfo.value) is KeyboardInterrupt:  # pytest's own kinds mean that it stopped by itself
+        if type(excinfo.value) is KeyboardInterrupt:  # pytest's own kinds mean a regular stop
             self.begun.interrupted = True
         for pid in living_workers(self.begun.folder.path):
             os.kill(pid, signal.SIGTERM)
@@ -251,7 +255,7 @@ class Controller:
 
 
 class PlainController(Controller):
-    """As Controller, for pytest called directly: also plans, checks, and tells the end."""
+    """Like Controller, for pytest called directly: also plans, checks, and reports the end."""
 
     def __init__(
         self,
@@ -290,7 +294,7 @@ class PlainController(Controller):
         except MutatorError as err:
             self._open.close()
             self.begun = None
-            print(err, file=sys.stderr)  # pytest tells the reason of an exit twice
+            print(err, file=sys.stderr)  # pytest would print the reason twice
             pytest.exit("no campaign was run", returncode=err.exit_code)
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
@@ -334,7 +338,7 @@ class PlainController(Controller):
 
 
 def _told(config: pytest.Config) -> Notify | None:
-    """Tells the stages that pytest has no items for; nothing with `-q`."""
+    """Reports the stages without pytest items; None with `-q`."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None
@@ -347,7 +351,7 @@ def _told(config: pytest.Config) -> Notify | None:
 
 
 def _lines(summary: Summary) -> list[str]:
-    """The end of a campaign for a terminal."""
+    """The summary of a campaign for a terminal."""
     lines = [
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),

@@ -1,4 +1,4 @@
-"""The frozen plan that a command works on: made now, or found in its run folder."""
+"""The frozen plan of a command: new, or from its run folder."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -17,11 +17,10 @@ from mutator.workspace import Workspace
 def open_frozen(
     workspace: Workspace, campaign: str | Path, out: Path, choices: Choices, *, reviewed: bool
 ) -> RunFolder:
-    """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign in it.
+    """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign.
 
-    With `reviewed`, also store who approved what; CheckFailed, and no new plan, unless all of it is approved.
-    MutatorError when the folder holds another plan, one of other sources, or one of another
-    version of mutator.
+    With `reviewed`, also store the approvals; CheckFailed, and no new plan, unless everything is approved.
+    MutatorError if the folder has another plan, other sources or another version of mutator.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
@@ -36,7 +35,7 @@ def open_frozen(
 
 
 def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
-    """Open a run folder that was planned from this campaign with these choices and sources, or refuse it."""
+    """Open a run folder that was planned from this campaign, choices and sources; MutatorError otherwise."""
     folder = RunFolder.open(out)
     head = folder.head
     check_version(out, head["schema"], head["provenance"])

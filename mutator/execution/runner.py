@@ -1,4 +1,4 @@
-"""From experiments to records: build each mutant, have an engine run it, compare with golden, judge."""
+"""From experiments to records: build each mutant, run it on an engine, compare with golden, judge."""
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -26,14 +26,16 @@ from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
-_KEPT = 32  # golden runs: those of one seed, and of the next
+_KEPT = 32  # golden runs: those of one seed and the next
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """An experiment with its record. `out` (the target's output folder) is valid until the next is drawn;
-    None without a mutant or a run. `mode`, `why` and `start` are the execution's. `series` is None where
-    none was asked for, and of what did not end well."""
+    """An experiment with its record. `out` (the target's output folder) is valid until the next one.
+
+    It is None without a mutant or a run. `mode`, `why` and `start` are the execution's. `series` is None if
+    not requested or if the run failed.
+    """
 
     experiment: Experiment
     record: Record
@@ -42,15 +44,17 @@ class Finished:
     cpu_s: float = 0.0
     wall_s: float = 0.0
     log: str = ""
-    mode: RunMode | None = None  # None: it was not run
+    mode: RunMode | None = None  # None: not run
     why: str = ""
     start: int = 0
     series: EncodedSeries | None = None
 
 
 class Goldens:
-    """The channels of golden runs, loaded when asked for; the last few are kept. `folder_of` finds where the
-    golden run of an experiment left its files; with `several_seeds` each has golden runs of its own."""
+    """The channels of golden runs, loaded on request; the last few are kept.
+
+    `folder_of` finds the files of an experiment's golden run; with `several_seeds` each seed has golden runs.
+    """
 
     def __init__(
         self,
@@ -59,7 +63,7 @@ class Goldens:
         *,
         several_seeds: bool = False,
     ) -> None:
-        self.folder = folder_of  # where the run without the fault left its files
+        self.folder = folder_of  # finds the files of the run without the fault
         self._several_seeds = several_seeds
         self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
@@ -77,7 +81,7 @@ class Goldens:
         return self._ends(self.folder(experiment))
 
     def sampler(self, experiment: Experiment) -> Sampler:
-        """What makes the series of runs that are compared with the golden run of an experiment."""
+        """Makes the series of runs compared with an experiment's golden run."""
         return self._sampler(self.folder(experiment))
 
 
@@ -102,8 +106,11 @@ class Runner:
         self.with_series = with_series
 
     def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
-        """Each experiment with its record; what cannot be built has its record without being run, and what
-        is the same run as another has that one's."""
+        """Yield each experiment with its record.
+
+        A mutant that cannot be built is not run. An experiment that is the same run as another gets its
+        record.
+        """
         shared = {same[0].id: same for same in runs(self.manifest, experiments)}
         for finished in self._run([same[0] for same in shared.values()]):
             yield finished
@@ -182,7 +189,7 @@ class Runner:
         )
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
-        """The injections that are there to raise."""
+        """The injections that raise on purpose."""
         models = [self.models.get(injection.model) for injection in experiment.fault.injections]
         return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
 
@@ -205,7 +212,7 @@ class Runner:
     def _judged(
         self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
     ) -> Record:
-        """The record of a run that ended well, beside golden."""
+        """The record of a run that ended well, compared with golden."""
         activation = activation_of(execution.probe or {})
         reference, time = self.goldens.trace(experiment), self.manifest.time_channel
         if execution.stopped:
@@ -238,7 +245,7 @@ class Runner:
         )
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
-        """The record of a run that did not end well."""
+        """The record of a run that failed."""
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
         # a time-out's count depends on the machine's speed, a crash's does not
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
@@ -247,12 +254,12 @@ class Runner:
 
 
 def _problem_of(err: BadOutput) -> str:
-    """What is wrong with an output, without the scratch folder that it was in."""
+    """What is wrong with an output, without its scratch folder."""
     return f"{Path(err.where or '').name}: {err.got}"
 
 
 def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
-    """Why a difference from golden cannot be the fault's doing; empty if it can."""
+    """Why the fault cannot have caused a difference from golden; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
     when = "although the fault was never active" if activation is None else f"before {activation.first} s"
@@ -274,7 +281,7 @@ def _bare(
 
 
 def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
-    """The record of an experiment of which no more is known."""
+    """The record of an experiment that has only a status."""
     return Record(
         experiment_id=experiment_id,
         status=status,

@@ -1,6 +1,6 @@
-"""A session: one command at work in a run folder that it owns, from the plan to the table of results.
+"""A session: one command in a run folder that it owns, from the plan to the table of results.
 
-How the pending work is dealt out to processes is not decided here: see `distribution`.
+`distribution` decides how the work goes to processes.
 """
 
 import os
@@ -51,7 +51,7 @@ Notify = Callable[[Progress], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """What a run came to. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
+    """The outcome of a run. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
 
     planned: int  #: planned experiments of this folder
     done: int  #: those with a record that counts
@@ -68,7 +68,7 @@ class Summary:
 
     @property
     def proof_note(self) -> str:
-        """How far the proof is, or why there is none; empty where the reference engine was asked for."""
+        """How far the proof is, or why there is none; empty if the reference engine was requested."""
         if self.not_forked:
             return f"none is needed, as no experiment was forked: {self.not_forked}"
         return str(self.proof) if self.proof else ""
@@ -83,7 +83,7 @@ class Summary:
 
 
 class Session:
-    """One command at work in a run folder that it owns."""
+    """One command in a run folder that it owns."""
 
     def __init__(
         self,
@@ -103,21 +103,25 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
         self.manifest = workspace.manifest(folder.head["target"])
-        # of the whole plan, so that all shards of it, and the run of one machine, have a proof, or none has
+        # of the whole plan, so that all its shards, and a run on one machine, agree on whether there is a
+        # proof
         experiments = folder.head["experiments"]
         self.engine = choose_engine(engine, self.manifest, experiments)
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
         self.problem = ""
         self.interrupted = False
-        self.working = ""  # who is at work, where that is told
+        self.working = ""  # who is working, if known
         self._began = time.monotonic()
         self._done_before = 0
         self._records: Mapping[str, Record] | None = None
         self._known: Ended | None = None
 
     def prepare(self) -> None:
-        """Find what is left to run; if anything is, pass the checks, lay out the pristine tree, and note the
-        stretch of work that begins. MutatorError for other versions than before that are not accepted."""
+        """Find the work to do and, if there is any, check, lay out the pristine tree, and note the stretch of
+        work.
+
+        MutatorError for other versions that are not accepted.
+        """
         self._known = ended_before(self.folder)
         if self._known and are_there(self.folder):
             self._done_before = self.folder.planned
@@ -146,18 +150,18 @@ class Session:
         self._records = None if left else records
 
     def note_machine(self, machine: Mapping[str, Any]) -> None:
-        """Note in run.json, with the stretch of work, another machine that takes part in it."""
+        """Add a machine that takes part to the stretch of work in run.json."""
         add_machine(self.folder, machine)
 
     def worker_name(self, name: str) -> str:
-        """Name of a worker's files, used by no session before this one."""
+        """A name for a worker's files that no session used before."""
         kinds = ("records", "timings", equivalence.FOLDER)
         files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in kinds)
         taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
-        """All that an xdist worker needs, in types that execnet can send."""
+        """Everything an xdist worker needs, in types that execnet can send."""
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
@@ -169,7 +173,7 @@ class Session:
         }
 
     def finish(self) -> Summary:
-        """Build the table from what there is now, and say what the run has come to."""
+        """Build the tables from what is there, and report the outcome of the run."""
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)
@@ -214,7 +218,7 @@ class Session:
         )
 
     def _finish_again(self, known: Ended) -> Summary:
-        """As `finish`, of a run that was finished before."""
+        """Like `finish`, for a run that was finished before."""
         built = None
         with self._noting_full_disk():
             built = results.ensure(self.folder.path)
@@ -236,19 +240,21 @@ class Session:
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:
-        """A full disk is no end: the records are there, the rest can be made at any time."""
+        """A full disk does not lose anything: the records are there, the rest can be made later."""
         try:
             yield
         except DiskFull as err:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Enter what this session's workers wrote; if one is still dying, the next session does it."""
+        """Enter what this session's workers wrote; the next session does so for one that is still ending."""
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
-        """Pack what this session's workers appended; if one is still dying, the next session does it."""
+        """Pack what this session's workers appended; the next session does so for one that is still
+        ending.
+        """
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
             texts = Results.of_run(folder.path).texts()
@@ -277,7 +283,7 @@ def open_session(
         try:
             folder = open_frozen(workspace, campaign, out, choices, reviewed=reviewed)
         except MutatorError:
-            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is left
+            if is_new and not RunFolder.exists(out):  # nothing was planned, so there is nothing to keep
                 shutil.rmtree(out, ignore_errors=True)
             raise
         digests.close_segments(folder.path)

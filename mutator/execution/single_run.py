@@ -1,4 +1,4 @@
-"""One experiment outside a campaign, with everything kept: what `try`, `show` and `rerun --trace` need."""
+"""Run one experiment outside a campaign, keeping everything, for `try`, `show` and `rerun --trace`."""
 
 import os
 from collections.abc import Iterator
@@ -46,8 +46,8 @@ def run_single(
 ) -> Single:
     """Run `experiment` into the folder `out`: golden/ (unless given), faulty/ and mutant.patch.
 
-    `faulty` is an empty folder when the mutant was refused, and holds what the run left when it did not end
-    well. CheckFailed when the golden run does not end well.
+    `faulty` is empty if the mutant was refused, and holds what the run left if it failed. CheckFailed if the
+    golden run fails.
     """
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
@@ -67,8 +67,10 @@ def run_single(
 def run_golden(
     workspace: Workspace, manifest: TargetManifest, experiment: Experiment, out: Path, *, limits: Limits
 ) -> Path:
-    """Run `experiment` without its fault into the folder `out`; where its output is. CheckFailed when it does
-    not end well."""
+    """Run `experiment` without its fault into the folder `out`, and return its output folder.
+
+    CheckFailed if the run fails.
+    """
     with _engine(manifest, out, limits) as engine:
         return _run_golden(workspace, engine, experiment, out / "golden")
 
@@ -76,9 +78,9 @@ def run_golden(
 def rerun(
     workspace: Workspace, run: Path, experiment_id: str, *, out: Path | None = None
 ) -> tuple[Single, bool]:
-    """Run a planned experiment again into the folder `out` (default: traces/<id>/ of the run folder).
+    """Rerun a planned experiment into the folder `out` (default: traces/<id>/ of the run folder).
 
-    The flag says whether the record equals the one of the campaign (true if there is none yet).
+    The flag says whether the record equals the campaign's (True if there is none yet).
     """
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
@@ -97,8 +99,10 @@ def rerun(
 
 
 def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
-    """Whether an experiment that was run again has the record of the campaign, true if there is none yet;
-    MutatorError when the patch of that record is damaged."""
+    """Whether an experiment that was rerun has the campaign's record, True if there is none yet.
+
+    MutatorError if that record's patch is damaged.
+    """
     if known is None:
         return True
     folder.read_patch(known.experiment_id, known)
@@ -106,7 +110,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
-    """The target of a run; MutatorError when it, templates or scenarios are no longer those of the run."""
+    """The target of a run; MutatorError if its sources are no longer those of the run."""
     manifest = workspace.manifest(folder.head["target"])
     check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, folder.scenarios))
     return manifest
@@ -114,7 +118,7 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 
 @contextmanager
 def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
-    """An engine alone in `out`, whose scratch is there, and gone afterwards."""
+    """An engine alone in `out`, whose scratch is deleted afterwards."""
     check_requirements(manifest)
     make_folder(out)
     with alone_in(out):
@@ -141,14 +145,14 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
         raise CheckFailed(
             f"the run without any fault ended as {execution.status.value}: {execution.detail}",
             where=job.scenario,
-            remedy="mend the target or the scenario first",
+            remedy="correct the target or the scenario first",
         )
     _replace(execution.out, place)
     return place
 
 
 def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
-    """The runs with their output moved to `out`/faulty and their diff beside it."""
+    """The runs, with their output moved to `out`/faulty and their diff next to it."""
     for finished in runs:
         left = finished.out
         if left is None or not left.is_dir():  # a run may delete it
@@ -161,7 +165,7 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
 
 
 def _replace(new: Path, place: Path) -> None:
-    """Put a folder in another's place, in which somebody may be reading."""
+    """Replace a folder that somebody may be reading."""
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
         place.rename(aside / place.name)

@@ -1,4 +1,4 @@
-"""Experiments of a run, drawn by lot and driven again on the reference engine: are their records the same?"""
+"""Spot-check a run: rerun randomly drawn experiments on the reference engine, and compare their records."""
 
 from collections.abc import Iterator, Sequence
 from random import SystemRandom
@@ -14,15 +14,17 @@ from mutator.workspace import Workspace
 
 
 def drawn(folder: RunFolder, count: int) -> list[str]:
-    """Ids of `count` experiments that have a result, or of all if there are fewer. The draw follows from no
-    seed: nobody can know it beforehand."""
+    """Ids of `count` experiments that have a result, or of all if there are fewer.
+
+    The draw has no seed, so that nobody can predict it.
+    """
     records = folder.records().values()
     ids = sorted(record.experiment_id for record in records if record.status is not Status.HARNESS_ERROR)
     return SystemRandom().sample(ids, min(count, len(ids)))
 
 
 def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
-    """Drive these experiments; what is not the same as in their records. Nothing is written to the folder."""
+    """Run these experiments, and yield those whose records differ. The folder is not written to."""
     manifest, records = manifest_of(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:

@@ -1,4 +1,4 @@
-"""The traces of a run's experiments: those that are kept, and those that are made when they are needed."""
+"""The traces of a run's experiments: stored ones, and ones made on request."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class Traces:
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        """The run's target; MutatorError where it is not to be found."""
+        """The run's target; MutatorError if it cannot be found."""
         return self.workspace.manifest(self.folder.head["target"])
 
     @cached_property
@@ -37,15 +37,15 @@ class Traces:
         return {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
-        """What the campaign found out of an experiment; MutatorError when only its results are there."""
+        """The campaign's record of an experiment; MutatorError if only its results are left."""
         if experiment_id not in self._records:
             raise MutatorError(f"there is no record of {experiment_id} any more", where=self.folder.path)
         return self._records[experiment_id]
 
     def of(self, experiment_id: str) -> tuple[Trace, Trace]:
-        """(fault-free, faulty) of an experiment that ended well; without a kept trace it is driven again.
+        """(fault-free, faulty) of an experiment that ended well; it is rerun if no trace is stored.
 
-        MutatorError when that cannot be done any more, or does not give what the campaign found.
+        MutatorError if that is impossible or the result differs from the campaign's.
         """
         kept = self.folder.path / "traces" / experiment_id
         experiment = self._experiments[experiment_id]
@@ -60,10 +60,10 @@ class Traces:
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
 
     def sampled(self, experiment_id: str, *, drive: bool = False) -> tuple[Trace, Trace]:
-        """(fault-free, faulty) of an experiment from its series: at most 20 values a second.
+        """(fault-free, faulty) of an experiment from its series, at most 20 values a second.
 
-        One without a series is driven again if `drive` says so. MutatorError where there is none, where it is
-        damaged, and where driving fails as in `of`.
+        One without a series is rerun if `drive` says so. MutatorError if there is none, it is damaged, or the
+        rerun fails as in `of`.
         """
         series = SeriesFolder(self.folder.path)
         found = series.read(experiment_id)
@@ -75,12 +75,12 @@ class Traces:
             raise MutatorError(
                 f"no series of {experiment_id}",
                 where=self.folder.path,
-                remedy=f"drive it again: {making_again(self.folder.path, experiment_id)}",
+                remedy=f"rerun it: {making_again(self.folder.path, experiment_id)}",
             )
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
-        """Whether the trace of the campaign's run is there, not that of another state of the sources."""
+        """Whether the trace of the campaign's run is stored, not that of another state of the sources."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():
             return False

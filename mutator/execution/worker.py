@@ -1,4 +1,4 @@
-"""The process that runs chunks: an xdist worker, or the command itself when there are none."""
+"""The process that runs chunks: an xdist worker, or the command itself."""
 
 import signal
 import socket
@@ -32,8 +32,11 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assignment:
-    """Who a worker is: `name` makes its files in the run folder its own, `engine` runs its chunks, `parent`
-    is the process it must not outlive (None: it is the command itself)."""
+    """Who a worker is.
+
+    `name` makes its files in the run folder its own, `engine` runs its chunks, and `parent` is the process
+    that it must not outlive (None: it is the command itself).
+    """
 
     run: Path
     name: str
@@ -42,7 +45,7 @@ class Assignment:
 
 
 class Worker:
-    """Runs chunks of a run folder and appends what came of them. Reads the plan only chunk by chunk."""
+    """Runs chunks of a run folder and appends results. Reads the plan chunk by chunk."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self.folder = RunFolder.open(assignment.run)
@@ -59,10 +62,10 @@ class Worker:
         self._runner = self._make_runner(
             self._engine(assignment.engine), with_series=self._series is not None
         )
-        self._seed: int | None = None  # that is being driven
+        self._seed: int | None = None  # the seed being run
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
-        self._needs_proof: bool | None = None  # None: nothing that it ran itself says so
+        self._needs_proof: bool | None = None  # None: nothing that it ran decides it
         self._planned: Mapping[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
@@ -71,7 +74,7 @@ class Worker:
         self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
-        """Run what is left of a chunk; returns (experiment id, detail) of its harness errors."""
+        """Run the rest of a chunk; returns (experiment id, detail) of its harness errors."""
         experiments = plan_file.read_chunk(
             self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
         )
@@ -86,16 +89,16 @@ class Worker:
         return errors
 
     def _make_room(self, seed: int) -> None:
-        """The pictures of a hundred seeds would fill the disk."""
+        """Delete images of earlier seeds, which would fill the disk."""
         if len(self.folder.seeds) > 1 and seed != self._seed:
             caches.make_room(self._manifest.name)
         self._seed = seed
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:
-        """Run an experiment of the proof's sample on the reference engine; harness errors as `run`.
+        """Run an experiment of the proof's sample on the reference engine; harness errors as in `run`.
 
-        Each has a run of its own, which takes nothing from others: what they share is to be proved, too.
-        Where it is known that nothing was forked, none is run.
+        Its run shares nothing with others, as what is shared is also to be proved. If nothing was forked,
+        none is run.
         """
         if self._needs_proof is None:
             self._needs_proof = equivalence.needless(self.folder) is None
@@ -147,7 +150,7 @@ class Worker:
         )
 
     def _keep(self, finished: Finished) -> None:
-        """Patch first, record last: what has a record has everything."""
+        """Append the patch first, the record last: an experiment with a record has everything."""
         if finished.mutant is not None:
             self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
@@ -156,7 +159,7 @@ class Worker:
         self._records.append(line_of(finished.record))
 
     def _sync_blocks(self) -> None:
-        """Before records: a record that survives a power cut names a patch that does."""
+        """Sync before records, since a stored record names patches that must survive a power cut."""
         self._patches.sync()
         if self._series is not None:
             self._series.sync()
@@ -179,11 +182,11 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """The beginning of a Python command line whose process dies with `parent` from its first moment on."""
+    """The beginning of a Python command line whose process dies with `parent` from the start."""
     return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
 
 
 def bind_to_parent(parent: int) -> None:
-    """End with the process `parent`, to whom Ctrl-C is left, too."""
+    """End with the process `parent`, which also handles Ctrl-C."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     guard.die_with_parent(parent)

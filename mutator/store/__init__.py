@@ -1,4 +1,4 @@
-"""What a run folder holds and how it is read and written: plan, records, checks, shards.
+"""The content of a run folder, and how to read and write it: plan, records, checks, shards.
 
-What the stored things mean, and who may decide on them, never lives here.
+This package stores results; it does not interpret them.
 """

@@ -1,8 +1,8 @@
-"""Files of checksummed blocks of bytes, each appended by one process: patches, and series of a run at work.
+"""Files of checksummed blocks of bytes, each appended by one process: patches, and series during a run.
 
 A block is a head of 19 bytes, a key (text) and its content. The head is, little-endian: the mark `FIB1`, a
 kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the SHA-256 of the
-rest of the block. A block that was changed is found, and those after it still count.
+rest of the block. A changed block is detected, and the blocks after it still count.
 """
 
 import os
@@ -17,12 +17,12 @@ from mutator._common.files import raising_disk_full
 
 _MARK = b"FIB1"
 _HEAD, _CHECK = struct.Struct("<4sBHI"), 8
-_BATCH, _BATCH_S = 32, 2.0  # blocks, and seconds, between two syncs at most
+_BATCH, _BATCH_S = 32, 2.0  # at most so many blocks, and seconds, between two syncs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """What was appended. `kind` is for the file's owner to choose; `offset` is where its content begins."""
+    """An appended block. The file's owner chooses `kind`; `offset` is the start of the content."""
 
     kind: int
     key: str
@@ -32,8 +32,10 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
-    """What is in such a file: the blocks that are as they were written, and whether others are damaged. What
-    a kill cut short at the end is not damage."""
+    """The content of such a file: the intact blocks, and whether others are damaged.
+
+    A block that a kill cut short at the end is not damage.
+    """
 
     path: Path
     blocks: tuple[Block, ...]
@@ -41,9 +43,9 @@ class Blocks:
 
 
 class BlockWriter:
-    """Appends blocks to a new file of its own, whole ones, synced in batches.
+    """Appends blocks to a new file, synced in batches.
 
-    A block that does not fit on the disk is taken back; DiskFull is raised.
+    A block that does not fit on the disk is removed again, and DiskFull raised.
     """
 
     def __init__(self, path: Path) -> None:
@@ -60,7 +62,7 @@ class BlockWriter:
             self.sync()
 
     def extend(self, blocks: bytes) -> None:
-        """Append whole blocks that were made elsewhere; they are synced by time alone."""
+        """Append whole blocks made elsewhere; they are synced by time only."""
         with raising_disk_full(self.path):
             try:
                 written = 0
@@ -89,7 +91,6 @@ class BlockWriter:
 
 
 def as_block(kind: int, key: str, data: bytes) -> bytes:
-    """The bytes of a block."""
     text = key.encode()
     head = _HEAD.pack(_MARK, kind, len(text), len(data))
     check = sha256(b"".join((head, text, data))).digest()[:_CHECK]
@@ -104,12 +105,12 @@ def read_blocks(path: Path) -> Blocks:
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    """The blocks of a file that are as they were written, one at a time."""
+    """Yield the intact blocks of a file."""
     yield from (block for block in _verified(path.read_bytes()) if block is not None)
 
 
 def _verified(data: bytes) -> Iterator[Block | None]:
-    """The blocks that are as they were written, and None for whatever is damaged."""
+    """Yield intact blocks, and None for damaged parts."""
     at = 0
     while at < len(data):
         block = _block_at(data, at)
@@ -124,7 +125,7 @@ def _verified(data: bytes) -> Iterator[Block | None]:
 
 
 def _block_at(data: bytes, at: int) -> Block | None:
-    """The block that begins there; None where there is none that is as it was written."""
+    """The intact block that begins there, or None."""
     begin = at + _HEAD.size + _CHECK
     if begin > len(data):
         return None
@@ -140,7 +141,7 @@ def _block_at(data: bytes, at: int) -> Block | None:
 
 
 def _intact(data: bytes, at: int) -> Iterator[int]:
-    """Where blocks begin that are as they were written, from `at` on."""
+    """Where intact blocks begin, from `at` on."""
     while (at := data.find(_MARK, at)) >= 0:
         if _block_at(data, at) is not None:
             yield at
@@ -148,7 +149,7 @@ def _intact(data: bytes, at: int) -> Iterator[int]:
 
 
 def _is_cut(data: bytes, at: int) -> bool:
-    """Whether what is there is the beginning of a block that the file's end cuts off."""
+    """Whether the file's end cuts off a block that begins there."""
     rest = data[at:]
     if len(rest) < _HEAD.size + _CHECK:
         return _MARK.startswith(rest[: len(_MARK)])

@@ -1,4 +1,4 @@
-"""`checks.json`: what the preflight of a run folder found."""
+"""`checks.json`: the results of a run folder's preflight."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ FILE = "checks.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
-    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` says what was found."""
+    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` describes the result."""
 
     name: str
     passed: bool
@@ -19,13 +19,13 @@ class CheckResult:
 
 
 def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
-    """The packages that the golden runs in a folder loaded; nothing before they ran."""
+    """The packages that the golden runs loaded; empty before they ran."""
     path = folder.path / FILE
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
-    """Mean CPU time in s of the golden runs in a folder; None before they ran."""
+    """Mean CPU time in s of the golden runs; None before they ran."""
     path = folder.path / FILE
     found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
     return found if isinstance(found, int | float) else None

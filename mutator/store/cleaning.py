@@ -1,4 +1,4 @@
-"""Deletes what a run wrote into its folder, and nothing else."""
+"""Delete what a run wrote into its folder, and nothing else."""
 
 import os
 import time
@@ -19,23 +19,27 @@ _TRIES, _PAUSE_S = 50, 0.1
 
 
 def clean(path: Path) -> None:
-    """Delete the run folder; refused as by `check`, and while a command or its workers hold it."""
+    """Delete the run folder; MutatorError as in `check`, and while a command or its workers hold it."""
     check(path)
     with owned(path, patience_s=0.0):
-        found = check(path)  # once more, now that nobody writes to it
-        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # without it, it is no run folder
+        found = check(path)  # again, now that nobody writes to it
+        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # the head last
 
 
 def clear(path: Path) -> None:
-    """Delete what a killed command left in a folder that was to become a run folder, first what makes it one,
-    last what it had half written, which says that it was at work. What others put there stays."""
+    """Delete what a killed command left in an unfinished run folder; other files stay.
+
+    The head goes first, and half-written files, the evidence of the command, last.
+    """
     ours, _ = _sorted_out(path)
     _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
 
 
 def finish_deletion(path: Path) -> bool:
-    """Wait for another command that may be deleting the run folder, and delete what was written into it
-    meanwhile; whether it is gone."""
+    """Wait for a command that may be deleting the run folder, then delete what was written meanwhile.
+
+    Returns whether the folder is gone.
+    """
     for _ in range(_TRIES):
         try:
             with owned(path, patience_s=0.0):
@@ -44,7 +48,7 @@ def finish_deletion(path: Path) -> bool:
                 clear(path)
         except FileNotFoundError:
             return True
-        except MutatorError:  # it is still at work
+        except MutatorError:  # still in use
             time.sleep(_PAUSE_S)
         else:
             return True
@@ -52,7 +56,7 @@ def finish_deletion(path: Path) -> bool:
 
 
 def _delete(path: Path, files: Iterable[Path]) -> None:
-    """Delete files below `path`, then every folder with nothing in it."""
+    """Delete files below `path`, then every empty folder."""
     for file in files:
         file.unlink()
     for folder, _, _ in os.walk(path, topdown=False):
@@ -61,18 +65,17 @@ def _delete(path: Path, files: Iterable[Path]) -> None:
 
 
 def check(path: Path) -> list[Path]:
-    """The files of a run folder; MutatorError for any other folder, for one that holds what no run writes,
-    and for a link to one."""
+    """List the files of a run folder; MutatorError for any other folder, a link, or unknown content."""
     if path.is_symlink():
         raise MutatorError(
             f"a link to {path.readlink()}",
             where=path,
             expected="a run folder itself",
-            remedy="name the folder that it leads to",
+            remedy="name the link's target",
         )
     if not RunFolder.exists(path):
         raise MutatorError(
-            "no run folder (it has no run.json)",
+            "not a run folder (it has no run.json)",
             where=path,
             expected="a run folder",
             remedy="delete it yourself",
@@ -92,13 +95,13 @@ def check(path: Path) -> list[Path]:
 
 
 def _is_known(name: str) -> bool:
-    """Whether a run writes a file of that name, or a kill leaves one while it does."""
+    """Whether a run writes a file of that name, or leaves it half written."""
     whole = Path(name).with_name(complete(Path(name).name)).as_posix()
     return any(fnmatchcase(whole, pattern) for pattern in CONTENT)
 
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
-    """What a run wrote below `path`, without the folders, and what it did not. No link is followed."""
+    """What a run wrote below `path`, without folders, and everything else. Links are not followed."""
     ours: list[Path] = []
     strangers: list[Path] = []
     for folder, folders, files in os.walk(path):

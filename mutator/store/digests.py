@@ -1,7 +1,7 @@
-"""`digests.json`: size and SHA-256 of every file of a run folder that counts, so that a change is found.
+"""`digests.json`: size and SHA-256 of every file of a run folder that counts, to detect changes.
 
-The owner of the folder alone writes it. What is about to be rewritten is announced first, with its old and
-its new digest, and confirmed afterwards: a kill in between leaves a folder in which each file is either.
+Only the folder's owner writes it. A rewrite is announced first, with old and new digest, and confirmed
+afterwards. After a kill in between, each file matches one of the two.
 """
 
 import hashlib
@@ -28,14 +28,14 @@ from mutator.store.lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
 _WORTH_THREADS = 20_000_000  # bytes
-SEGMENTS = ("records", "proof")  # folders of append-only files; each file is entered once it is closed
+SEGMENTS = ("records", "proof")  # folders of append-only files, each of which is entered once closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Digest:
-    """What a file was when it was written; `lines` of a segment only."""
+    """A file's state when it was written; `lines` for segments only."""
 
-    size: int  # in bytes
+    size: int  # bytes
     sha256: str
     lines: int | None = None
 
@@ -45,8 +45,8 @@ class Digest:
 
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
-        """Of the file there; None where there is none."""
-        if not path.is_file():  # nobody waits for what a pipe may say
+        """The digest of a file; None if there is none."""
+        if not path.is_file():  # never block on a pipe
             return None
         try:
             with path.open("rb") as file:
@@ -60,12 +60,12 @@ class Digest:
             return None
 
     def is_of(self, found: "Digest | None") -> bool:
-        """Whether a file that was found is still what it was."""
+        """Whether a file's current digest matches."""
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
 
 
 def of_files(paths: Sequence[Path]) -> list[Digest | None]:
-    """Of each file; several at a time, as hashing leaves other threads alone."""
+    """The digest of each file, in parallel: hashing releases the lock."""
     sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
     if sum(sizes) < _WORTH_THREADS:
         return [Digest.of_file(path) for path in paths]
@@ -78,7 +78,7 @@ def of_files(paths: Sequence[Path]) -> list[Digest | None]:
 
 
 class DigestingFile:
-    """Writes to a file, and knows the digest of what was written."""
+    """Writes to a file and computes its digest."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._hash, self._size = file, hashlib.sha256(), 0
@@ -90,27 +90,30 @@ class DigestingFile:
 
     @property
     def digest(self) -> Digest:
-        """Of all that was written."""
+        """The digest of everything written."""
         return Digest(size=self._size, sha256=self._hash.hexdigest())
 
 
 def sha256(path: Path) -> str:
-    """The digest of a file, which may be larger than memory; '' where there is none."""
+    """The digest of a file, which may be larger than memory; '' if there is none."""
     found = Digest.of_file(path)
     return found.sha256 if found else ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ledger:
-    """What `digests.json` says: files by their names in the run folder; those that are being rewritten, and
-    what they become (None: they go); whether every experiment has a record that counts."""
+    """The content of `digests.json`.
+
+    Files by their names in the run folder; files being rewritten, with their new digests (None: deleted);
+    whether every experiment has a record that counts.
+    """
 
     files: Mapping[str, Digest]
     rewriting: Mapping[str, Digest | None] = field(default_factory=dict)
     finished: bool = False
 
     def accepts(self, name: str, found: Digest | None) -> bool:
-        """Whether a file may be what was found; one that is being rewritten is the old, the new or gone."""
+        """Whether a file may have this digest; one that is being rewritten may be old, new or missing."""
         known = self.files.get(name)
         if name not in self.rewriting:
             return known.is_of(found) if known else found is None
@@ -119,12 +122,12 @@ class Ledger:
 
     @property
     def names(self) -> list[str]:
-        """Every file that is known, or about to be."""
+        """Every file that is known or announced."""
         return [*self.files, *(name for name in self.rewriting if name not in self.files)]
 
 
 def read(run: Path) -> Ledger:
-    """The ledger of a run folder; MutatorError when it is missing or not as it was written."""
+    """Read the ledger of a run folder; MutatorError if it is missing or changed."""
     path = run / FILE
     remedy = "take it from a copy of the run folder; without it nothing vouches for the results"
     if not path.is_file():
@@ -144,7 +147,7 @@ def read(run: Path) -> Ledger:
 
 
 def write(run: Path, ledger: Ledger) -> None:
-    """Write the ledger, whole or not at all."""
+    """Write the ledger atomically."""
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "finished": ledger.finished,
@@ -162,8 +165,11 @@ def _plain(one: Digest) -> dict[str, Any]:
 def rewriting(
     run: Path, coming: Mapping[str, Digest | None], *, finished: bool | None = None
 ) -> Iterator[None]:
-    """Within it these files become what is said (None: they go). Whoever is killed within it leaves a folder
-    that opens, and that can be rewritten again. `finished` as for `close_segments`, from the beginning."""
+    """Announce that the block changes these files (None: deletes them), and confirm at the end.
+
+    A kill within the block leaves a folder that opens and can be rewritten. `finished` as in
+    `close_segments`, from the beginning.
+    """
     before = settled(run)
     before = replace(before, finished=before.finished if finished is None else finished)
     write(run, replace(before, rewriting=coming))
@@ -173,13 +179,13 @@ def rewriting(
 
 
 def rewrite(run: Path, name: str, data: bytes) -> None:
-    """Write one file of a run folder anew, and its digest."""
+    """Rewrite a file of a run folder and its digest."""
     with rewriting(run, {name: Digest.of(data)}):
         write_atomic(run / name, data)
 
 
 def settled(run: Path) -> Ledger:
-    """The ledger without announcements: what a killed command left of them is taken as it is."""
+    """The ledger without announcements: files that a killed command left are taken as they are."""
     known = read(run)
     files = dict(known.files)
     for name, coming in known.rewriting.items():
@@ -192,7 +198,7 @@ def settled(run: Path) -> Ledger:
 
 
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
-    """Enter the segments that nobody appends to any more, with the bytes that count: a torn last line goes.
+    """Enter the segments that are complete, without a torn last line.
 
     `finished` says whether the run is, from now on; None: as before. MutatorError for a damaged line.
     """
@@ -207,7 +213,7 @@ def close_segments(run: Path, *, finished: bool | None = None) -> None:
 
 
 def segments(run: Path) -> list[str]:
-    """Names of the segments in a run folder."""
+    """The names of the segments in a run folder."""
     return sorted(f"{kind}/{path.name}" for kind in SEGMENTS for path in (run / kind).glob("*.jsonl"))
 
 

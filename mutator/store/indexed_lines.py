@@ -1,6 +1,6 @@
-"""Lines of checksummed files by the experiment that they are of: verified at once, parsed when asked for.
+"""Lines of checksummed files by experiment: all verified at once, each parsed on request.
 
-A million experiments take some 200 MB so, where their records as objects take 5 GB.
+A million experiments take some 200 MB this way; as objects, their records take 5 GB.
 """
 
 import json
@@ -16,17 +16,17 @@ from mutator._common.hashing import from_json
 from mutator.errors import MutatorError
 from mutator.store.lines import bare_segment, verified_lines
 
-_OPEN = 16  # files that are kept open
-_ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # as canonical JSON has it, nowhere else in such a line
+_OPEN = 16  # most open files
+_ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # canonical JSON has this nowhere else in a line
 
 T = TypeVar("T")
 
 
 class IndexedLines(Mapping[str, T], Generic[T]):
-    """Of each experiment the object that `made` makes of its line, in the order in which they came first.
+    """Maps each experiment to the object that `made` makes of its line, in order of first appearance.
 
-    `replaces(line, known)` decides of a second line of an experiment, given the one that is known; it may
-    raise. MutatorError for a damaged line; for one that holds something else once it is asked for.
+    `replaces(line, known)` decides about a second line of an experiment, and may raise. MutatorError for a
+    damaged line, and on access for one with other content.
     """
 
     def __init__(
@@ -41,7 +41,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self._made, self._checksums = made, checksums
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
-        self._last: tuple[str, T] | None = None  # the object that was made last: some ask for one twice
+        self._last: tuple[str, T] | None = None  # the last object, since some callers ask twice
         self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
         for file, path in enumerate(self._files.paths):
             self._read(file, path, schema, replaces)
@@ -68,7 +68,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return Line(self._files.paths[file], self._number[at], data)
 
     def __getitem__(self, name: str) -> T:
-        last = self._last  # threads may ask for others meanwhile
+        last = self._last  # threads may replace it meanwhile
         if last is None or last[0] != name:
             self._last = last = name, self._read_one(name)
         return last[1]
@@ -90,7 +90,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return len(self._index)
 
     def problem(self, line: "Line") -> MutatorError:
-        """What is said of a line that is not what it should be."""
+        """The error about an unexpected line."""
         return self._problem(line.path, line.number)
 
     def _problem(self, path: Path, number: int) -> MutatorError:
@@ -104,7 +104,7 @@ class Line:
         self.path, self.number, self.data = path, number, data
 
     def content(self) -> dict[str, Any]:
-        """The object on it; ValueError when it is none."""
+        """The object on it; ValueError if it is not one."""
         value = from_json(self.data)
         if not isinstance(value, dict):
             raise ValueError("no object")
@@ -113,17 +113,17 @@ class Line:
 
 
 def _name(data: bytes) -> str | None:
-    """The experiment that a line names; None: none."""
+    """The experiment that a line names, or None."""
     if found := _ID.search(data):
         return found[1].decode()
     try:
-        return str(json.loads(data)["experiment_id"])  # older folders have other spaces
+        return str(json.loads(data)["experiment_id"])  # older folders use other spaces
     except (KeyError, TypeError, ValueError, RecursionError):
         return None
 
 
 class Files:
-    """Reads pieces of files, of which a few are open at a time."""
+    """Reads parts of files and keeps a few files open."""
 
     def __init__(self, paths: list[Path]) -> None:
         self.paths = paths
@@ -131,7 +131,7 @@ class Files:
         self._lock = Lock()
 
     def read(self, file: int, offset: int, length: int) -> bytes:
-        with self._lock:  # no thread closes a file that another one reads
+        with self._lock:  # no thread closes a file while another reads it
             if file not in self._open:
                 if len(self._open) >= _OPEN:
                     os.close(self._open.pop(next(iter(self._open))))

@@ -1,7 +1,7 @@
-"""Is a run folder what was written? Asked whenever one is opened, before anything of it is believed.
+"""Check that a run folder is as written, before anything in it is used.
 
-Files are compared with `digests.json`, lines with their checksums, the records with the plan. A folder of an
-earlier schema has neither digests nor checksums; of it only the ids are checked.
+Files are compared with `digests.json`, lines with their checksums, records with the plan. Folders of the
+first schema have neither digests nor checksums, so only their ids are checked.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -20,8 +20,8 @@ from mutator.store.records import SCHEMA, ending_on, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, Head
 from mutator.store.shards import Shard
 
-SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has nothing unknown
-WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # cannot be made again
+SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders with no unknown files in a finished run
+WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # files that cannot be recreated
 TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
 _MANY = 5  # experiments that one message names
 
@@ -29,10 +29,9 @@ _MANY = 5  # experiments that one message names
 def problems(
     run: Path, head: Head, ledger: Ledger | None, shard: Shard | None, *, anew: bool = False
 ) -> Iterator[MutatorError]:
-    """All that is wrong in a run folder, of which `shard` is run in it.
+    """Yield all that is wrong in a run folder, which runs `shard`.
 
-    Of a finished run whose very bytes this machine has verified before, only these bytes are compared, unless
-    that is to be done `anew`.
+    For a finished run that this machine has verified before, only the bytes are compared, unless `anew`.
     """
     key = ""
     if ledger is not None:
@@ -68,8 +67,10 @@ def problems(
 
 
 def content_key(run: Path) -> str:
-    """What stands for all that counts in a finished run folder (`verified_runs`); empty where it is not
-    finished, or not as its digests say."""
+    """A key for everything that counts in a finished run folder (`verified_runs`).
+
+    It is empty if the run is not finished or does not match its digests.
+    """
     ledger = digests.read(run)
     found = digests_of(run, ledger)
     settled = ledger.finished and not ledger.rewriting
@@ -77,29 +78,29 @@ def content_key(run: Path) -> str:
 
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
-    """Of all files that count, by their names in the run folder."""
+    """The digests of all files that count, by name in the run folder."""
     names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
     return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
-    """`verified_runs.key_of` of these files, and of what says which must be there."""
+    """`verified_runs.key_of` of these files and of the list of required files."""
     ledger = Digest.of_file(run / digests.FILE)
     told = {**found, digests.FILE: ledger}
     return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
 def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
-    """Ids and places of the experiments of a plan that a run folder is to run, in the plan's order.
+    """Ids and positions of the experiments that a run folder runs, in plan order.
 
-    MutatorError for a plan that has one twice, or another number than its chunks have.
+    MutatorError for a plan with a duplicate, or whose number differs from its chunks.
     """
     path = run / plan_file.EXPERIMENTS
     places: dict[str, int] = {}
     for place, name in enumerate(plan_file.ids(run)):
         if places.setdefault(name, place) != place:
             raise MutatorError(
-                f"experiment {name} a second time", where=path, line=place + 1, remedy=_remedy(run, HEAD)
+                f"duplicate experiment {name}", where=path, line=place + 1, remedy=_remedy(run, HEAD)
             )
     counts = [count for _, _, count in head["chunks"]]
     if sum(counts) != len(places):
@@ -118,7 +119,7 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
 def file_problems(
     run: Path, ledger: Ledger, digests_found: Mapping[str, Digest | None]
 ) -> Iterator[MutatorError]:
-    """Files that are missing, or have other bytes than were written."""
+    """Yield files that are missing or changed."""
     for name in ledger.names:
         found = digests_found[name]
         if ledger.accepts(name, found):
@@ -132,7 +133,7 @@ def file_problems(
 
 
 def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[MutatorError]:
-    """What is wrong with a file of other bytes: its damaged lines, if it has lines."""
+    """Yield what is wrong with a changed file: its damaged lines, if it has lines."""
     path = run / name
     if known.lines is not None:
         segment = read_segment(path)
@@ -146,7 +147,7 @@ def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[Mut
         return
     line = None
     if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
-        with suppress(MutatorError):  # the other one is missing
+        with suppress(MutatorError):  # the other problem is a missing file
             line = next((one.line for one in plan_file.problems(run) if one.where == str(path)), None)
     yield MutatorError(
         f"changed: {_told(found)}", where=path, line=line, expected=_told(known), remedy=_remedy(run, name)
@@ -165,7 +166,7 @@ def _remedy(run: Path, name: str) -> str:
 
 
 def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
-    """Damaged lines of segments that are still appended to, or that a killed command left."""
+    """Yield damaged lines of segments in use, or left by a killed command."""
     for name in digests.segments(run):
         if name not in ledger.files:
             try:
@@ -177,7 +178,7 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
 
 
 def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
-    """Files of a finished run, where only those belong that the ledger names, that it does not name."""
+    """Yield files of a finished run that the ledger does not name, in folders where all must be named."""
     known = {*ledger.files, *ledger.rewriting}
     paths = [run / name for name in TOP]
     paths += [path for folder in SEALED for path in sorted((run / folder).rglob("*"))]
@@ -190,7 +191,7 @@ def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
 def id_problems(
     run: Path, head: Head, ledger: Ledger | None, planned: Collection[str]
 ) -> Iterator[MutatorError]:
-    """Records of experiments that are not planned here, two of one experiment, and missing ones."""
+    """Yield unplanned, duplicate and missing records."""
     patches = Patches(run) if ledger is not None else None
     stored = dict(patches.digests()) if patches is not None else {}
     for kind in digests.SEGMENTS:
@@ -217,7 +218,7 @@ def id_problems(
             yield MutatorError(
                 f"no record of {', '.join(missing[:_MANY])}{more}",
                 where=run / kind,
-                expected="one of each planned experiment, as the run is finished",
+                expected="one for each planned experiment, as the run is finished",
                 remedy=_remedy(run, ""),
             )
 
@@ -226,7 +227,7 @@ _Lines = Iterator[tuple[int, bytes]]  # number from 1, and bytes
 
 
 def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[MutatorError]:
-    """A segment of another run, or in another's place."""
+    """Yield a problem if a segment belongs to another run or has been moved."""
     number, line = next(lines, (0, b""))
     if number != 1:
         return
@@ -248,8 +249,9 @@ def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[Mutato
 def _counted(
     segment: Segment, lines: _Lines, planned: Collection[str]
 ) -> Iterator[tuple[int, str | MutatorError, str, int]]:
-    """Of each record of a segment that counts its line, experiment and patch, and a hash of it; what is wrong
-    with a line in the place of the experiment."""
+    """Yield line, experiment, patch and hash of each record of a segment that counts, or the line's
+    problem.
+    """
     for number, line in lines:
         try:
             ending = ending_on(line)
@@ -272,15 +274,16 @@ def _counted(
 def patch_problems(
     patches: Patches, experiment_id: str, known: str, worker: str = ""
 ) -> Iterator[MutatorError]:
-    """A stored patch that is missing, or not the one whose digest `known` the record of `worker` has; empty
-    for no mutant."""
+    """Yield a problem if a stored patch is missing or its digest is not the record's `known` (empty: no
+    mutant).
+    """
     if not known:
         return
     data = patches.read(experiment_id)
     found = "" if data is None else digest(data)
     if found != known:
         yield MutatorError(
-            f"another patch of {experiment_id} than was run: SHA-256 {found[:16]}"
+            f"not the patch of {experiment_id} that was run: SHA-256 {found[:16]}"
             if found
             else f"no patch of {experiment_id}",
             where=patches.file(experiment_id, worker),

@@ -1,8 +1,8 @@
-"""Files of checksummed lines: each appended by one process, verified over raw bytes before any is parsed.
+"""Files of checksummed lines, each appended by one process; raw bytes are verified before any line is parsed.
 
 A line is a JSON object whose first key is its checksum, `{"sum":"<16 hex>",...}`: SHA-256, shortened, of the
-checksum that the line before states and of all bytes after its own. So a line that was changed, dropped,
-doubled or moved is found by its number, and the lines after it still verify.
+previous line's checksum and of all bytes after its own. So a changed, missing, duplicate or moved line is
+detected by its number, and the lines after it still verify.
 """
 
 import json
@@ -19,18 +19,18 @@ from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
 _BATCH = 32  # lines between two syncs
-_BATCH_S = 2.0  # and at most this long
+_BATCH_S = 2.0  # and the longest time between them
 _KEY, _WIDTH, _AFTER = b'{"sum":"', 16, b'",'
 _SUM = slice(len(_KEY), len(_KEY) + _WIDTH)
 _BODY = len(_KEY) + _WIDTH + len(_AFTER)
 
 
 class LineWriter:
-    """Appends JSON lines to a new file of its own: whole lines, checksummed, synced in batches.
+    """Appends checksummed JSON lines to a new file, synced in batches.
 
-    `head`, with the schema, is the first line; the file's name joins it. `first` is called before each sync,
-    to sync what the lines refer to. A line that does not fit on the disk is taken back, so the file stays
-    readable; DiskFull is raised.
+    `head`, with the schema, is the first line, to which the file's name is added. `first` is called before
+    each sync, to sync what the lines refer to. A line that does not fit on the disk is removed again, and
+    DiskFull raised.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
@@ -52,7 +52,7 @@ class LineWriter:
             self.sync()
 
     def extend(self, values: Iterable[bytes]) -> None:
-        """Append lines, given as the canonical text of their values; they are synced by time alone."""
+        """Append lines, given as canonical text; they are synced by time only."""
         lines, last = [], self._last
         for value in values:
             lines.append(_line(last, value[1:]))
@@ -89,8 +89,11 @@ class LineWriter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """What is in such a file: the lines that are as they were written, by number from 1; the numbers of those
-    that are not; and where the last whole line ends. What comes after it is torn: a kill left it."""
+    """The content of such a file: intact lines by number from 1, numbers of damaged lines, end of the last
+    whole line.
+
+    What comes after that end was torn by a kill.
+    """
 
     path: Path
     checksums: bool
@@ -99,19 +102,19 @@ class Segment:
     end: int
 
     def problem(self, number: int) -> MutatorError:
-        """What is said of a line that is not as it was written."""
+        """The error about a damaged line."""
         run = self.path.parent.parent
         mend = f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
         return MutatorError(
             "a damaged line",
             where=self.path,
             line=number,
-            expected="the bytes that its checksum was taken of" if self.checksums else "a whole JSON object",
+            expected="bytes that match its checksum" if self.checksums else "a whole JSON object",
             remedy=mend if self.checksums else "take the file from a copy of the run folder",
         )
 
     def content(self, number: int) -> dict[str, Any]:
-        """The object on a line, without its checksum; MutatorError when it is none."""
+        """The object on a line, without its checksum; MutatorError if it is not one."""
         try:
             value = json.loads(self.lines[number])
         except (ValueError, RecursionError):
@@ -122,15 +125,14 @@ class Segment:
         return value
 
     def body(self, number: int) -> bytes:
-        """A line without its checksum: the same in every file that it is in."""
+        """A line without its checksum, which is the same in every file."""
         return self.body_of(self.lines[number])
 
     def body_of(self, line: bytes) -> bytes:
-        """As `body`."""
         return line[_BODY if self.checksums else 0 :]
 
     def check_head(self, schema: str) -> None:
-        """MutatorError for a file of another schema, or one that was written under another name."""
+        """Raise MutatorError for a file of another schema, or one written under another name."""
         if 1 not in self.lines:
             return
         head = self.content(1)
@@ -146,8 +148,9 @@ class Segment:
             )
 
     def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Number and content of each line after the head; MutatorError for a damaged line, and for a file of
-        another schema or name."""
+        """Yield number and content of each line after the head; MutatorError for damage or another schema
+        or name.
+        """
         if self.damaged:
             raise self.problem(self.damaged[0])
         self.check_head(schema)
@@ -155,10 +158,9 @@ class Segment:
 
 
 def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
-    """Verify the lines of a file; `data` are its bytes, if they were read already.
+    """Verify the lines of a file, whose bytes are `data` if already read.
 
-    Without `checksums` (a run folder of before there were any) every whole line counts as written.
-    MutatorError where there is no file.
+    Without `checksums` (an old run folder) every whole line counts as intact. MutatorError without a file.
     """
     data = _read(path) if data is None else data
     end = data.rfind(b"\n") + 1
@@ -175,14 +177,14 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
 
 
 def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tuple[int, int, bytes]]:
-    """Number, offset and bytes (without the line's end) of each whole line after the head, one at a time.
+    """Yield number, offset and bytes (without newline) of each whole line after the head.
 
-    MutatorError for a damaged line, and for a file that is missing, or of another schema or name.
+    MutatorError for a damaged line, and for a missing file or another schema or name.
     """
     last, offset = b"", 0
     with _no_pipe(path).open("rb") as file:
         for number, line in enumerate(file, start=1):
-            if not line.endswith(b"\n"):  # torn: a kill left it
+            if not line.endswith(b"\n"):  # torn by a kill
                 return
             data = line[:-1]
             if checksums and not _is_intact(last, data):
@@ -196,8 +198,7 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
 
 
 def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
-    """Number and bytes of each whole line that is as it was written, one at a time. MutatorError where there
-    is no file."""
+    """Yield number and bytes of each whole, intact line. MutatorError without a file."""
     last = b""
     with _no_pipe(path).open("rb") as file:
         for number, line in enumerate(file, start=1):
@@ -208,12 +209,12 @@ def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
 
 
 def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:
-    """A file of which no more than these lines is known."""
+    """A segment of which only these lines are known."""
     return Segment(path=path, checksums=checksums, lines=lines or {}, damaged=(), end=0)
 
 
 def _is_intact(last: bytes, line: bytes) -> bool:
-    """Whether a line, which follows on the checksum `last`, has the bytes that its own was taken of."""
+    """Whether a line that follows the checksum `last` matches its own."""
     found = sha256(last + line[_BODY:]).hexdigest()[:_WIDTH].encode()
     return line[:_BODY] == b"".join((_KEY, found, _AFTER))
 
@@ -223,18 +224,18 @@ def _read(path: Path) -> bytes:
 
 
 def _no_pipe(path: Path) -> Path:
-    if path.is_file():  # nobody waits for what a pipe may say
+    if path.is_file():  # never block on a pipe
         return path
     raise MutatorError(
         "no file",
         where=path,
         expected="lines",
-        remedy="take it from a copy of the run folder, or delete it: `mutator verify` tells what is lost",
+        remedy="take it from a copy of the run folder, or delete it: `mutator verify` lists what is lost",
     )
 
 
 def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
-    """What a file at `path` holds to which `values` were appended."""
+    """The bytes of a file at `path` after `values` were appended."""
     lines = [b""]
     for value in (_head(path, head), *values):
         lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
@@ -242,7 +243,7 @@ def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, A
 
 
 def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
-    """Write a file whose lines, after its own head, are those of other files, with their checksums."""
+    """Write a file from other files' lines, after a new head, with new checksums."""
     first = _line(b"", canonical(_head(path, head)).encode()[1:])
     with writing_atomic(path) as file:
         file.write(first)
@@ -254,7 +255,7 @@ def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> N
 
 
 def _line(last: bytes, body: bytes) -> bytes:
-    """A line: its checksum, which follows on `last`, and `body`, the object without its first brace."""
+    """A line: its checksum, which follows `last`, and `body`, the object without its first brace."""
     checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
     return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
 

@@ -1,7 +1,7 @@
-"""The patches of a run folder: packed, each as what it has beside another one, which most of it is.
+"""The patches of a run folder: packed, most of them as a difference from another patch.
 
-Each worker appends to a file of its own, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have
-a file a patch, `patches/<xx>/<experiment>.patch`. Whether one is what was run, the digest in its record says.
+Each worker appends to its own file, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have one
+file per patch, `patches/<xx>/<experiment>.patch`. The digest in a record identifies the patch that was run.
 """
 
 import zlib
@@ -15,9 +15,9 @@ from mutator._common.hashing import digest
 from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
-WHOLE, BESIDE = 0, 1  # kinds of blocks: a patch by itself, or beside the last whole one before it
-_WINDOW = 32_768  # bytes that deflate looks back
-_RUN = 256  # patches to a whole one: what depends on it is lost with it
+WHOLE, BESIDE = 0, 1  # kinds of blocks: a whole patch, or a difference from the last whole one
+_WINDOW = 32_768  # bytes of deflate's window
+_RUN = 256  # patches per whole one, which are lost with it
 _LEVEL = 9
 
 
@@ -29,7 +29,7 @@ class _Packer:
         self._whole = b""
 
     def block(self, data: bytes) -> tuple[int, bytes]:
-        """Kind and content of the block of the next patch."""
+        """Kind and content of the next patch's block."""
         is_whole = self._count % _RUN == 0
         self._count += 1
         if is_whole:
@@ -44,7 +44,7 @@ class PatchWriter:
 
     def __init__(self, run: Path, worker: str) -> None:
         self._path = run / FOLDER / f"{worker}{SUFFIX}"
-        self._blocks: BlockWriter | None = None  # nothing was appended yet
+        self._blocks: BlockWriter | None = None  # nothing appended yet
         self._packer = _Packer()
 
     def append(self, experiment_id: str, data: bytes) -> None:
@@ -54,7 +54,7 @@ class PatchWriter:
         self._blocks.append(kind, experiment_id, content)
 
     def extend(self, blocks: bytes) -> None:
-        """Append the blocks that `packed_patches` made elsewhere."""
+        """Append blocks of `packed_patches`."""
         if self._blocks is None:
             self._blocks = BlockWriter(self._path)
         self._blocks.extend(blocks)
@@ -82,7 +82,7 @@ class _Whole:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where a patch is: its block, and the whole patch that it is beside, or is."""
+    """A patch's place: its block, and the whole patch that it depends on or is."""
 
     path: Path
     block: Block
@@ -90,7 +90,7 @@ class _Place:
 
 
 def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
-    """The patch of a block; None where the whole patch that it is beside is lost."""
+    """The patch in a block; None if the whole patch that it depends on is lost."""
     try:
         if block.kind == WHOLE or whole is None:
             return whole.data if whole is not None and block.kind == WHOLE else zlib.decompress(block.data)
@@ -107,12 +107,12 @@ class Patches:
         self.run = run
 
     def __iter__(self) -> Iterator[str]:
-        """Every experiment that a patch is there of."""
+        """Every experiment with a stored patch."""
         old = (path.stem for path in (self.run / FOLDER).glob("*/*.patch"))
         return iter(sorted({*self._places, *old}))
 
     def read(self, experiment_id: str) -> bytes | None:
-        """The newest patch of an experiment; None where none is there, or only a damaged one."""
+        """The newest patch of an experiment; None if it is missing or damaged."""
         place = self._places.get(experiment_id)
         if place is None:
             path = self.old_file(experiment_id)
@@ -120,8 +120,9 @@ class Patches:
         return _unpacked(place.block, place.whole)
 
     def digests(self) -> Iterator[tuple[str, str]]:
-        """Each experiment that a patch is packed of, and the SHA-256 of the patch, empty for a damaged one; a
-        newer one comes later. They are unpacked one at a time."""
+        """Yield each experiment with a packed patch, and the patch's SHA-256, empty if damaged; newer ones
+        come later.
+        """
         for path in filter(Path.is_file, self.files()):
             whole: _Whole | None = None
             for block in intact_blocks(path):
@@ -130,8 +131,10 @@ class Patches:
                 yield block.key, "" if data is None else digest(data)
 
     def file(self, experiment_id: str, worker: str = "") -> Path:
-        """The file that has it, or that would have it if it were there: a damaged one, else that of the
-        `worker` whose record names it, if that is known."""
+        """The file that has, or should have, an experiment's patch.
+
+        That is one with a damaged patch, else the file of the `worker` in its record, if known.
+        """
         place = self._places.get(experiment_id)
         if place is not None:
             return place.path
@@ -143,17 +146,17 @@ class Patches:
         return next(damaged, lost)
 
     def old_file(self, experiment_id: str) -> Path:
-        """Where folders of earlier schemas have it."""
+        """The file in folders of earlier schemas."""
         return self.run / FOLDER / experiment_id[:2] / f"{experiment_id}.patch"
 
     def files(self) -> list[Path]:
-        """The files of blocks, oldest session first, and what else has such a name."""
+        """The block files, oldest session first, and anything else with such a name."""
         return sorted((self.run / FOLDER).glob(f"*{SUFFIX}"))
 
     @cached_property
     def _places(self) -> dict[str, _Place]:
         found: dict[str, _Place] = {}
-        for path in filter(Path.is_file, self.files()):  # nobody waits for what a pipe may say
+        for path in filter(Path.is_file, self.files()):  # never block on a pipe
             whole: _Whole | None = None
             for block in read_blocks(path).blocks:
                 if block.kind == WHOLE:
@@ -163,12 +166,12 @@ class Patches:
 
 
 def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
-    """Write a file of blocks anew, with these patches alone."""
+    """Rewrite a file of blocks with only these patches."""
     write_atomic(path, packed_patches(patches))
 
 
 def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
-    """The blocks of patches that need no others before them: a file, or a part of one."""
+    """Blocks of patches that depend on no earlier ones: a file, or a part of one."""
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)

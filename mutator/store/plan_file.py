@@ -1,4 +1,4 @@
-"""The frozen plan on disk: one line per experiment, read whole or one chunk at a time."""
+"""The frozen plan on disk: one line per experiment, read whole or by chunk."""
 
 import json
 import re
@@ -48,8 +48,9 @@ class SupportsWrite(Protocol):
 
 
 class PlanWriter:
-    """Writes experiments and their faults, each once, to the files that are given; `places` has where each
-    chunk is."""
+    """Writes experiments, and each fault once, to the given files; `places` has the position of each
+    chunk.
+    """
 
     def __init__(self, experiments: SupportsWrite, faults: SupportsWrite) -> None:
         self.places: list[Chunk] = []
@@ -58,7 +59,7 @@ class PlanWriter:
         self._offset = 0
 
     def append(self, experiments: Sequence[Experiment], chunks: Iterable[int]) -> None:
-        """Write the experiments of the next chunks, which are so long."""
+        """Write the experiments of the next chunks, of these lengths."""
         lines = (canonical(_line(experiment)).encode() + b"\n" for experiment in experiments)
         for count in chunks:
             data = b"".join(islice(lines, count))
@@ -71,7 +72,7 @@ class PlanWriter:
 
 
 def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -> list[Chunk]:
-    """Write the plan's files; returns where each chunk is."""
+    """Write the plan's files; returns the position of each chunk."""
     make_folder(run)
     with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
         writer = PlanWriter(lines, faults)
@@ -80,12 +81,12 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
 
 
 def make_folder(run: Path) -> None:
-    """The folder of the plan's files."""
+    """Make the folder of the plan's files."""
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
 
 
-_Lines = Iterable[tuple[int | None, bytes]]  # number, where it is known, and text
+_Lines = Iterable[tuple[int | None, bytes]]  # number, if known, and text
 
 
 def _lines(path: Path) -> _Lines:
@@ -93,7 +94,7 @@ def _lines(path: Path) -> _Lines:
 
 
 def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T | MutatorError]:
-    """What is `made` of each line of the plan file at `path`, or what is wrong with the line."""
+    """Yield what `made` makes of each line of the plan file at `path`, or the line's problem."""
     for number, line in lines:
         try:
             yield made(json.loads(line))
@@ -104,7 +105,7 @@ def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> I
 
 
 def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
-    """As `_tried`, but what is wrong is raised."""
+    """Like `_tried`, but raise problems."""
     for found in _tried(path, lines, made):
         if isinstance(found, MutatorError):
             raise found
@@ -118,19 +119,18 @@ def read_faults(run: Path) -> dict[str, Fault]:
 
 
 def fault_lines(run: Path) -> dict[str, bytes]:
-    """The lines of the plan's faults by id, which is the digest of the line: the faults unread."""
+    """The lines of the plan's faults by id, the digest of the line, without parsing."""
     lines = (line.rstrip(b"\n") for line in lines_of(run / FAULTS))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
 def lines_named(run: Path, names: Container[str]) -> Iterator[bytes]:
-    """The lines of these experiments, in the plan's order."""
+    """Yield the lines of these experiments in plan order."""
     lines = lines_of(run / EXPERIMENTS)
     return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in names)
 
 
 def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
-    """The lines of one chunk."""
     offset, length, _ = chunk
     with (run / EXPERIMENTS).open("rb") as file:
         file.seek(offset)
@@ -147,12 +147,12 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
 
 
 def read_all(run: Path) -> tuple[Experiment, ...]:
-    """Every experiment, in the plan's order."""
+    """Every experiment in plan order."""
     return tuple(iterate(run))
 
 
 class ExperimentsInOrder(Sequence[Experiment]):
-    """Every experiment, in the plan's order, read when asked for: a million need no room."""
+    """Every experiment in plan order, read on access, so that a million need no memory."""
 
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
         self._run, self._chunks = run, chunks
@@ -182,13 +182,13 @@ class ExperimentsInOrder(Sequence[Experiment]):
 
 
 def iterate(run: Path) -> Iterator[Experiment]:
-    """As `read_all`, one after the other."""
+    """Like `read_all`, one at a time."""
     path = run / EXPERIMENTS
     yield from _experiments(path, _lines(path), read_faults(run))
 
 
 def lines_of(path: Path) -> Iterator[bytes]:
-    """The lines of a plan file, one at a time, with their ends."""
+    """Yield the lines of a plan file, with newlines."""
     try:
         with no_pipe(path).open("rb") as file:
             yield from file
@@ -203,7 +203,6 @@ def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fau
 
 
 def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iterator[Experiment]:
-    """The experiments on lines of the plan file at `path`."""
     for number, line in lines:
         if experiment := experiment_as_written(line, faults):
             yield experiment
@@ -212,18 +211,18 @@ def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iter
 
 
 def ids(run: Path) -> Iterator[str]:
-    """Every experiment's id, in the plan's order."""
+    """Every experiment's id, in plan order."""
     path = run / EXPERIMENTS
     for number, line in _lines(path):
         found = _ID.match(line)
-        if found and line.count(b'"id":') == 1:  # as it is written, and no other id follows
+        if found and line.count(b'"id":') == 1:  # as written, with a single id
             yield found[1].decode()
         else:
             yield from _read(path, [(number, line)], lambda data: str(data["id"]))
 
 
 def problems(run: Path) -> Iterator[MutatorError]:
-    """Every line that is not what its id, or the id by which others name it, stands for."""
+    """Yield every line that does not match its id."""
     planned, defined = run / EXPERIMENTS, run / FAULTS
     found = list(_tried(defined, _lines(defined), fault_from))
     faults = {fault.id: fault for fault in found if isinstance(fault, Fault)}
@@ -239,7 +238,7 @@ def problems(run: Path) -> Iterator[MutatorError]:
 
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:
-    """What JSON knows of an experiment; its fault by id."""
+    """An experiment as JSON types, with its fault's id."""
     return {name: plain(value) for name, value in _line(experiment).items()}
 
 
@@ -258,8 +257,9 @@ def _line(experiment: Experiment) -> dict[str, Any]:
 
 
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    """The experiment of a plan file's line; MutatorError when its id is not that of its content, and for a
-    field that this version does not know."""
+    """The experiment on a plan file's line; MutatorError if its id does not match, or for an unknown
+    field.
+    """
     if data["fault"] not in faults:
         raise MutatorError(f"fault {data['fault']} is not in {FAULTS}, or was changed there", remedy=_REMEDY)
     trigger = data["trigger"]
@@ -274,7 +274,7 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         read["after_hazard"] = AfterHazard(data["after_hazard"])
     experiment = _make(Experiment, values, **read)
     if _is_named(data):
-        vars(experiment)["id"] = data["id"]  # what the property would find, and keep
+        vars(experiment)["id"] = data["id"]  # what the property would compute and keep
     elif experiment.id != data["id"]:
         raise MutatorError(
             f"what is called experiment {data['id']} is {experiment.id}",
@@ -285,15 +285,17 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
 
 
 def _is_named(data: Mapping[str, Any]) -> bool:
-    """Whether the id of a plan file's line is that of its content, asked of the plain data: in half the time
-    that it takes to ask the experiment. That one knows what to think of fields that are missing or new."""
+    """Whether the id of a plan file's line matches its content, computed from the plain data.
+
+    This takes half the time of the experiment's own id. That one handles missing and new fields.
+    """
     if data.keys() != _FIELDS or data["trigger"].keys() != _known(Trigger):
         return False
     return bool(content_id([data[name] for name in _HASHED]) == data["id"])
 
 
 def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
-    """The canary, as the run.json at `head` has it; MutatorError when it is damaged."""
+    """The canary in the run.json at `head`; MutatorError if it is damaged."""
     try:
         fault = fault_from(data["fault"])
         return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
@@ -302,7 +304,7 @@ def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
 
 
 def fault_from(data: Mapping[str, Any]) -> Fault:
-    """The fault of a plan file's line; MutatorError for a field that this version does not know."""
+    """The fault on a plan file's line; MutatorError for an unknown field."""
     return _make(
         Fault,
         data,
@@ -325,8 +327,9 @@ def _injection_from(data: Mapping[str, Any]) -> Injection:
 
 
 def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """A record from its line, some values of which were `read` already. Fields added since the line was
-    written hold their defaults."""
+    """A record from its line; some values were `read` already. Fields that the line lacks have their
+    defaults.
+    """
     if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
         raise MutatorError(
             f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",

@@ -1,4 +1,4 @@
-"""Lines of the plan as they are written: read from their bytes, ids included, without parsing them."""
+"""Read lines of the plan, including ids, from their bytes without parsing JSON."""
 
 import json
 import re
@@ -18,15 +18,14 @@ _FIELDS = {field.name for field in fields(Trigger)}
 
 
 def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experiment | None:
-    """The experiment on a line as canonical JSON has it.
+    """The experiment on a line in canonical JSON.
 
-    None where the line is anything else, or its id is not that of its content: whoever reads all kinds of
-    lines knows what to think of it.
+    None for any other line, or if the id does not match; the general reader handles those.
     """
     if not (found := _LINE.fullmatch(line)):
         return None
     fault, name, method, scenario, scenario_digest, seed, setting, trigger = found.groups()
-    # what Experiment.id is the digest of
+    # the input of Experiment.id
     hashed = b",".join((fault, scenario, scenario_digest, method, trigger, seed, setting))
     if sha256(b"[%b]" % hashed).hexdigest()[:16].encode() != name:
         return None
@@ -42,7 +41,7 @@ def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experimen
         )
     except (ValueError, LookupError, TypeError):
         return None
-    vars(experiment)["id"] = name.decode()  # what the property would find, and keep
+    vars(experiment)["id"] = name.decode()  # what the property would compute and keep
     return experiment
 
 

@@ -1,4 +1,4 @@
-"""The experiments of a plan by id, each parsed when it is asked for."""
+"""The experiments of a plan by id, parsed on access."""
 
 import json
 import re
@@ -14,9 +14,9 @@ _ID = re.compile(rb'"id":"([^"\\]+)"')
 
 
 class Planned(Mapping[str, Experiment]):
-    """Those of the run folder at `run`, in the plan's order.
+    """Those of the run folder at `run`, in plan order.
 
-    MutatorError, when one is asked for, for a line that is damaged or is not what its id stands for.
+    MutatorError on access for a line that is damaged or does not match its id.
     """
 
     def __init__(self, run: Path) -> None:
@@ -46,7 +46,7 @@ class Planned(Mapping[str, Experiment]):
 
 
 def _id(line: bytes) -> str | None:
-    """The id on a line; None where there is none: what is on it is told when it is asked for."""
+    """The id on a line, or None; such a line is reported on access."""
     if found := _ID.search(line):
         return found[1].decode()
     try:

@@ -1,4 +1,4 @@
-"""How far a run is: its stage, how much of it is done, how fast it goes and how long it will still take."""
+"""The progress of a run: stage, share done, rate, remaining time."""
 
 import json
 import time
@@ -11,11 +11,10 @@ from mutator.model import Status
 
 @dataclass(kw_only=True)
 class Progress:
-    """How far a run is. `outcomes` counts outcomes of ok experiments and the other statuses by name.
+    """The progress of a run. `outcomes` counts outcomes of ok experiments and other statuses by name.
 
-    The stages: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `pictures`,
-    `report`, in turn.
-    Rate and remaining time are those of the stage; `total` is 0 where there is nothing to count.
+    Stages in order: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `pictures`,
+    `report`. Rate and remaining time are those of the stage; `total` is 0 if nothing is counted.
     """
 
     stage: str  #: `plan`, `checks`, `golden`, `experiments`, `proof`, `tables`, `pictures` or `report`
@@ -28,14 +27,14 @@ class Progress:
 
 
 class Pace:
-    """The rate of a stage, measured from here on; `done` of `total` steps were done before."""
+    """Measures the rate of a stage from now on; `done` of `total` steps were done before."""
 
     def __init__(self, stage: str, total: int, done: int = 0) -> None:
         self._stage, self._total, self._before = stage, total, done
         self._began = time.monotonic()
 
     def at(self, done: int, *, detail: str = "", outcomes: Counter[str] | None = None) -> Progress:
-        """The progress when `done` steps are done."""
+        """The progress after `done` steps."""
         elapsed = time.monotonic() - self._began
         per_s = (done - self._before) / elapsed if done > self._before and elapsed else None
         return Progress(
@@ -50,7 +49,7 @@ class Pace:
 
 
 class Tail:
-    """Follows the records in a folder of a run as they are appended, reading each byte once."""
+    """Follows the records of a run as they are appended, reading each byte once."""
 
     def __init__(self, stage: str, folder: Path, total: int) -> None:
         self._folder = folder
@@ -60,7 +59,7 @@ class Tail:
         self._pace = Pace(stage, total, len(self._labels))
 
     def poll(self) -> Progress:
-        """Where the stage is now."""
+        """The current progress of the stage."""
         self._read()
         return self._pace.at(len(self._labels), outcomes=Counter(self._labels.values()))
 
@@ -81,10 +80,10 @@ class Tail:
             name = label(data["status"], data["outcome"])
             if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._labels:
                 self._labels[data["experiment_id"]] = name
-        except (ValueError, KeyError):  # a head, or damage that read_records will tell
+        except (ValueError, KeyError):  # a head, or damage that read_records reports
             return
 
 
 def label(status: str, outcome: str | None) -> str:
-    """What Progress counts: the outcome of what ran, else the status."""
+    """What Progress counts: the outcome if there is one, else the status."""
     return str(outcome or status)

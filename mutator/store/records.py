@@ -1,4 +1,4 @@
-"""Records on disk: appended by workers, one file each, read back whatever a kill left behind."""
+"""Records on disk: appended by workers, one file each, and readable after any kill."""
 
 import json
 import re
@@ -14,11 +14,11 @@ from mutator.store.indexed_lines import IndexedLines, Line
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
 _NAMES = tuple(field.name for field in fields(Record))
-_RECORDS = ("activation", "error")  # of the fields, those that are records themselves
+_RECORDS = ("activation", "error")  # fields that are records themselves
 
 
 def line_of(record: Record) -> dict[str, Any]:
-    """A record as its line has it: `asdict` without a copy of every tuple."""
+    """A record as in its line: `asdict` without copying every tuple."""
     line = {name: getattr(record, name) for name in _NAMES}
     return line | {name: asdict(line[name]) for name in _RECORDS if line[name] is not None}
 
@@ -48,11 +48,11 @@ def record_from(data: Mapping[str, Any]) -> Record:
 
 
 def _pairs(items: list[list[Any]]) -> tuple[tuple[str, float], ...]:
-    return tuple([(name, value) for name, value in items])  # a list: faster than a generator
+    return tuple([(name, value) for name, value in items])  # a list is faster than a generator
 
 
 class Ending(NamedTuple):
-    """How an experiment ended: what is looked for in a record most often."""
+    """How an experiment ended: the most frequently read part of a record."""
 
     experiment_id: str
     status: str
@@ -65,15 +65,17 @@ class Ending(NamedTuple):
         return self.status != Status.HARNESS_ERROR.value
 
 
-# as canonical JSON has it; within a text the quotation marks would be escaped
+# in canonical JSON; within a text the quotation marks would be escaped
 _NAME, _OUTCOME = b'"experiment_id":"', b'"outcome":'
 _END = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
 _ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
 
 
 def ending_on(line: bytes) -> Ending:
-    """The ending that a record's line tells, a tenth of the time that the record takes. ValueError and others
-    as of `json.loads` and of missing keys, for a line that is none."""
+    """The ending on a record's line, ten times as fast as the whole record.
+
+    Raises ValueError and others, as `json.loads` and missing keys do.
+    """
     begin = line.find(_NAME) + len(_NAME)
     found = _END.match(line, line.find(_OUTCOME))
     if begin >= len(_NAME) and found and all(line.count(key) == 1 for key in _ONCE):
@@ -100,17 +102,17 @@ def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
 
 
 def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
-    """The final record of each experiment id that has one (torn last lines are skipped).
+    """The final record of each experiment that has one; torn last lines are skipped.
 
-    Any other record goes before a harness error. MutatorError for a damaged line and for a second record of
-    one experiment; CheckFailed when the two differ.
+    Any other record supersedes a harness error. MutatorError for a damaged line and for a second record of
+    one experiment; CheckFailed if the two differ.
     """
     paths = sorted((run / folder).glob("*.jsonl"))
     return IndexedLines(paths, SCHEMA, record_from, _replaces, checksums=checksums)
 
 
 def _replaces(line: Line, known: Line) -> bool:
-    """Whether a second record of an experiment is the one that counts."""
+    """Whether a second record of an experiment supersedes the first."""
     record, before = (record_from(one.content()) for one in (line, known))
     if record.status is Status.HARNESS_ERROR:
         return False
@@ -126,7 +128,7 @@ def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str,
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
-    """What is said of a second final record of an experiment."""
+    """The error about a second final record of an experiment."""
     if same:
         return MutatorError(
             f"a second record of experiment {experiment_id}",
@@ -140,5 +142,5 @@ def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> M
         where=path,
         line=line,
         expected="the same result each time",
-        remedy="this is a fault of the harness or of the machine; do not trust this run",
+        remedy="this is a defect of the harness or the machine; do not trust this run",
     )

@@ -1,4 +1,4 @@
-"""The run folder: where a campaign keeps all it was told and all it found out.
+"""The run folder: everything a campaign was given and everything it produced.
 
 DIR/
   digests.json          size and SHA-256 of every file that counts
@@ -6,20 +6,20 @@ DIR/
   campaign.yaml         the campaign file as it was read
   plan.csv              the plan for people and spreadsheets
   plan/experiments.jsonl, plan/faults.jsonl      the frozen plan
-  reviewed.json         who approved what is run, and digests of it (`run --require-reviewed`)
+  reviewed.json         approvals of what is run, with digests (`run --require-reviewed`)
   checks.json           the checks before the campaign, keyed by digest
   golden/<scenario>[+change]/                    fault-free runs: trace and record of the target
   patches/<session>-<worker>.blocks              source diff of each experiment that ran, appended
   records/<session>-<worker>.jsonl               one line per finished experiment, appended
   timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
-  proof/<session>-<worker>.jsonl                 records of the sample run again on the reference engine
+  proof/<session>-<worker>.jsonl                 records of the sample rerun on the reference engine
   series/index.js, series/*.js                   channels over time of each experiment, thinned and packed
-  series/<session>-<worker>.blocks               these as they are appended, until they are packed
+  series/<session>-<worker>.blocks               the same as appended, until packed
   traces/<experiment>/                           on request (`rerun --trace`)
   plots/                                         plots, stills and films of experiments (`show`)
-  results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be made again at any time
-  results.json          digests of these tables and of what they were made from
-  report/, exports/     derived, too (`report`, `compare`, `export`)
+  results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be recreated
+  results.json          digests of these tables and of their sources
+  report/, exports/     also derived (`report`, `compare`, `export`)
   damaged/              what a repair put aside (`verify --repair`)
   owner.lock, workers/                           held by the running command and by its workers
   work/                                          scratch of running experiments
@@ -44,11 +44,11 @@ from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: hazards and alerts after it were not seen."
-SERIES_MB = 500  # of a run, unless it was planned with another number
-_LOOKS = 3  # at a folder whose owner writes while it is looked at
+SERIES_MB = 500  # of a run, unless planned with another number
+_LOOKS = 3  # attempts to read a folder while its owner writes
 SCRATCH = "work"
 _TABLES = ("results", "propagation", "timings")
-CONTENT = (  # all that may be in a run folder; * stands for any text, folders included
+CONTENT = (  # all possible content of a run folder; * stands for any text, including folders
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *(
         "golden/*/*",
@@ -71,8 +71,9 @@ CONTENT = (  # all that may be in a run folder; * stands for any text, folders i
 
 
 class GoldenRun(NamedTuple):
-    """A fault-free run: its scenario with changes, and its seed where a run has several seeds (None: that of
-    the run)."""
+    """A fault-free run: its scenario with changes, and its seed if a run has several (None: the run's
+    seed).
+    """
 
     scenario: str
     changes: tuple[str, ...] = ()
@@ -80,7 +81,7 @@ class GoldenRun(NamedTuple):
 
     @classmethod
     def of(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
-        """What an experiment is compared with."""
+        """The golden run that an experiment is compared with."""
         return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
 
     @property
@@ -91,12 +92,12 @@ class GoldenRun(NamedTuple):
 
     @classmethod
     def from_plain(cls, told: Sequence[Any]) -> "GoldenRun":
-        """One that run.json has."""
+        """One from run.json."""
         scenario, changes, *seed = told
         return cls(scenario, tuple(changes), *seed)
 
     def plain(self) -> list[Any]:
-        """As run.json has it."""
+        """As in run.json."""
         return [self.scenario, list(self.changes), *([] if self.seed is None else [self.seed])]
 
 
@@ -108,10 +109,10 @@ class RunFolder:
 
     @classmethod
     def open(cls, path: Path) -> "RunFolder":
-        """An existing run folder whose content is what was written.
+        """Open and verify an existing run folder.
 
-        MutatorError when there is none, one of a newer schema, or anything in it is damaged, missing or not
-        of its plan.
+        MutatorError if there is none, it has a newer schema, or anything in it is damaged, missing or not in
+        its plan.
         """
         folder = cls.unverified(path)
         for problem in folder.problems():
@@ -120,17 +121,17 @@ class RunFolder:
 
     @classmethod
     def unverified(cls, path: Path) -> "RunFolder":
-        """As `open`, but only its head was looked at."""
+        """Like `open`, but checks only the head."""
         if not cls.exists(path):
             raise MutatorError(
-                "no run folder (it has no run.json)",
+                "not a run folder (it has no run.json)",
                 where=path,
                 expected="a folder that `mutator plan` or `mutator run` made",
                 remedy="check the path",
             )
         folder = cls(path.resolve())
         check_is_text(folder.path)
-        _ = folder.head  # read now, so that a wrong schema is told now
+        _ = folder.head  # read now, so that a wrong schema fails here
         return folder
 
     @staticmethod
@@ -139,8 +140,10 @@ class RunFolder:
         return (path / HEAD).is_file()
 
     def problems(self, *, anew: bool = False) -> list[MutatorError]:
-        """All that is not as it was written; a folder of an earlier schema cannot tell all. With `anew` it
-        does not matter what was verified before (`verified_runs`)."""
+        """All differences from what was written; folders of earlier schemas cannot detect all.
+
+        With `anew`, earlier verifications are ignored (`verified_runs`).
+        """
         if not self.verifiable:
             stray = (self.path / digests.FILE).exists()
             downgraded = MutatorError(
@@ -160,17 +163,16 @@ class RunFolder:
 
     @property
     def verifiable(self) -> bool:
-        """Whether it has digests and checksums: folders of earlier schemas have none."""
+        """Whether it has digests and checksums, unlike folders of earlier schemas."""
         return bool(self.head["schema"] != FIRST_SCHEMA)
 
     @property
     def finished(self) -> bool:
-        """Whether every experiment has a record that counts, and the proof is whole."""
+        """Whether every experiment has a record that counts, and the proof is complete."""
         return self.verifiable and digests.read(self.path).finished
 
     @cached_property
     def head(self) -> Head:
-        """run.json."""
         return read_head(self.path)
 
     @property
@@ -183,11 +185,11 @@ class RunFolder:
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
-        """What each session that drove anything ran with, oldest first."""
+        """What each session that ran anything used, oldest first."""
         return read_stretches(self.head)
 
     def stretch_of(self, experiment_id: str) -> Stretch | None:
-        """The newest stretch of work that has a record of an experiment."""
+        """The newest stretch of work with a record of an experiment."""
         files = self.path / "records"
         for stretch in reversed(self.stretches):
             for path in files.glob(f"{stretch.records}.jsonl"):
@@ -197,7 +199,7 @@ class RunFolder:
 
     @property
     def planned(self) -> int:
-        """Number of experiments planned for this folder: of its shard, or all."""
+        """The number of experiments planned for this folder: of its shard, or all."""
         shard = self.shard
         if shard is None:
             return int(self.head["experiments"])
@@ -205,52 +207,51 @@ class RunFolder:
 
     @property
     def shard(self) -> Shard | None:
-        """The share of the plan that is run here; None: all of it."""
-        text = self.head["choices"].get("shard")  # runs of before there were shards do not say
+        """The share of the plan that runs here; None: all of it."""
+        text = self.head["choices"].get("shard")  # missing in runs older than shards
         return Shard.parse(text) if text else None
 
     @property
     def limits(self) -> Limits:
-        """Limits of each run."""
         return Limits(**self.head["limits"])
 
     @property
     def scale(self) -> Scale | None:
-        """What makes classes of delta-v; None for a target without contacts, and in older runs."""
+        """The scale of delta-v classes; None for a target without contacts, and in older runs."""
         told = self.head.get("severity")
         return Scale.from_plain(told) if told else None
 
     @property
     def series_mb(self) -> int:
-        """How many MB of series are kept at most."""
-        chosen = self.head["choices"].get("series_mb")  # not there in earlier runs
+        """The budget of series in MB."""
+        chosen = self.head["choices"].get("series_mb")  # missing in earlier runs
         return SERIES_MB if chosen is None else int(chosen)
 
     @property
     def has_alerts(self) -> bool:
-        """Whether the target has alerts; of an old folder that is not known, and taken for granted."""
+        """Whether the target has alerts; True for an old folder, which does not say."""
         return bool(self.head.get("alerts", True))
 
     @property
     def stop_note(self) -> str:
-        """What to know of runs that end at their first terminal hazard; empty where they go on."""
+        """A note about runs that end at their first terminal hazard; empty if they go on."""
         stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
         return STOP_NOTE if stops else ""
 
     @property
     def seeds(self) -> range:
-        """The seed of all that is drawn, or several."""
+        """The seed of all draws, or several."""
         first, last = self.head.get("seeds", (self.head["seed"], self.head["seed"]))
         return range(first, last + 1)
 
     @cached_property
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that is needed."""
+        """Every fault-free run needed."""
         return tuple(map(GoldenRun.from_plain, self.head["goldens"]))
 
     @property
     def scenarios(self) -> set[str]:
-        """The scenarios that are driven."""
+        """The scenarios that are run."""
         return {one.scenario for one in self.goldens}
 
     def golden_of(self, experiment: Experiment) -> GoldenRun:
@@ -262,18 +263,18 @@ class RunFolder:
         return self.path / "golden" / GoldenRun(scenario, changes, seed).key
 
     def golden_folder(self, experiment: Experiment) -> Path:
-        """That of the run that an experiment is compared with."""
+        """The folder of an experiment's fault-free run."""
         return self.golden(*self.golden_of(experiment))
 
     @cached_property
     def patches(self) -> Patches:
-        """The source diffs of the experiments that were run."""
+        """The source diffs of the experiments that ran."""
         return Patches(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
-        """The stored diff of an experiment with that record; None where it has not run, or had no mutant.
+        """The stored diff of an experiment with that record; None if it has not run, or had no mutant.
 
-        MutatorError when it is missing, or not the one that the record names.
+        MutatorError if it is missing, or is not the one in the record.
         """
         if self.verifiable:
             if record is None or not record.patch:
@@ -283,16 +284,15 @@ class RunFolder:
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
-        """The records of the experiments, or those of the `proof`, by experiment id; each is parsed when it
-        is asked for."""
+        """The records of the experiments, or of the `proof`, by experiment id; parsed on access."""
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:
-        """A record of today as one of this folder has it: earlier schemas knew nothing of patches."""
+        """A current record as this folder would store it: earlier schemas have no patches."""
         return record if self.verifiable else replace(record, patch="")
 
     def timings(self) -> Mapping[str, dict[str, Any]]:
-        """What each experiment cost, where: its newest line, by experiment id; as `records`."""
+        """The cost of each experiment and where it ran: its newest line, by experiment id; like `records`."""
         return read_timings(self.path, checksums=self.verifiable)
 
     @property
@@ -301,21 +301,21 @@ class RunFolder:
         return plan_file.canary_from(self.path / HEAD, self.head["canary"])
 
     def share(self) -> dict[str, int]:
-        """Ids and places of the planned experiments that are run here, in the plan's order."""
+        """Ids and positions of the experiments that run here, in plan order."""
         return integrity.share(self.path, self.head, self.shard)
 
     @property
     def work(self) -> Path:
-        """Scratch; whatever is in it may be deleted while nobody owns the folder."""
+        """Scratch, which may be deleted while nobody owns the folder."""
         return self.path / SCRATCH
 
     @property
     def base(self) -> Path:
-        """The pristine tree that runs are made from."""
+        """The pristine tree from which runs are made."""
         return self.work / "base"
 
     def find(self, prefix: str) -> str:
-        """The one planned experiment whose id starts with `prefix`; MutatorError for none or several."""
+        """The only planned experiment whose id starts with `prefix`; MutatorError for none or several."""
         hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"

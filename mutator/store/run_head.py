@@ -1,4 +1,4 @@
-"""`run.json`, read and checked: a damaged one is told by its key, whichever version wrote it."""
+"""Read and check `run.json`; damage is reported by its key, whichever version wrote it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
@@ -11,12 +11,12 @@ from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
 
-SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first had neither digests nor checksums
+SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first one had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}
-# What keys hold: a type, or several; `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`;
-# `(x, y)` one of them.
+# What keys hold: a type; `[x]` a list of x; `{str: x}` names with x; `{"a": x}` an x under `a`; `(x, y)`
+# either.
 _STRETCH = {
     "python": str,
     "packages": _TEXTS,
@@ -29,7 +29,7 @@ _STRETCH = {
     "accepted": [str],
     "machines": [{"worker": str, "host": str, "python": str, "platform": str}],
 }
-_LATER = {"machines"}  # keys that older folders lack
+_LATER = {"machines"}  # missing in older folders
 _SHAPES: dict[str, Any] = {
     "plan": str,
     "campaign": str,
@@ -64,7 +64,7 @@ _SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)} 
 
 
 class Head(dict[str, Any]):
-    """The content of a run.json; MutatorError for a key that it should have and does not."""
+    """The content of a run.json; MutatorError for a missing key."""
 
     def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
         super().__init__(content)
@@ -75,7 +75,7 @@ class Head(dict[str, Any]):
 
 
 def read_head(run: Path) -> Head:
-    """The head of a run folder; MutatorError when it is damaged, or of a newer schema."""
+    """Read the head of a run folder; MutatorError if it is damaged or has a newer schema."""
     path = run / HEAD
     head = Head(path, read_json(path, SCHEMA))
     if wrong := next(_wrong(head), ""):
@@ -86,7 +86,7 @@ def read_head(run: Path) -> Head:
 
 
 def _wrong(head: Head) -> Iterator[str]:
-    """The keys with something that they cannot hold."""
+    """Yield keys with invalid values."""
     yield from (key for key, shape in _SHAPES.items() if key in head and not _fits(head[key], shape))
     known = {field.name for field in fields(Limits)}
     if not head.get("limits", {}).keys() <= known:

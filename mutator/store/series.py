@@ -1,4 +1,4 @@
-"""The series of a run folder, `series/1`: where each experiment's is, and reading one."""
+"""Find and read the series of a run folder, `series/1`."""
 
 import gzip
 import json
@@ -24,10 +24,13 @@ _LENGTH = struct.Struct("<I")
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """What `series/index.js` says. `chunks` are (name, number of entries), `sizes` the bytes of each entry
-    in their order; `goldens` and `entries` say which entry is that of a golden run, of an experiment;
-    `golden_of` which golden run an experiment is compared with. `left_out` experiments ended well
-    and have none, for the most part since they did not fit into `budget_mb`."""
+    """The content of `series/index.js`.
+
+    * `chunks`: (name, number of entries); `sizes`: the bytes of each entry, in order
+    * `goldens`, `entries`: the entry of each golden run and experiment
+    * `golden_of`: the golden run of each experiment
+    * `left_out`: how many experiments ended well but have no series, mostly because of `budget_mb`
+    """
 
     plan: str
     chunks: tuple[tuple[str, int], ...]
@@ -39,8 +42,7 @@ class Index:
     budget_mb: int
 
     def plain(self) -> dict[str, Any]:
-        """For JSON: ids as one text, in the order of their worth; the entry of each as the difference
-        from the one before."""
+        """As JSON types: ids joined in one text, by worth; entries as differences from the previous one."""
         names, numbers = list(self.goldens), [*self.entries.values()]
         return {
             "schema": SCHEMA,
@@ -57,7 +59,7 @@ class Index:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Index":
-        """As `plain` has it."""
+        """The inverse of `plain`."""
         text, names = data["ids"], list(data["goldens"])
         ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
         golden_of = (names[code] for code in data["golden_of"])
@@ -74,7 +76,7 @@ class Index:
 
     @cached_property
     def places(self) -> list[tuple[str, int]]:
-        """Of each entry its chunk, and where it begins there."""
+        """The chunk of each entry, and its start there."""
         found, number = [], 0
         for name, count in self.chunks:
             sizes = self.sizes[number : number + count]
@@ -93,43 +95,43 @@ class SeriesFolder:
 
     @cached_property
     def index(self) -> Index | None:
-        """Which series there are; None where none were packed. MutatorError for a damaged index."""
+        """The index of series; None if none were packed. MutatorError if damaged."""
         return read_index(self.path / f"{INDEX}.js") if self.is_packed else None
 
     @property
     def is_packed(self) -> bool:
-        """Whether there is an index."""
         return (self.path / f"{INDEX}.js").is_file()
 
     def has(self, experiment_id: str) -> bool:
-        """Whether an experiment's series is there; MutatorError for a damaged index."""
+        """Whether an experiment has a series; MutatorError for a damaged index."""
         if self.kept(experiment_id).is_file():
             return True
         return self.index is not None and experiment_id in self.index.entries
 
     def is_readable(self, experiment_id: str) -> bool:
-        """Whether an experiment's series is there and not damaged."""
+        """Whether an experiment has an undamaged series."""
         try:
             return self.read(experiment_id) is not None
         except MutatorError:
             return False
 
     def kept_ids(self) -> list[str]:
-        """The experiments whose series are in files of their own."""
+        """The experiments whose series are in separate files."""
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """(golden, faulty) of an experiment; None where its series is not there. MutatorError where it is
-        damaged, with the command that makes it anew."""
+        """(golden, faulty) of an experiment; None without a series. MutatorError for damage, with the
+        repairing command.
+        """
         try:
             return self._read(experiment_id)
         except MutatorError as err:
-            remedy = f"drive it again: {making_again(self.path.parent, experiment_id)}"
+            remedy = f"rerun it: {making_again(self.path.parent, experiment_id)}"
             where = err.where or self.path
             raise MutatorError(err.got, where=where, expected=err.expected, remedy=remedy) from None
 
     def _read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        if (path := self.kept(experiment_id)).exists():  # driven again, maybe since the others are damaged
+        if (path := self.kept(experiment_id)).exists():  # rerun, perhaps because the packed one is damaged
             return read_kept(path)
         index = self.index
         if index is None or experiment_id not in index.entries:
@@ -141,7 +143,7 @@ class SeriesFolder:
         return golden, decode(self.entry(index.entries[experiment_id]), golden)
 
     def entry(self, number: int) -> bytes:
-        """The bytes of an entry of the index; MutatorError where its chunk is damaged."""
+        """The bytes of an entry of the index; MutatorError if its chunk is damaged."""
         assert self.index is not None
         name, at = self.index.places[number]
         if self._chunk[0] != name:
@@ -149,20 +151,20 @@ class SeriesFolder:
         return self._chunk[1][at : at + self.index.sizes[number]]
 
     def chunk(self, name: str) -> bytes:
-        """The bytes of a chunk; MutatorError for one that is missing or damaged."""
+        """The bytes of a chunk; MutatorError if it is missing or damaged."""
         path = self.path / f"{name}.js"
         data = read_script(path)
         if name_of(data) != name:
-            raise MutatorError("damaged", where=path, expected="the content that its name stands for")
+            raise MutatorError("damaged", where=path, expected="content that matches its name")
         return data
 
     def kept(self, experiment_id: str) -> Path:
-        """Where the series of an experiment is that was driven again for it."""
+        """The file of a series made by a rerun."""
         return self.path / KEPT / f"{experiment_id}.js"
 
 
 def making_again(run: Path, experiment_id: str = "ID") -> str:
-    """The command that makes the series of an experiment anew."""
+    """The command that recreates the series of an experiment."""
     return f"`mutator rerun {experiment_id} --trace --run {run}`"
 
 
@@ -173,7 +175,7 @@ def putting_aside(run: Path) -> str:
 
 
 def read_index(path: Path) -> Index:
-    """An index; MutatorError for a damaged one."""
+    """Read an index; MutatorError if damaged."""
     remedy = putting_aside(path.parent.parent)
     try:
         data = json.loads(gzip.decompress(read_script(path)))
@@ -189,19 +191,19 @@ def read_index(path: Path) -> Index:
 
 
 def write_index(path: Path, index: Index) -> None:
-    """Write an index, the same bytes for the same one."""
+    """Write an index, with the same bytes for equal ones."""
     text = canonical(index.plain()).encode()
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
 
 
 def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
-    """Write the series of one experiment into a file of its own, with that of its golden run."""
+    """Write the series of one experiment and its golden run into a separate file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_script(path, b"".join((_LENGTH.pack(len(golden)), golden, faulty)))
 
 
 def read_kept(path: Path) -> tuple[Series, Series]:
-    """(golden, faulty) of such a file; MutatorError where it is damaged."""
+    """(golden, faulty) in such a file; MutatorError if damaged."""
     data = read_script(path)
     try:
         (length,) = _LENGTH.unpack_from(data)

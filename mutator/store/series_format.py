@@ -1,8 +1,8 @@
-"""The bytes of a run's series, `series/1`: channels on common times, in single precision, compressed.
+"""The bytes of a run's series, `series/1`: channels on common times, single precision, compressed.
 
-Of a run with a fault only the channels are kept that differ from its golden run, as how far they are from
-it: so many numbers of single precision lie between two values, and how that goes on from one time to the next
-is what is stored, byte by byte in planes, compressed. docs/reference/formats.md has the layout.
+A faulty run keeps only channels that differ from its golden run, as the number of single-precision values in
+between. The second differences over time are stored in byte planes and compressed; see
+docs/reference/formats.md.
 """
 
 import gzip
@@ -19,14 +19,14 @@ from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
 _LENGTH = struct.Struct("<I")
-_LEVEL = 4  # a hundredth larger than 6 makes it, in two thirds of the time
+_LEVEL = 4  # one percent larger than level 6, in two thirds of the time
 _BELOW_SIGN = np.int32(0x7FFFFFFF)
 _EMPTY: np.ndarray = np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Values at steps between the common times: the number of a channel, its time (s), both runs' values."""
+    """Values at steps between the common times: channel number, time (s), both runs' values."""
 
     channel: np.ndarray = field(default_factory=lambda: _EMPTY.astype(int))
     t: np.ndarray = field(default_factory=lambda: _EMPTY)
@@ -36,10 +36,10 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """A run on common times `t` (s): `rows` has the values of each channel, in single precision (NaN: none),
-    at each time, or at each second, third, ... of them, as `every` says.
+    """A run on common times `t` (s).
 
-    `about` is plain data that goes with it. `points` are those of a run with a fault between these times.
+    `rows` has the values of each channel in single precision (NaN: none), at every n-th time with n from
+    `every`. `about` is plain data. `points` are a faulty run's values between these times.
     """
 
     t: np.ndarray
@@ -54,8 +54,10 @@ class Series:
 
 
 def encode(one: Series, golden: Series | None = None) -> bytes:
-    """The bytes of a run with a fault, whose times are the first ones of `golden`, and then its own; those of
-    a golden run without `golden`. The same bytes each time."""
+    """Encode a run, always with the same bytes; without `golden`, a golden run.
+
+    The times of a faulty run begin with those of `golden`.
+    """
     known = 0
     if golden is not None and len(one.t):
         known = int(np.searchsorted(golden.t, one.t[-1], side="right"))
@@ -82,7 +84,7 @@ def encode(one: Series, golden: Series | None = None) -> bytes:
 
 
 def decode(data: bytes, golden: Series | None = None) -> Series:
-    """The run of these bytes, which were made with `golden`; MutatorError where they are damaged."""
+    """Decode a run that was encoded with `golden`; MutatorError if damaged."""
     try:
         return _decode(gzip.decompress(data), golden)
     except (ValueError, LookupError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:
@@ -100,7 +102,7 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
     t = times[:more].copy() if golden is None else np.concatenate((golden.t[:known], times[:more]))
     lengths = [len(t[::step]) for step in every]
     if len(words) != sum(lengths[channel] for channel in changed) + 2 * len(channels):
-        raise ValueError("another number of values")
+        raise ValueError("wrong number of values")
     rows = list(_references(golden, known, lengths))
     begin = 0
     for channel in changed:
@@ -113,7 +115,7 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
 
 
 def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> Iterator[np.ndarray]:
-    """Of each channel the values that others are compared with: none after the end of golden."""
+    """Yield the reference values of each channel: none after the end of golden."""
     for channel, length in enumerate(lengths):
         row = np.full(length, np.nan, dtype="<f4")
         if golden is not None:
@@ -123,7 +125,7 @@ def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> It
 
 
 def _ordered(values: np.ndarray) -> np.ndarray:
-    """Whole numbers in the order of the values: neighbours differ by 1."""
+    """Integers in the order of the values: neighbouring floats differ by 1."""
     words: np.ndarray = values.view("<i4")
     ordered: np.ndarray = words ^ ((words >> 31) & _BELOW_SIGN)
     return ordered
@@ -135,14 +137,15 @@ def _unordered(numbers: np.ndarray) -> np.ndarray:
 
 
 def _words(numbers: np.ndarray) -> np.ndarray:
-    """How the change from each number to the next changes (modulo 2^32), as words that are small for small
-    changes of either sign."""
+    """Second differences of the numbers (modulo 2^32), as words that are small for small values of either
+    sign.
+    """
     steps = np.diff(numbers, n=2, prepend=np.zeros(2, dtype="<i4"))
     return ((steps << 1) ^ (steps >> 31)).view("<u4")
 
 
 def _numbers(words: np.ndarray) -> np.ndarray:
-    """The numbers of which `_words` made words."""
+    """The inverse of `_words`."""
     steps = (words >> 1).view("<i4") ^ -(words & 1).view("<i4")
     numbers: np.ndarray = steps.cumsum(dtype="<i4").cumsum(dtype="<i4")
     return numbers

@@ -1,7 +1,7 @@
-"""Packing: from what workers appended to the chunks of a run's series, under a budget.
+"""Pack what workers appended into the chunks of a run's series, under a budget.
 
-The same experiments with the same worth give the same files, whoever ran them in whatever order: what is
-there is packed again with what came since. Kept is what comes first by worth, as far as the budget goes.
+The same experiments with the same worth result in the same files, whatever the workers and order: old and new
+content is packed together, the best by worth as far as the budget goes.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -15,15 +15,15 @@ from mutator.store.blocks import BlockWriter, read_blocks
 from mutator.store.series import FOLDER, INDEX, Index, SeriesFolder, write_index
 from mutator.store.series_script import name_of, size_in_script, write_script
 
-SUFFIX = ".blocks"  # of the files that workers append to, in series/
-GOLDEN, EXPERIMENT = 0, 1  # kinds of their blocks
-CHUNK_BYTES = 256_000  # of a chunk's content, but for its last entry: a page loads it in about 30 ms
+SUFFIX = ".blocks"  # of the workers' files in series/
+GOLDEN, EXPERIMENT = 0, 1  # kinds of blocks
+CHUNK_BYTES = 256_000  # of a chunk's content without its last entry: a page loads it in about 30 ms
 _MB = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedSeries:
-    """The bytes of an experiment's series, and those of the golden run `key` that it is made with."""
+    """The bytes of an experiment's series, and of the golden run `key` that it refers to."""
 
     key: str
     golden: bytes
@@ -31,11 +31,11 @@ class EncodedSeries:
 
 
 class SeriesWriter:
-    """Appends what a worker made, the series of each golden run once."""
+    """Appends a worker's series, with each golden run once."""
 
     def __init__(self, run: Path, worker: str) -> None:
         self._path = run / FOLDER / f"{worker}{SUFFIX}"
-        self._blocks: BlockWriter | None = None  # nothing was appended yet
+        self._blocks: BlockWriter | None = None  # nothing appended yet
         self._known: set[str] = set()
 
     def append(self, experiment_id: str, one: EncodedSeries) -> None:
@@ -43,13 +43,13 @@ class SeriesWriter:
         self._writer().append(*series_block(experiment_id, one))
 
     def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
-        """Append the series of a golden run, which `golden` makes, unless it is there."""
+        """Append the series of a golden run, made by `golden`, unless present."""
         if key not in self._known:
             self._writer().append(GOLDEN, key, golden())
             self._known.add(key)
 
     def extend(self, blocks: bytes) -> None:
-        """Append blocks of `series_block` that were made elsewhere; their golden runs were added."""
+        """Append blocks of `series_block` made elsewhere, whose golden runs were added."""
         self._writer().extend(blocks)
 
     def sync(self) -> None:
@@ -73,12 +73,12 @@ def series_block(experiment_id: str, one: EncodedSeries) -> tuple[int, str, byte
 
 
 Read = Callable[[], bytes]
-Worth = Mapping[str, Any]  # experiment -> what it is sorted by, best first
+Worth = Mapping[str, Any]  # experiment -> sort key, best first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
-    """Bytes that are somewhere: their digest, size in a script, and how to get them."""
+    """Bytes stored somewhere: their digest, size in a script, and how to read them."""
 
     digest: str
     size: int
@@ -87,7 +87,7 @@ class _Entry:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Everything that is to be packed: entries of golden runs, of experiments with the golden run of each."""
+    """Everything to pack: entries of golden runs, and of experiments with their golden runs."""
 
     goldens: dict[str, _Entry]
     experiments: dict[str, tuple[str, _Entry]]
@@ -98,15 +98,15 @@ class _Found:
 
 
 def segments(run: Path) -> list[Path]:
-    """The files that workers appended to and that are not packed yet."""
+    """Files of workers that are not packed yet."""
     return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
 
 
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
     """Pack the series of a run folder, and those of the run folders `others`.
 
-    `worth` has every experiment that ended well. What is damaged is left out. Killed at any time, it can be
-    done again.
+    `worth` has every experiment that ended well. Damaged series are left out. It can be repeated after a
+    kill.
     """
     appended = segments(run)
     if not appended and not others:
@@ -125,7 +125,7 @@ def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Pa
 
 
 def pack_again(run: Path, index: Index) -> None:
-    """Pack anew what `index` has, but for what is damaged or missing. What workers appended stays."""
+    """Repack the content of `index` without damaged and missing parts. Files of workers stay."""
     worth = {name: place for place, name in enumerate(index.entries)}
     found = _packed(SeriesFolder(run))
     ended = len(worth) + index.left_out
@@ -133,7 +133,7 @@ def pack_again(run: Path, index: Index) -> None:
 
 
 def _remove_others(run: Path, index: Index) -> None:
-    """Remove chunks that the index does not name any more."""
+    """Remove chunks that the index no longer names."""
     known = {name for name, _ in index.chunks} | {INDEX}
     for path in (run / FOLDER).glob("*.js"):
         if path.stem not in known:
@@ -141,7 +141,7 @@ def _remove_others(run: Path, index: Index) -> None:
 
 
 def _packed(folder: SeriesFolder) -> _Found:
-    """What was packed before; a damaged chunk is left out."""
+    """What was packed before, without damaged chunks."""
     found = _Found({}, {})
     try:
         index = folder.index
@@ -164,7 +164,7 @@ def _packed(folder: SeriesFolder) -> _Found:
 
 
 def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
-    """All that have an entry, by its number: runs that are the same bytes share one."""
+    """Keys by entry number: runs with the same bytes share one entry."""
     found: dict[int, list[str]] = {}
     for name, number in entries.items():
         found.setdefault(number, []).append(name)
@@ -172,7 +172,7 @@ def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
 
 
 def _appended(path: Path) -> _Found:
-    """What a worker appended; damaged blocks are left out."""
+    """What a worker appended, without damaged blocks."""
     found = _Found({}, {})
     for block in read_blocks(path).blocks:
         read = _reader(path, block.offset, len(block.data))
@@ -199,7 +199,7 @@ def _reader(path: Path, offset: int, length: int) -> Read:
 
 
 def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int, ended: int) -> Index:
-    """Write the chunks, then the index; so many experiments `ended` well."""
+    """Write the chunks, then the index; `ended` experiments ended well."""
     kept = _kept(found, worth, budget_mb * _MB)
     golden_of = {name: found.experiments[name][0] for name in kept}
     goldens = {name: found.goldens[name] for name in sorted({*golden_of.values()})}
@@ -222,8 +222,10 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
 
 
 def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
-    """The experiments whose series fit into so many bytes, with those of their golden runs: the first ones by
-    worth. One that does not fit in one session does not in any later one."""
+    """The experiments, best first, whose series fit into `budget` bytes together with their golden runs.
+
+    One that does not fit in one session does not fit in any later one.
+    """
     there = [name for name in found.experiments if name in worth]
     kept: list[str] = []
     counted: set[str] = set()
@@ -241,7 +243,7 @@ def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
 
 
 def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
-    """Entries by their digest, in the order of the first of each."""
+    """Entries by digest, in order of first appearance."""
     found: dict[str, _Entry] = {}
     for entry in entries:
         found.setdefault(entry.digest, entry)
@@ -249,7 +251,7 @@ def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
 
 
 def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list[int]]]:
-    """Write entries into chunks; name and sizes of each chunk."""
+    """Write entries into chunks; yields name and sizes of each chunk."""
     parts: list[bytes] = []
     for entry in entries:
         parts.append(entry.read())

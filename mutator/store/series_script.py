@@ -1,7 +1,7 @@
-"""Bytes in a script: a file that a page opened from a disk may load, and that is hardly larger than they are.
+"""Bytes in a script that a page opened from a disk can load, with little overhead.
 
-Such a page can neither fetch a file nor read it, but run it. So the file is a call with a string in it, one
-character a byte; the page loads it as `x-user-defined`, the encoding in which each byte is a character.
+Such a page cannot fetch or read a file, but it can run one. So the file is a call with a string argument, one
+character per byte, loaded as `x-user-defined`, the encoding in which each byte is a character.
 """
 
 import re
@@ -16,32 +16,32 @@ _PLAIN = {escaped: plain for plain, escaped in _ESCAPED.items()}
 _SPECIAL, _ESCAPE = re.compile(rb'[\\"\r\n]'), re.compile(rb'\\[\\"rn]')
 _CALL = re.compile(rb'SeriesFile\.loaded\("([0-9a-z]+)","')
 _END = b'");\n'
-NAME_LENGTH = 16  # hex digits of the SHA-256 of what is in a file that is named by its content
+NAME_LENGTH = 16  # hex digits of the SHA-256 in a file's name
 
 
 def name_of(data: bytes) -> str:
-    """The name of what is called by its content."""
+    """A name from the content."""
     return digest(data)[:NAME_LENGTH]
 
 
 def size_in_script(data: bytes) -> int:
-    """How many bytes of a script `data` takes."""
+    """The size of `data` in a script."""
     return len(data) + sum(map(data.count, _ESCAPED))
 
 
 def write_script(path: Path, data: bytes) -> None:
-    """Write a script that hands `data` to the page, under the name of its file."""
+    """Write a script that passes `data` to the page, under the file's name."""
     write_atomic(path, script_of(path.stem, data))
 
 
 def script_of(name: str, data: bytes) -> bytes:
-    """The script that hands `data` to the page under a name."""
+    """The script that passes `data` to the page under a name."""
     text = _SPECIAL.sub(lambda found: _ESCAPED[found[0]], data)
     return b"".join((f'SeriesFile.loaded("{name}","'.encode(), text, _END))
 
 
 def read_script(path: Path) -> bytes:
-    """What a script hands to the page; MutatorError for one that is missing or no such script."""
+    """The data in a script; MutatorError if it is missing or invalid."""
     try:
         text = no_pipe(path).read_bytes()
     except OSError as err:

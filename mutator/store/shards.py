@@ -1,4 +1,4 @@
-"""Shards: a plan's chunks dealt out to several machines, which need not know of each other."""
+"""Shards: a plan's chunks distributed to several independent machines."""
 
 import re
 from dataclasses import dataclass
@@ -8,14 +8,14 @@ from mutator.errors import MutatorError
 
 @dataclass(frozen=True, slots=True)
 class Shard:
-    """Share `number` (from 1) of `of`: every `of`-th chunk, so that each share has some of everything."""
+    """Share `number` (from 1) of `of`: every `of`-th chunk, so that each share is representative."""
 
     number: int
     of: int
 
     @classmethod
     def parse(cls, text: str) -> "Shard":
-        """`k/n`, as on the command line; MutatorError for anything else."""
+        """Parse `k/n` from the command line; MutatorError for anything else."""
         found = re.fullmatch(r"([1-9]\d{0,5})/([1-9]\d{0,5})", text)
         if not found or int(found[1]) > int(found[2]):
             raise MutatorError(
@@ -26,5 +26,5 @@ class Shard:
         return cls(int(found[1]), int(found[2]))
 
     def has(self, chunk: int) -> bool:
-        """Whether the chunk of this index (from 0) is of this share."""
+        """Whether the chunk of this index (from 0) belongs to this share."""
         return chunk % self.of == self.number - 1

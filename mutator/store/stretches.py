@@ -1,4 +1,4 @@
-"""Stretches of work: what each session that drove anything in a run folder ran with."""
+"""Stretches of work: the software and machine of each session of a run folder."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -12,20 +12,20 @@ from mutator.errors import MutatorError
 class Stretch:
     """What one session ran with.
 
-    `python` and `packages` stay the same while a run goes on, unless others are accepted; `accepted` says
-    which were. All else is recorded only: golden runs show whether machines compute alike. None: not known.
+    `python` and `packages` must stay the same during a run, unless other versions are accepted and listed in
+    `accepted`. The rest is only recorded: golden runs show whether machines compute alike. None: not known.
     """
 
     python: str  # CPython 3.11.7
-    packages: Mapping[str, str]  # version of what the harness requires and what the golden runs loaded
+    packages: Mapping[str, str]  # versions of the harness's requirements and of what the golden runs loaded
     platform: str  # operating system, kernel, kind of processor
     cpu: str | None = None  # the processor's model
     blas: Sequence[Mapping[str, Any]] = ()  # `library`, `version`, `kernel`, `threads` of what numpy loads
     threads: Mapping[str, str] = field(default_factory=dict)  # in the environment of the target's process
-    # `commit` and `changed` of the git clones that mutator, library, templates and target lie in
+    # `commit` and `changed` of the git clones of mutator, library, templates and target
     git: Mapping[str, Mapping[str, Any]] | None = None
-    records: str = "*"  # names of its files in records/, timings/ and proof/, without suffix, as a glob
-    accepted: Sequence[str] = ()  # how Python and packages differ from those of the stretch before
+    records: str = "*"  # glob of its files in records/, timings/ and proof/, without suffix
+    accepted: Sequence[str] = ()  # differences of Python and packages from the previous stretch
     # workers on other machines: `worker`, `host`, `mutator`, `python`, `platform`, `cpu`, `blas`, `packages`
     machines: Sequence[Mapping[str, Any]] = added(())
 
@@ -35,7 +35,7 @@ class Stretch:
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Those of a run.json, oldest first. An old one has one: what the run was planned with."""
+    """Those of a run.json, oldest first. An old one has one: that of its planning."""
     if "stretches" not in head:
         planned = head["provenance"]
         return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)

@@ -1,8 +1,8 @@
-"""Finished runs that this machine has verified: what it found is kept in the cache, to be found by bytes.
+"""Cache of finished runs that this machine has verified, keyed by their bytes.
 
-An entry's name is a digest of the SHA-256 of every file that counts, and of the version that looked at them.
-It vouches for no other byte, whoever changed it and whatever digests were computed anew: such a run is
-verified as if it had never been seen. An unwritable or damaged cache is ignored.
+An entry's name is a digest of the SHA-256 of every file that counts and of the verifying version. So a run
+with any changed byte is verified in full, even if its digests were recomputed. An unwritable or damaged cache
+is ignored.
 """
 
 import json
@@ -18,28 +18,28 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
 _SCHEMA = "verified/1"
-_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # that count, and that the ledger does not name
+_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # that count, but are not in the ledger
 Digests = Mapping[str, str | None]  # SHA-256 by name
 
 
 def other_files(run: Path) -> list[str]:
-    """The names of the files that count beside those of the ledger."""
+    """The names of the files that count but are not in the ledger."""
     paths = (path for pattern in _OTHER_FILES for path in run.glob(pattern))
     return sorted(path.relative_to(run).as_posix() for path in paths)
 
 
 def key_of(found: Digests) -> str:
-    """What stands for a run with these files."""
+    """The key of a run with these files."""
     return digest([_SCHEMA, VERSION, sorted(found.items())])
 
 
 def recall(key: str) -> dict[str, Any]:
-    """What is known of a run; nothing of one that was never seen."""
+    """What is known about a run; empty for an unknown one."""
     path = _path(key)
     try:
         data = json.loads(no_pipe(path).read_bytes())
         if data.pop("sum") == digest([key, data]):
-            os.utime(path)  # used now
+            os.utime(path)  # mark as used
             return dict(data)
     except (OSError, MutatorError, ValueError, KeyError, TypeError, AttributeError):
         pass
@@ -47,7 +47,7 @@ def recall(key: str) -> dict[str, Any]:
 
 
 def remember(key: str, **facts: Any) -> None:
-    """Add to what is known of a run."""
+    """Add to what is known about a run."""
     data = recall(key) | facts
     path = _path(key)
     try:

@@ -122,7 +122,7 @@ def test_damaged_series_are_told_put_aside_and_made_again(
     whole = SeriesFolder(Path("run")).read(name)
     assert whole is not None
     if what != "index" or become is flip:
-        with pytest.raises(MutatorError, match=f"drive it again: `mutator rerun {others[0]} --trace"):
+        with pytest.raises(MutatorError, match=f"rerun it: `mutator rerun {others[0]} --trace"):
             SeriesFolder(Path("run")).read(others[0])
     repaired = cli("verify", "run", "--repair")
     assert repaired.code == 1 and f"repaired: series/{became.name}" in repaired.out
@@ -201,7 +201,7 @@ def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeyp
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("verify", "nosuch"), "no run folder"),
+        (("verify", "nosuch"), "not a run folder"),
         (("verify", "run", "--expect", "36251d8d"), "--expect: '36251d8d'"),
         (("verify", "run", "--rerun", "-1"), "--rerun"),
     ],

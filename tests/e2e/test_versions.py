@@ -205,7 +205,7 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
     """Exit code 2 with the list; accepted, the merged run has the stretches of both, and says so."""
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
     code, _, err = cli(*words)
-    assert code == 2 and "part2: not driven as " in err and PYTHONS in err and "--accept-versions" in err
+    assert code == 2 and "part2: not run as " in err and PYTHONS in err and "--accept-versions" in err
     assert not (tmp_path / "out").exists()
     code, _, err = cli(*words, "--accept-versions")
     assert code == 0, err

@@ -96,7 +96,7 @@ class Pair:
         if end is End.REFUSED and name == "verify" and code == 1:
             return End.WRONG, "a run under way is taken for a damaged one"
         if end is End.REFUSED and name in ("run", "verify --repair") and not any(w in said for w in BUSY):
-            known = "no run folder" in said or "no results" in said
+            known = "not a run folder" in said or "no results" in said
             return (
                 (end, why) if known and name != "run" else (End.WRONG, f"{name}: refused for another reason")
             )

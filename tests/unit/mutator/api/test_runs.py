@@ -247,7 +247,7 @@ def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         run.experiment("zz")
-    with pytest.raises(MutatorError, match="no run folder"):
+    with pytest.raises(MutatorError, match="not a run folder"):
         mutator.load_run(tmp_path)
 
 

@@ -165,7 +165,7 @@ def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
     ("location", "said"),
     [
         ({"path": "../toycar/sensor.py"}, "leads out of the target"),
-        ({"path": "toycar/judge.py"}, "is forbidden to faults"),
+        ({"path": "toycar/judge.py"}, "faults are forbidden in"),
         ({"function": "Sensor.mesure"}, "did you mean 'Sensor.measure'?"),
         ({"anchor": Anchor(kind=AnchorKind.AFTER_ASSIGN, name="rate", nth=2)}, "matches 1 statements"),
         (

@@ -119,7 +119,7 @@ def test_the_report_is_the_same_each_time(run: Path) -> None:
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
     """A folder that is no run folder is the user's error."""
-    with pytest.raises(MutatorError, match="no run folder"):
+    with pytest.raises(MutatorError, match="not a run folder"):
         building.write(tmp_path, None)
 
 

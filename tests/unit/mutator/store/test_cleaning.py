@@ -95,7 +95,7 @@ def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
 def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
     """What is no run folder at all is told as such, and nothing is written into it."""
     (tmp_path / "thesis.tex").touch()
-    with pytest.raises(MutatorError, match="no run folder"):
+    with pytest.raises(MutatorError, match="not a run folder"):
         clean(tmp_path)
     assert contents(tmp_path) == {tmp_path / "thesis.tex"}
 

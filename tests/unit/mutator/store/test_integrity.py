@@ -89,7 +89,7 @@ def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
         path.write_bytes(content)
         assert problem(run).where == str(path)
     path.unlink()
-    assert "no run folder" in str(problem(run)) if name == "run.json" else problem(run).where == str(path)
+    assert "not a run folder" in str(problem(run)) if name == "run.json" else problem(run).where == str(path)
 
 
 @pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
@@ -194,7 +194,7 @@ def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
     reseal(run)
-    assert f"{path}:24: experiment {json.loads(lines[0])['id']} a second time" in str(problem(run))
+    assert f"{path}:24: duplicate experiment {json.loads(lines[0])['id']}" in str(problem(run))
     path.write_text("".join(lines[:-1]))
     reseal(run)
     assert f"{path}: 23 experiments; expected 24" in str(problem(run))

@@ -65,7 +65,7 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 
 def test_no_run_folder(tmp_path: Path) -> None:
     """A folder without run.json is told as such."""
-    with pytest.raises(MutatorError, match="no run folder"):
+    with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 
 

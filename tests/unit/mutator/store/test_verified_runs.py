@@ -82,7 +82,7 @@ def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path)
     try:
         name = next(iter(kept))
         rewrite_patches(path, [*(kept | {name: kept[name] + b"\n"}).items()])
-        with pytest.raises(MutatorError, match=f"another patch of {name}"):
+        with pytest.raises(MutatorError, match=f"not the patch of {name} that was run"):
             RunFolder.open(run)
     finally:
         path.write_bytes(before)

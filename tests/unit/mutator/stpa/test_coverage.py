@@ -57,7 +57,7 @@ def test_neighbouring_numbers_leave_no_cell_between() -> None:
 def test_beyond_a_proof(condition: str) -> None:
     """A comparison of another kind is said to be beyond it; nothing is claimed then."""
     found = prove(condition, f"not {condition}")
-    assert found.beyond is not None and "no comparison of one variable with a constant" in found.beyond
+    assert found.beyond is not None and "not a comparison of one variable with a constant" in found.beyond
     assert found.place is None
 
 

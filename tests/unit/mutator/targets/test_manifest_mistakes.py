@@ -97,7 +97,7 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
         ("  gap: {unit: m, role", "  rate: {unit: m, role", "'rate'", "from: rate"),
         ("  LATE: {}", "  LATE: {for_s: 1}", "judged by the record", "when"),
         ("is: cart.gap", "is: 'abs(1, 2)'", "abs(1, 2)", "attributes"),
-        ("when: gap <= 0", "when: seen <= 0", "observed and not recorded", "role: truth"),
+        ("when: gap <= 0", "when: seen <= 0", "observed but not recorded", "role: truth"),
         ("  least:", "  t_hit least:", "'t_hit least'", "letters"),
         ("follow: cart", "follow: car", "'car'", "cart"),
         ('{y: "0"}', "{points_m: [[1, 2], [3]]}", "[3.0]", "[x, y]"),
