@@ -39,7 +39,7 @@ def _names(path: str, data: bytes, root: Path) -> list[str]:
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {message}", where=root / path, line=line, remedy="correct the target"
+            f"not valid Python: {message}", where=root / path, line=line, remedy="mend the target"
         ) from None
 
 

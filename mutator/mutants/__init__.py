@@ -1,4 +1,4 @@
-"""From a fault to changed source: anchors, splicing, rendering, patches, and the contract with the probe.
+"""From a fault to changed source: anchors, splicing, rendering, patches, and the probe's contract.
 
-Nothing here runs a mutant or knows a campaign.
+This package does not run mutants and knows no campaigns.
 """

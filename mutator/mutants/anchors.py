@@ -1,8 +1,8 @@
-"""Anchors: from a qualified function name and a statement to lines of a source file.
+"""Anchors: resolve a qualified function name and a statement to lines of a source file.
 
-LibCST parses each file once. Kept are, for each function, the statements that assign, call or return, with
-the lines they span. A location resolves to exactly one of them, or to an error that lists the candidates; and
-only to one that `ast` sees in the same place.
+LibCST parses each file once. For each function, the statements that assign, call or return are kept with
+their lines. A location resolves to exactly one that `ast` sees in the same place, or to an error that lists
+candidates.
 """
 
 from collections.abc import Hashable, Mapping
@@ -28,8 +28,8 @@ from mutator.targets.source_tree import SourceTree
 class Site:
     """A resolved anchor: the anchored statement is lines `first` to `last` (exclusive, from 0).
 
-    For `entry` it is empty: `first == last`. `reindent` is the number of its lines that a guard may indent:
-    all, or only the first when a string spans lines. `names` are the names that the function uses.
+    For `entry` it is empty: `first == last`. `reindent` is how many of its lines a guard may indent: all, or
+    only the first if a string spans lines. `names` are the names that the function uses.
     """
 
     first: int
@@ -53,12 +53,12 @@ class ParsedFile:
     indent_unit: bytes
     import_line: int
     functions: Mapping[str, tuple[Function, ...]]
-    places: frozenset[Place]  # as `ast` sees them
+    places: frozenset[Place]  # according to `ast`
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
     fixed: tuple[FixedValue, ...]
-    outer: tuple[range, ...]  # the lines of each function that is in no other one
+    outer: tuple[range, ...]  # the lines of each outermost function
     where: Path
-    sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be
+    sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be sound
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve_value(self, location: FaultLocation) -> Expression:
@@ -74,7 +74,7 @@ class ParsedFile:
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """The lines that what the location names is on: the first (from 0), and the one after the last."""
+        """The lines of what the location names: the first (from 0), and the one after the last."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
@@ -85,11 +85,11 @@ class ParsedFile:
         return site.first, site.last
 
     def outer_function(self, line: int) -> range | None:
-        """The lines of the outermost function that this line (from 0) is in."""
+        """The lines of the outermost function that contains this line (from 0)."""
         return next((lines for lines in self.outer if line in lines), None)
 
     def names(self, location: FaultLocation) -> frozenset[str]:
-        """The names that the function uses in which the location's statement or value is."""
+        """The names used in the function that contains the location."""
         if location.anchor.kind not in VALUE_ANCHORS:
             return self.resolve(location).names
         line = self.resolve_value(location).start[0]
@@ -105,13 +105,13 @@ class ParsedFile:
 
 
 def parsed(tree: SourceTree, path: str) -> ParsedFile:
-    """The file at `path`, parsed once; MutatorError when it is not a Python file of the target."""
+    """The file at `path`, parsed once; MutatorError if it is not a Python file of the target."""
     return tree.derived(path, parse_file)
 
 
 @held()
 def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
-    """Parse one file of the target; MutatorError when it is not Python, or has injected lines already."""
+    """Parse a file of the target; MutatorError if it is not Python, or already has injected lines."""
     where = root / path
     refuse_unfit(data, where)
     tree = python_tree(data, where)
@@ -135,12 +135,12 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
 
 
 def plain_name(function: str) -> str:
-    """The qualified name of a function as files have it: without `<locals>`."""
+    """The qualified name of a function as written in files: without `<locals>`."""
     return as_compiled(function.replace(".<locals>", ""))
 
 
 def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
-    """The functions of that qualified name; MutatorError with those that there are, if there is none."""
+    """The functions with that qualified name; MutatorError that lists the known ones if there is none."""
     name = plain_name(function)
     functions = file.functions.get(name)
     if not functions:
@@ -182,7 +182,7 @@ def _inside(file: ParsedFile, first: int, names: frozenset[str]) -> Site:
 
 
 def _check_place(file: ParsedFile, place: Place | None) -> None:
-    """MutatorError unless `ast` sees the anchored statement, or the function, in the same place."""
+    """Raise MutatorError unless `ast` sees the anchored statement, or the function, in the same place."""
     if place is not None and place.in_bytes(file.lines, file.encoding) not in file.places:
         raise MutatorError(
             "LibCST and Python's own parser see this statement in different places",
@@ -237,7 +237,7 @@ def _choose(
     verb = anchor.kind.partition("_")[2]
     name = as_written(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
-    # heads of blocks count last: a number that chose a statement before heads were anchors still does
+    # heads of blocks count last, so that older numbers still select the same statements
     hits = sorted(
         (pair for pair in pairs if pair[1].reason is None), key=lambda pair: pair[1].opens is not None
     )
@@ -255,7 +255,9 @@ def _no_single_hit(
     pairs: list[tuple[Function, Statement]],
     hits: list[tuple[Function, Statement]],
 ) -> MutatorError:
-    """Why the anchor is ambiguous or missing: `pairs` have its name, `hits` of them are statements."""
+    """The error about an ambiguous or missing anchor: `pairs` have its name, `hits` of them are
+    statements.
+    """
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
     what, place = _what(verb, anchor.name), f"in {location.function}"

@@ -1,4 +1,4 @@
-"""From a fault and a trigger to changed files: built, compiled, diffed, identified."""
+"""Build mutants: from a fault and a trigger to changed files, compiled, diffed and identified."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,26 +48,26 @@ class InvalidMutant(MutatorError):
 class Mutant:
     """A mutated tree as its difference from the target. Same fault, trigger, target and templates: same id.
 
-    `files` maps paths relative to the root to the whole new content, changed files and the probe alike.
+    `files` maps paths relative to the root to the full new content, including the probe.
     """
 
     id: str
     files: dict[str, bytes]
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
-    injections: tuple[str, ...]  # the ids in the tags and in the probe's report, in the fault's order
+    injections: tuple[str, ...]  # the ids in tags and in the probe's report, in the fault's order
 
     @cached_property
     def patch_bytes(self) -> bytes:
-        """The patch as it must be written to a file (sources need not be UTF-8)."""
+        """The patch as bytes, since sources need not be UTF-8."""
         return self.patch.encode("utf-8", "surrogateescape")
 
 
 def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
-    """The mutant of `manifest`'s tree with `fault` under `trigger`; no fault: the null mutant (probe only).
+    """Build the mutant of `manifest`'s tree with `fault` under `trigger`; without a fault, the null mutant.
 
-    `fault.hold` overrides `trigger.hold`. MutatorError when an anchor is not found or ambiguous (candidates
-    are listed), InvalidMutant when the result does not compile.
+    The null mutant has only the probe. `fault.hold` overrides `trigger.hold`. MutatorError if an anchor is
+    missing or ambiguous (candidates are listed), InvalidMutant if the result does not compile.
     """
     return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
@@ -75,7 +75,7 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
 def build_directly(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
-    """The same mutant with each file spliced, compared and compiled anew: `build` must give its bytes."""
+    """Like `build`, but splices, compares and compiles every file; `build` must return the same bytes."""
     return _build(manifest, models, fault, trigger, _Splicer())
 
 
@@ -109,7 +109,7 @@ def _build(
 def _edits(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
 ) -> dict[str, list[Edit]]:
-    """The edits of each file: the observation's first, then those of the injections in their order."""
+    """The edits of each file: the observation's first, then the injections' in order."""
     edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
     for name, injection in zip(ids, injections, strict=True):
         check_location(manifest, injection.location)
@@ -148,7 +148,7 @@ def _probe(
 
 
 def _compile(data: bytes, where: Path) -> None:
-    """InvalidMutant unless `data` compiles."""
+    """Raise InvalidMutant unless `data` compiles."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:
@@ -165,11 +165,11 @@ class _Splicer:
     """Makes every file by splicing, and compiles it; `ids` are those in the injected lines."""
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
-        """InvalidMutant unless the probe compiles."""
+        """Raise InvalidMutant unless the probe compiles."""
         _compile(text.encode(), where)
 
     def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
-        """The file with the edits made; InvalidMutant unless it compiles and un-splices to the original."""
+        """The edited file; InvalidMutant unless it compiles and un-splices to the original."""
         change = self.spliced(file, edits)
         _compile(change.data, file.where)
         return change
@@ -188,7 +188,7 @@ class _Splicer:
 
 
 class _ReusingSplicer(_Splicer):
-    """Makes a file from a reusable change, if there is one; splices it and keeps one if not."""
+    """Makes a file from a reusable change if there is one, else splices it and keeps one."""
 
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
@@ -202,7 +202,7 @@ class _ReusingSplicer(_Splicer):
         key = reuse_key(file, edits, ids)
         if key in known:
             found = known[key]
-            if isinstance(found, Change):  # most changes of an expression are made once
+            if isinstance(found, Change):  # most changes of an expression occur once
                 found = known[key] = ReusableChange.of(found)
             return found.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):

@@ -1,4 +1,6 @@
-"""Whether a changed file compiles, told from its changed functions: most of a file is as it was."""
+"""Decide whether a changed file compiles from its changed functions alone, since most of a file is
+unchanged.
+"""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -11,11 +13,10 @@ from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
 
 
 def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
-    """Whether the file certainly compiles with these edits, and with all others of their key: the functions
-    that they change do, as they are and with normalized lines, and so does the file with the import of the
-    probe.
+    """Whether the file certainly compiles with these edits, and with all others of their key.
 
-    False says nothing: an edit may lie outside of functions.
+    It does if the changed functions compile, as they are and normalized, and so does the file with the import
+    of the probe. False is inconclusive: an edit may lie outside functions.
     """
     as_they_are = in_order(edits)
     normalized = [
@@ -30,7 +31,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     outside: list[Edit] = []
     for edit in edits:
         function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
-        if function is None or edit.rank is Rank.AFTER_WHOLE:  # the latter stands between functions
+        if function is None or edit.rank is Rank.AFTER_WHOLE:  # the latter is between functions
             outside.append(edit)
         else:
             functions[function].append(edit)
@@ -40,8 +41,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
 
 
 def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
-    """Whether the file compiles with edits outside of functions: with that of the probe's import, asked
-    once."""
+    """Whether the file compiles with edits outside functions, i.e. the probe's import; checked once."""
     if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
         return False
     if outside not in file.sound:

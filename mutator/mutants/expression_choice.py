@@ -1,4 +1,4 @@
-"""From the words of an anchor to the one expression that they name."""
+"""Resolve an anchor to the one expression that it names."""
 
 import ast
 from collections.abc import Sequence
@@ -9,11 +9,11 @@ from mutator.errors import MutatorError
 from mutator.model import Anchor, AnchorKind, FaultLocation
 from mutator.mutants.expressions import Expression
 
-_MOST = 12  # candidates that an error lists
+_MOST = 12  # candidates listed in an error
 
 
 def as_written(name: str) -> str:
-    """The text by which anchors know an expression; a text that is none stays as it is."""
+    """The text by which anchors know an expression; invalid text is returned unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -24,7 +24,10 @@ def choose_expression(
     known: Sequence[Expression], location: FaultLocation, where: Path, line: int
 ) -> Expression:
     """The one of a function's expressions that the location's anchor names; the function begins at `line`
-    (from 0). MutatorError that lists what it may have meant unless there is exactly one."""
+    (from 0).
+
+    MutatorError that lists candidates unless there is exactly one.
+    """
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)
     hits = [one for one in known if one.answers(kind, name, anchor.which)]
@@ -56,7 +59,7 @@ def _which(anchor: Anchor) -> str:
 
 
 def _candidates(known: Sequence[Expression], kind: AnchorKind, name: str) -> str:
-    """The anchors of this kind, those of the name first if there are any; the most similar of many."""
+    """The anchors of this kind, those of the name if there are any, else the most similar."""
     roles = [(called, place, one) for one in known for own, called, place in one.roles if own is kind]
     roles = [role for role in roles if role[0] == name] or roles
     if len(roles) > _MOST:

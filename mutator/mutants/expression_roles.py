@@ -1,4 +1,4 @@
-"""Which expressions a function consists of, and what each is there for, by Python's own parser."""
+"""List the expressions of a function and the role of each, using Python's parser."""
 
 import ast
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,8 +13,10 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 def source_of(node: ast.AST) -> str:
-    """Its source; empty where `ast` cannot write it: an int of thousands of digits, an f-string that would
-    need a backslash inside braces."""
+    """The source of a node, or empty if `ast` cannot write it.
+
+    Examples are an int of thousands of digits, and an f-string that would need a backslash inside braces.
+    """
     try:
         return ast.unparse(node)
     except ValueError:
@@ -22,7 +24,7 @@ def source_of(node: ast.AST) -> str:
 
 
 def expressions_in(tree: ast.Module) -> Iterator[Found]:
-    """Each expression in a function's body, with the function's qualified name and what it is there."""
+    """Yield each expression in a function's body, with the function's qualified name and its roles."""
     yield from _of_scope(tree.body, (), inside=False)
 
 
@@ -40,7 +42,7 @@ def _of_scope(body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool)
 
 
 def blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
-    """The blocks of a statement: its body, what it does otherwise, its cases."""
+    """The blocks of a statement: its body, alternatives, cases."""
     for name in _BLOCKS:
         yield getattr(statement, name, [])
     for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
@@ -51,7 +53,7 @@ _Pairs = Iterator[tuple[ast.expr, tuple[Role, ...]]]
 
 
 def _of_statement(statement: ast.stmt) -> _Pairs:
-    """The expressions of one statement, without those of the statements in it."""
+    """The expressions of one statement, without those of nested statements."""
     match statement:
         case ast.Assign(targets=targets, value=value):
             yield from _assigned(targets, value)
@@ -92,7 +94,7 @@ def _condition(test: ast.expr) -> _Pairs:
 
 
 def _in_target(target: ast.expr) -> _Pairs:
-    """What is calculated to find what is assigned to, or the item or attribute of something: an index."""
+    """The expressions evaluated to find an assignment's target, such as an index."""
     match target:
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
@@ -107,7 +109,7 @@ def _in_target(target: ast.expr) -> _Pairs:
 
 
 def _base(node: ast.expr) -> _Pairs:
-    """What an attribute, an item or a method is taken of: names alone are objects, and no values."""
+    """The object of an attribute, item or method; plain names do not count as values."""
     if isinstance(node, ast.Attribute):
         yield from _base(node.value)
     elif not isinstance(node, ast.Name):
@@ -117,7 +119,7 @@ def _base(node: ast.expr) -> _Pairs:
 def _of(node: ast.expr, *roles: Role) -> _Pairs:
     """An expression, and those in it."""
     if isinstance(node, ast.JoinedStr):
-        yield node, roles  # what is in it has places of its own only from Python 3.12 on
+        yield node, roles  # nested ones have positions only from Python 3.12 on
         return
     if isinstance(node, ast.Call):
         roles = (*roles, (AnchorKind.RESULT, source_of(node.func), None))

@@ -1,8 +1,7 @@
-"""Expressions whose value can be changed where they stand: what a function returns, asks, passes on.
+"""Expressions whose value can be changed in place, such as returned values, conditions and arguments.
 
-Python's own parser finds them, and what each is for; one counts only if LibCST sees an expression in the
-same place. None begins or ends on a line that cannot carry a tag: one that ends inside a string, or in a
-backslash.
+Python's parser finds them and their roles; an expression counts only if LibCST sees one in the same place.
+None begins or ends on a line that cannot carry a tag, because it ends inside a string or in a backslash.
 """
 
 import ast
@@ -27,8 +26,8 @@ _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | as
 class Expression:
     """An expression of a function, from `start` to before `end`.
 
-    `roles` are the anchors that it answers to: kind, name, which argument; the last is VALUE, with its text.
-    `written` is its source on one line, in parentheses if an operator beside it could tear it apart.
+    `roles` are the anchors that match it: kind, name, which argument; the last is VALUE, with its text.
+    `written` is its source on one line, in parentheses if an adjacent operator could split it.
     """
 
     function: str
@@ -36,16 +35,16 @@ class Expression:
     end: _Point
     roles: tuple[Role, ...]
     written: str
-    bare: bool  # a tuple without parentheses, or what sets a name: its parentheses are not part of it
+    bare: bool  # a tuple without parentheses, or a binding: its parentheses are not part of it
     node: ast.expr
 
     @property
     def text(self) -> str:
-        """What an anchor calls it, however it is spaced and quoted in the source."""
+        """Its name in anchors, independent of spacing and quotes."""
         return self.roles[-1][1]
 
     def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
-        """Whether an anchor of this kind names it: an empty name or no `which` stands for any."""
+        """Whether an anchor of this kind names it: an empty name or no `which` matches any."""
         return any(
             kind is own and name in (called, "") and which in (place, None)
             for own, called, place in self.roles
@@ -53,7 +52,6 @@ class Expression:
 
 
 def _grouped(found: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
-    """Expressions by their function."""
     functions: dict[str, list[Expression]] = defaultdict(list)
     for one in found:
         functions[one.function].append(one)
@@ -63,7 +61,7 @@ def _grouped(found: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
 def expressions_of(
     data: bytes, module: cst.Module, positions: Positions
 ) -> dict[str, tuple[Expression, ...]]:
-    """The expressions of each function of a file whose value can be changed, in the order of the source."""
+    """The changeable expressions of each function of a file, in source order."""
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
     tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
@@ -113,8 +111,7 @@ def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
 
 
 def _known_by(node: ast.expr) -> Iterator[ast.expr]:
-    """The nodes by whose places LibCST must know it: a tuple, to which LibCST counts no parentheses, by its
-    elements."""
+    """The nodes by which LibCST must know it: for a tuple, whose parentheses LibCST ignores, its elements."""
     if isinstance(node, ast.Tuple):
         for element in node.elts:
             yield from _known_by(element)
@@ -131,7 +128,7 @@ def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
 
 
 def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
-    """Where each bracket that opens stands, and the end of the one that closes it: lines from 0."""
+    """Where each bracket opens, and the end of the one that closes it: lines from 0."""
     found, begun = {}, list[_Point]()
     for token in tokens:
         if token.type == tokenize.OP and token.string in "([{":
@@ -144,7 +141,7 @@ def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
 def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
     """The lines (from 0) that cannot end in a comment."""
     found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
-    begun: list[int] = []  # lines in which f-strings began that have not ended
+    begun: list[int] = []  # lines where unfinished f-strings began
     for token in tokens:
         kind = tokenize.tok_name[token.type]
         if kind == "FSTRING_START":
@@ -159,8 +156,10 @@ NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arg
 
 
 def parts_of(expression: Expression) -> dict[str, object]:
-    """What templates may use beside the whole: the two sides of an operator (`left`, `right`), what a call
-    calls (`called`) and its arguments (`arguments`); None, or empty, where there is no such thing."""
+    """What templates may use in addition to the whole expression; None or empty where it does not apply.
+
+    The sides of an operator (`left`, `right`), a call's function (`called`) and its `arguments`.
+    """
     node, left, right = expression.node, None, None
     if isinstance(node, ast.BinOp):
         left, right = node.left, node.right
@@ -178,7 +177,7 @@ def parts_of(expression: Expression) -> dict[str, object]:
 
 
 def enclosed(text: str) -> str:
-    """The source of an expression, in parentheses if an operator beside it could tear it apart."""
+    """The source of an expression, in parentheses if an adjacent operator could split it."""
     return text if isinstance(ast.parse(text, mode="eval").body, _ATOMS) else f"({text})"
 
 

@@ -1,7 +1,7 @@
 """Fixed values: constants of modules and classes, and defaults of parameters.
 
-The program calculates them once, when it is loaded, and no fault is active then. So the probe sets them while
-the fault is active, and puts them back afterwards. A tagged line beside them tells it where to find them.
+The program computes them once, on loading, when no fault is active. So the probe sets them while the fault is
+active, and restores them afterwards. A tagged line next to them tells it where they are.
 """
 
 import ast
@@ -18,9 +18,9 @@ from mutator.model import AnchorKind, FaultLocation
 from mutator.mutants.expression_roles import blocks
 from mutator.mutants.scopes import as_compiled, set_by_functions
 
-_MADE_OTHERWISE = ("Enum", "Flag", "NamedTuple", "TypedDict")  # ends of the names of bases
+_MADE_OTHERWISE = ("Enum", "Flag", "NamedTuple", "TypedDict")  # endings of base class names
 _Function = ast.FunctionDef | ast.AsyncFunctionDef
-_Scope = tuple[ast.ClassDef, ...]  # the classes around, from the outermost
+_Scope = tuple[ast.ClassDef, ...]  # enclosing classes, from the outermost
 _Owner = ast.stmt | None
 
 
@@ -28,8 +28,8 @@ _Owner = ast.stmt | None
 class FixedValue:
     """A constant or a default: `name` is `LIMIT` or `Class.LIMIT`, or the parameter of `function`.
 
-    It stands on the lines `first` to `last` (exclusive, from 0). Its tagged line goes before line `index`,
-    with the indentation `indent`. `path` leads from the module to the constant, or over the function to the
+    It is on the lines `first` to `last` (exclusive, from 0). Its tagged line goes before line `index`, with
+    the indentation `indent`. `path` leads from the module to the constant, or via the function to the
     parameter, as the compiler names them. A `reason` says why it cannot be set.
     """
 
@@ -45,8 +45,9 @@ class FixedValue:
 
 
 def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
-    """All of a file, in the order of the source; of a constant that is assigned several times, the last one
-    stands for all."""
+    """All of a file, in source order; the last assignment represents a constant that is assigned several
+    times.
+    """
     found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
     for one, owner in _Finder(data).of_body(tree.body, ()):
         key = (one.kind, one.function, one.name)
@@ -65,7 +66,7 @@ def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
 
 
 def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
-    """The parameters of a function that have a default, and it."""
+    """The parameters of a function that have a default, with it."""
     places = [*arguments.posonlyargs, *arguments.args]
     with_default = places[len(places) - len(arguments.defaults) :]
     for argument, value in zip(with_default, arguments.defaults, strict=True):
@@ -76,8 +77,7 @@ def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
 
 
 class _Finder:
-    """Walks the bodies of a module and its classes. Each value comes with the class or function that has
-    it."""
+    """Walks the bodies of a module and its classes, and yields each value with its class or function."""
 
     def __init__(self, data: bytes) -> None:
         self.lines = data.splitlines(keepends=True)
@@ -87,7 +87,7 @@ class _Finder:
     def of_body(
         self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
     ) -> Iterator[tuple[FixedValue, _Owner]]:
-        """Those of statements of a module or class; `around` is the statement of its body that has them."""
+        """The values in statements of a module or class; `around` is the containing statement of its body."""
         for statement in body:
             whole = around or statement
             match statement:
@@ -168,7 +168,7 @@ def _of(scope: _Scope) -> Iterator[str]:
 
 
 def _path(scope: _Scope, *names: str) -> str:
-    """The names from the module on, private ones of a class as the compiler has them."""
+    """The names from the module on; private names of a class as the compiler writes them."""
     path, private = list[str](), ""
     for name in (*_of(scope), *names):
         hidden = private and name.startswith("__") and not name.endswith("__")
@@ -179,7 +179,7 @@ def _path(scope: _Scope, *names: str) -> str:
 
 
 def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
-    """Why what is assigned in a class is no constant of it."""
+    """Why an assignment in a class is not a constant."""
     for base in owner.bases:
         name = ast.unparse(base)
         if name.endswith(_MADE_OTHERWISE):
@@ -192,8 +192,10 @@ def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
 
 
 def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
-    """The constant or default that the location names; MutatorError if there is none (candidates are listed),
-    or if it cannot be set."""
+    """The constant or default that the location names.
+
+    MutatorError if there is none (candidates are listed), or if it cannot be set.
+    """
     kind, name = location.anchor.kind, as_compiled(location.anchor.name)
     function = as_compiled(location.function)
     alike = [one for one in known if one.kind is kind and one.function == function]

@@ -1,4 +1,4 @@
-"""Functions as pieces of source that compile by themselves: a change in one is checked without its file."""
+"""Compile functions alone, so that a change in one is checked without its file."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -6,7 +6,7 @@ from types import CodeType
 
 
 def outer_functions(tree: ast.AST) -> Iterator[range]:
-    """The lines (from 0) of each function that is in no other one, decorators included."""
+    """The lines (from 0) of each outermost function, including decorators."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = min(one.lineno for one in (node, *node.decorator_list)) - 1
@@ -16,10 +16,10 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
 
 
 def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
-    """The code of a module that has these lines of a function alone; None where they do not compile.
+    """The code of a module with only these lines of a function; None if they do not compile.
 
-    A function compiles in its file if and only if it does by itself: names of functions around it are what
-    it could miss, and it has none.
+    A function compiles in its file if and only if it does alone: only an outer function's names could be
+    missing, and it has no outer function.
     """
     text = b"".join(lines).decode(encoding).removeprefix("\ufeff")  # a byte order mark
     indented = text[:1] in (" ", "\t", "\f")

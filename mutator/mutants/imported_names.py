@@ -1,4 +1,4 @@
-"""Which modules of a tree import a constant of another one by name, so that it is set there, too."""
+"""Find modules of a tree that import a constant by name, which must be set there, too."""
 
 import ast
 from collections import Counter
@@ -28,25 +28,25 @@ class _Import:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Imports:
-    """What a file imports by name, and which names it sets in another way, too."""
+    """What a file imports by name, and which names it also sets in other ways."""
 
     path: str
     module: str
     names: tuple[_Import, ...]
     set: frozenset[str]
-    exported: frozenset[str] | None = None  # what `__all__` lists, if it lists it in words
+    exported: frozenset[str] | None = None  # content of `__all__`, if literal
 
 
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
-    """Where else in the tree the constant `name` of the module at `path` is known, `module.NAME` each.
+    """Where else in the tree the constant `name` of the module at `path` is known, as `module.NAME`.
 
-    MutatorError that lists the places where it cannot be set: those that import everything, or into a class,
-    and those that set the name in another way, too.
+    MutatorError that lists the places where it cannot be set: star imports, imports into a class, and modules
+    that also set the name in another way.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
     found, refused = [(module_name(path), name)], set[str]()
-    for known in found:  # which grows on the way: what is imported may be imported again
+    for known in found:  # grows during the loop: an imported name may be imported again
         for file in files:
             for one in file.names:
                 if (one.module, one.name) not in (known, (known[0], _ALL)):
@@ -67,7 +67,7 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
 
 
 def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
-    """Why what this imports cannot be set there; `exported` is what `*` stands for, if the module says so."""
+    """Why an import prevents setting the constant; `exported` is what `*` means, if known."""
     if one.name == _ALL:
         meant = not name.startswith("_") if exported is None else name in exported
         return "imports *" if meant else None
@@ -100,7 +100,7 @@ def _imports(path: str, data: bytes, root: Path) -> _Imports:
 
 
 def _exported(tree: ast.Module) -> frozenset[str] | None:
-    """The names in `__all__`, if it is made once, of texts alone."""
+    """The names in `__all__`, if it is assigned once, with literal texts."""
     made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:
         if (
@@ -114,7 +114,7 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
-    """Imports at the level of a module or of its classes: what a function imports is there for one call."""
+    """Imports of a module or its classes; imports in functions hold for one call only."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
@@ -132,5 +132,5 @@ def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_
 
 
 def _package(path: str, level: int) -> str:
-    """The package from which a relative import of this level starts; empty for an absolute one."""
+    """The package where a relative import of this level starts; empty for an absolute one."""
     return ".".join(path.split("/")[:-level]) if level else ""

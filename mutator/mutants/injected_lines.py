@@ -1,8 +1,8 @@
-"""Injected lines: how their tags and their calls of the probe look in source, and how they are found again.
+"""The syntax of injected lines: their tags, their calls of the probe, and how to find them in files and
+patches.
 
-Whoever writes, finds or reads injected lines, in files or in patches, asks this module; the probe that they
-call is that of `mutants.probe`. Code inside a target's process cannot import it, so engines pass on what that
-code needs.
+All knowledge of this syntax is here; the probe is that of `mutants.probe`. Code inside a target's process
+cannot import this module, so engines pass it what it needs.
 """
 
 import ast
@@ -16,8 +16,8 @@ from mutator.model import Injection
 
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
-ORIGINAL = "original"  # what a line that sets a value calls it as the program has it
-# in quotes, in a name or in a tag, which may have several: a number of eight digits is none
+ORIGINAL = "original"  # the original value in a line that sets a value
+# in quotes, a name or a tag, which may have several; not a number of eight digits
 INJECTION_ID = (
     r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
     r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"
@@ -28,7 +28,7 @@ _MARK_BYTES = _MARK.encode()
 _TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
-_ASKING = (  # what chooses an instance or an execution comes first
+_ASKING = (  # the choice of an instance or execution comes first
     rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
     rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
     rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
@@ -52,11 +52,11 @@ _SETTING = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tag:
-    """The tag at the end of an injected line: the injection's id, or IMPORT_TAG, OBSERVE_TAG. A line in which
-    several injections change values has their ids, with `+` between.
+    """The tag at the end of an injected line: the injection's id, IMPORT_TAG or OBSERVE_TAG.
 
-    `guarded` is the number of lines that a guard indents, 0 in other lines; `code` the line without its tag.
-    `was` is the target's line in whose place this one stands; None for one that was inserted.
+    A line in which several injections change values has their ids, joined with `+`. `guarded` is the number
+    of lines that a guard indents, else 0; `code` the line without its tag. `was` is the target's line that
+    this one replaces; None for an inserted one.
     """
 
     id: str
@@ -66,7 +66,7 @@ class Tag:
 
     @property
     def of_fault(self) -> bool:
-        """Whether the line belongs to a fault; the others are in every mutant."""
+        """Whether the line belongs to a fault; other lines are in every mutant."""
         return self.id not in (IMPORT_TAG, OBSERVE_TAG)
 
     @property
@@ -81,23 +81,25 @@ class Tag:
 
     @property
     def opens_original(self) -> bool:
-        """Whether it is the `else:` beneath which a guard keeps the target's statements."""
+        """Whether it is the `else:` under which a guard keeps the target's statements."""
         return self.guarded > 0 and self.code.strip() == b"else:"
 
     @property
     def asked_for(self) -> list[str]:
-        """The injections whose values a changed line takes only if the probe says so."""
+        """The injections whose values a changed line uses only if the probe says so."""
         return [found["id"].decode() for found in _ASKED.finditer(self.code)]
 
     @property
     def sets(self) -> bool:
-        """Whether the line tells the probe of a value that it is to set while the fault is active."""
+        """Whether the line tells the probe about a value to set while the fault is active."""
         return _SETS.match(self.code) is not None
 
 
 def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
-    """What a changed file has in place of values, and what chooses an instance: the injection, the line, the
-    column and that of the end. Lines count from 1, columns in bytes of UTF-8, as in tracebacks."""
+    """Yield the changed values and instance choices of a file: injection, line, start and end column.
+
+    Lines count from 1, columns in bytes of UTF-8, as in tracebacks.
+    """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.IfExp):
             asked = node.test.values if isinstance(node.test, ast.BoolOp) else [node.test]
@@ -120,23 +122,24 @@ def tag_of(line: bytes) -> Tag | None:
 
 
 def tagged(code: str, tag: str, guarded: int = 0) -> str:
-    """`code` with its tag; every line of a guard carries the number of lines that it guards."""
+    """`code` with its tag; every line of a guard has the number of lines that it guards."""
     return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
 
 
 def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
-    """The tag of a line that stands in the place of the target's line `was`."""
+    """The tag of a line that replaces the target's line `was`."""
     return f"  {_MARK}{'+'.join(ids)} was:".encode() + was
 
 
 def asks(tag: str) -> str:
-    """How an injected line asks the probe whether to act."""
+    """The question whether to act, from an injected line to the probe."""
     return f'{PROBE_NAME}.active("{tag}")'
 
 
 def asks_for(tag: str, injection: Injection) -> str:
-    """The same of an injection that may be limited to an instance or to some executions: for these it asks
-    only while the fault is active."""
+    """The same for an injection limited to an instance or executions: those are checked only while the
+    fault is active.
+    """
     asked = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
     for name in ("call", "every"):
         if (number := getattr(injection, name)) is not None:
@@ -145,13 +148,15 @@ def asks_for(tag: str, injection: Injection) -> str:
 
 
 def changed_value(asked: str, changed: str) -> str:
-    """What goes before an expression so that it is worth `changed` when the probe, `asked`, says so."""
+    """What goes before an expression so that its value is `changed` when the probe, `asked`, says so."""
     return f"({changed} if {asked} else "
 
 
 def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
-    """The line that has the probe set a constant: the one at `path` in its module, `Class.NAME` for one of a
-    class, and what other modules imported of it. `changed` is its value then, of the `original` one."""
+    """The line that makes the probe set the constant at `path` in its module (`Class.NAME` in a class).
+
+    `imported` are other modules' imports of it. `changed` is the new value, computed from `original`.
+    """
     more = "".join(f', "{name}"' for name in imported)
     return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
 
@@ -163,7 +168,7 @@ def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
 
 
 def sets_values(data: bytes) -> bool:
-    """Whether a file may have lines that tell the probe what to set: most have none."""
+    """Whether a file may have lines that tell the probe what to set; most have none."""
     return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
 
 
@@ -207,7 +212,7 @@ def adds_fault(hunk: str) -> bool:
 
 
 def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
-    """Begin, end and name of everything that differs from probe to probe, in the patch that adds one."""
+    """Begin, end and name of everything that differs between probes, in the patch that adds one."""
     for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
         name = match.lastgroup or ""
         yield *match.span(name), name

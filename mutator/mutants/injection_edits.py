@@ -1,4 +1,4 @@
-"""The edit of one injection: anchor resolved, snippet rendered, and no name of the target disturbed by it."""
+"""Make the edit of one injection: resolve the anchor, render the snippet, and protect the target's names."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -36,11 +36,11 @@ def injection_edit(
     name: str,
     tree: SourceTree | None = None,
 ) -> Edit | ValueEdit:
-    """The edit of one injection in its file; `name` tags its lines. `tree` has the files that may import a
-    constant from it; None: there are none.
+    """The edit of one injection in its file; `name` tags its lines.
 
-    MutatorError for an anchor that is not found, a name that the function does not know, and for lines that
-    would change what the target's names mean while the fault is not active.
+    `tree` has the files that may import a constant (None: there are none). MutatorError for a missing anchor,
+    a name unknown in the function, and lines that would change what the target's names mean while the fault
+    is inactive.
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
@@ -69,7 +69,7 @@ def injection_edit(
 def replaced_value(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str
 ) -> tuple[Expression, str]:
-    """The expression whose value an injection changes, and the source that stands for it then."""
+    """The expression whose value an injection changes, and the source that replaces it."""
     expression = file.resolve_value(injection.location)
     params, parts = dict(injection.params), parts_of(expression)
     if model.needs is Needs.CALL and not parts["called"]:
@@ -87,7 +87,7 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
 
 
 def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
-    """MutatorError if the changed value sets a name that the expression itself does not set."""
+    """Raise MutatorError if the changed value binds a name that the expression itself does not."""
     new = (
         _set_within(ast.parse(changed, mode="eval")) - _set_within(expression.node) if ":=" in changed else ()
     )
@@ -102,7 +102,7 @@ def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Express
 
 
 def _set_within(node: ast.AST) -> set[str]:
-    """The names that an expression sets by `:=`: they become names of the function."""
+    """The names that an expression binds by `:=`, which belong to the function."""
     return {one.target.id for one in ast.walk(node) if isinstance(one, ast.NamedExpr)}
 
 
@@ -151,7 +151,7 @@ def _setting(
 def _variables(
     file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
-    """The variables that are passed to the template; MutatorError for one that the function does not know."""
+    """The variables passed to the template; MutatorError for one unknown in the function."""
     params = dict(injection.params)
     found = set()
     for param in model.params:
@@ -173,7 +173,7 @@ def _variables(
 def _check_own_names(
     file: ParsedFile, site: Site, model: FaultModel, code: Sequence[str], variables: frozenset[str]
 ) -> None:
-    """MutatorError if the snippet sets a name of the function that is none of its parameters."""
+    """Raise MutatorError if the snippet binds a name of the function that is not one of its parameters."""
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
     taken = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
     if taken:
@@ -187,7 +187,7 @@ def _check_own_names(
 
 
 def _bound(code: str) -> Iterator[str]:
-    """The names that code sets or deletes, those inside comprehensions and functions included."""
+    """The names that code binds or deletes, including those inside comprehensions and functions."""
     for node in ast.walk(ast.parse(code)):
         match node:
             case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
@@ -203,12 +203,12 @@ def _bound(code: str) -> Iterator[str]:
 
 
 def _check_scopes(file: ParsedFile, site: Site, edit: Edit) -> None:
-    """MutatorError if the edit alone changes what a name means anywhere in the file."""
+    """Raise MutatorError if the edit alone changes what a name means anywhere in the file."""
     inserted = range(edit.index + 1, edit.index + 1 + len(edit.lines))
     try:
         moved = next(moved_names(file.data, joined(apply_edits(file, [edit])), inserted), None)
     except SyntaxError:
-        return  # the mutant does not compile, which is told when it is built
+        return  # the mutant does not compile, which building reports
     if moved:
         raise MutatorError(
             f"the lines would make '{moved.name}' {moved.after} in {moved.scope}, where it is {moved.before}",

@@ -1,4 +1,4 @@
-"""Injections into one instance among several, or into some executions: what is asked for before the probe."""
+"""Limit injections to one instance or to some executions, by a check before the probe's."""
 
 from mutator.config.instances import names_of
 from mutator.errors import MutatorError
@@ -9,7 +9,7 @@ from mutator.mutants.injected_lines import asks, asks_for
 
 
 def check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
-    """MutatorError if what chooses the instance asks for a name that the function does not know."""
+    """Raise MutatorError if the choice of the instance uses a name unknown in the function."""
     unknown = names_of(injection.where or "True") - names
     if unknown:
         raise MutatorError(
@@ -22,7 +22,7 @@ def check_instance(file: ParsedFile, names: frozenset[str], first: int, injectio
 
 
 def limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
-    """The snippet, asking the probe for one instance or some executions, if the injection has these."""
+    """The snippet with a check for one instance or some executions, if the injection has any."""
     plain, asked = asks(name), asks_for(name, injection)
     if asked == plain:
         return code

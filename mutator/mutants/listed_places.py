@@ -1,4 +1,6 @@
-"""Every place of a file where a fault can be injected, as a spec names it, and the fault models for each."""
+"""List every place of a file where a fault can be injected, in spec syntax, with the fault models for
+each.
+"""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -13,7 +15,7 @@ from mutator.mutants.anchors import ParsedFile, Site, functions_named, plain_nam
 from mutator.mutants.expressions import NO_PARTS, Expression, parts_of
 from mutator.mutants.statement_texts import written_out
 
-_OF_OPERATORS = "operator_"  # models that mutation operators use, which find their own places
+_OF_OPERATORS = "operator_"  # models of mutation operators, which find their own places
 _VERBS = {
     "assign": (AnchorKind.BEFORE_ASSIGN, AnchorKind.AFTER_ASSIGN),
     "call": (AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL),
@@ -31,20 +33,20 @@ class ListedPlace:
 
     @property
     def at(self) -> dict[str, Any]:
-        """What a spec writes at `at`."""
+        """The value of `at` in a spec."""
         return as_written_at(self.location)
 
 
 def places_of(file: ParsedFile, models: FaultModels, function: str | None = None) -> list[ListedPlace]:
-    """All places of a file, or of one of its functions, from its top to its end: a statement under each name
-    that it assigns or calls, an expression under the most telling of its anchors.
+    """All places of a file or function, in order: statements and the expressions in them.
 
-    MutatorError with the file's functions if it has none of that name.
+    A statement is listed under each name that it assigns or calls, an expression under its most specific
+    anchor. MutatorError with the file's functions if it has none of that name.
     """
     lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
     names = tuple(file.functions)
     if function is not None:
-        functions_named(file, function)  # or it says which there are
+        functions_named(file, function)  # raises if there is none
         names = (plain_name(function),)
     found = [place for name in names for place in lister.of_function(name)]
     found += lister.fixed(None if function is None else names[0])
@@ -64,7 +66,7 @@ class _Lister:
                 yield from self.statement(name, AnchorKind.ENTRY, "", i + 1 if len(functions) > 1 else None)
         for verb, kinds in _VERBS.items():
             found = (s for f in functions for s in f.statements if not s.reason)
-            statements = sorted(found, key=lambda s: s.opens is not None)  # as `nth` counts them
+            statements = sorted(found, key=lambda s: s.opens is not None)  # in the order of `nth`
             count, seen = (Counter[str]() for _ in range(2))
             count.update(one for s in statements for one in s.names(verb))
             for statement in statements:
@@ -81,7 +83,7 @@ class _Lister:
         try:
             site = self.file.resolve(location)
         except MutatorError:
-            return  # it shares its line, or there is nothing after it
+            return  # it shares its line, or nothing follows it
         models = tuple(model.name for model in self.models if self.fits(model, kind, site))
         if models:
             yield ListedPlace(
@@ -129,7 +131,7 @@ class _Lister:
 
 
 def writable(name: str) -> bool:
-    """Whether a spec may write this name of a statement: `None` is none."""
+    """Whether a spec may write this name of a statement: `None` means no name."""
     return not name or dotted_name(name) or assignable(name)
 
 

@@ -1,13 +1,12 @@
-"""Source with its numbers and ids replaced, so that compiling it once stands for many sources.
+"""Normalize numbers and ids in source, so that one compilation covers many mutants.
 
 Compiling a file takes milliseconds, and mutants of one kind differ only in the digits of their numbers and in
 their ids. If the normalized source compiles, so does every source that normalizes to it:
 
 * A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
-  replaced, and only up to a length that Python always accepts, so a token becomes one of the same kind. The
-  compiler cares about that kind alone. Where it cares about more (a mapping pattern may not repeat a key),
-  equal numbers are the hardest case.
-* An id (hex digits) becomes one that is neither a token by itself (`0f...`) nor a character (`\\U0f...`). So
+  replaced, up to a length that Python always accepts, so a token keeps its kind, all that the compiler cares
+  about. Where it cares about more (a mapping pattern must not repeat a key), equal numbers are the worst.
+* An id (hex digits) becomes one that is neither a token alone (`0f...`) nor a character (`\\U0f...`). So
   normalized source compiles only where ids are in strings, comments or names, and there any id compiles.
   Equal ids stay equal, different ones different.
 """
@@ -16,7 +15,7 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-_PART = r"[\w.\\\x80-\U0010ffff]"  # beside a literal: it continues, or belongs to a name or an escape
+_PART = r"[\w.\\\x80-\U0010ffff]"  # next to a literal: it continues, or belongs to a name or an escape
 _NUMBER = re.compile(  # the digit comes first because searching for it is fast; the lookbehind follows
     rf"[0-9](?<!{_PART}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_PART})"
 )
@@ -35,7 +34,7 @@ def _zero(number: re.Match[str]) -> str:
 
 @lru_cache(maxsize=256)
 def compiles(text: bytes) -> bool:
-    """Whether normalized source compiles, and with it every source that it stands for."""
+    """Whether normalized source compiles, and with it every source that normalizes to it."""
     try:
         compile(text, "<normalized>", "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError):

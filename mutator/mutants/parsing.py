@@ -1,4 +1,4 @@
-"""A source file parsed twice, by Python and by LibCST, and refused where they cannot both read it."""
+"""Parse a source file with both Python and LibCST, and refuse it if they disagree."""
 
 import ast
 import re
@@ -18,7 +18,7 @@ _LONE_CR = re.compile(rb"\r(?!\n)")
 
 
 def refuse_unfit(data: bytes, where: Path) -> None:
-    """MutatorError for line ends that the splicer does not know, and for a file with injected lines."""
+    """Raise MutatorError for unsupported line ends, and for a file with injected lines."""
     if found := _LONE_CR.search(data):
         raise MutatorError(
             "line ends of CR alone",
@@ -39,7 +39,7 @@ def refuse_unfit(data: bytes, where: Path) -> None:
 
 
 def python_tree(data: bytes, where: Path) -> ast.Module:
-    """What `ast` makes of the file; MutatorError unless it compiles."""
+    """Parse the file with `ast`; MutatorError unless it compiles."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
         return ast.parse(data)
@@ -52,14 +52,14 @@ def python_tree(data: bytes, where: Path) -> ast.Module:
 
 @contextmanager
 def reading(where: Path) -> Iterator[None]:
-    """Within it, LibCST reads a file; MutatorError where it fails on valid Python."""
+    """Turn the errors of LibCST on valid Python into MutatorError."""
     try:
         yield
     except (cst.ParserSyntaxError, SyntaxError, UnicodeError, RecursionError) as error:
         message, line = str(error), None
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]
-            line = None if message.startswith("tokenizer") else error.raw_line  # where it gives line 1
+            line = None if message.startswith("tokenizer") else error.raw_line  # it would be line 1 of a part
         raise MutatorError(
             f"LibCST cannot read it: {message}",
             where=where,
@@ -70,7 +70,7 @@ def reading(where: Path) -> Iterator[None]:
 
 
 def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
-    """What LibCST makes of the file; MutatorError unless that gives back the file's bytes."""
+    """Parse the file with LibCST; MutatorError unless that reproduces the file's bytes."""
     module = cst.parse_module(data)
     given = module.bytes
     if given != data:
@@ -113,6 +113,6 @@ def import_line(module: cst.Module, positions: Positions) -> int:
 
 
 def _first_line(node: cst.CSTNode, positions: Positions) -> int:
-    """Index of the first line of a statement, its decorators included."""
+    """Index of the first line of a statement, including decorators."""
     decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
     return min(positions[n].start.line for n in (node, *decorators)) - 1

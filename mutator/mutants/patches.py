@@ -11,7 +11,7 @@ _NO_NEWLINE = "\\ No newline at end of file\n"
 
 @dataclass(slots=True)
 class _Hunk:
-    """Pieces that are shown together, and the number of lines before them on each side."""
+    """Pieces shown together, and the number of lines before them on each side."""
 
     old: int
     new: int
@@ -40,7 +40,7 @@ def new_file(path: str, text: str) -> str:
 
 
 def _hunks(pieces: Sequence[Piece]) -> Iterator[_Hunk]:
-    """Changes with three lines of context, in one hunk where at most six lines lie between them."""
+    """Changes with three lines of context; those at most six lines apart share a hunk."""
     hunk = _Hunk(0, 0)
     old = new = 0
     for i, piece in enumerate(pieces):

@@ -1,7 +1,7 @@
-"""Where functions and statements are, told twice: a place counts only if LibCST and `ast` agree on it.
+"""Positions of functions and statements, which count only if LibCST and `ast` agree.
 
-A parser that drops a line shifts everything below. A mutant made with its positions compiles and un-splices
-all the same, with the fault at the wrong line.
+A parser that drops a line shifts everything below. A mutant made with such positions would compile and
+un-splice, with the fault at the wrong line.
 """
 
 import ast
@@ -18,11 +18,10 @@ _STATEMENTS = ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where a function or a small statement is; `kind` is its class in `ast`.
+    """The position of a function or a small statement; `kind` is its class in `ast`.
 
     `start` and `to` are (line from 1, column). `to` is the end of a statement; of a function, the start of
-    the first statement in it, which may be its docstring. LibCST counts columns in characters, `ast` in bytes
-    of UTF-8.
+    its first statement, including a docstring. LibCST counts columns in characters, `ast` in bytes of UTF-8.
     """
 
     kind: str
@@ -42,7 +41,6 @@ class Place:
 
 
 def function_place(node: cst.FunctionDef, positions: Positions) -> Place:
-    """Where LibCST sees a function."""
     first: cst.CSTNode = node.body.body[0]
     if isinstance(first, cst.SimpleStatementLine):
         first = first.body[0]
@@ -55,13 +53,12 @@ def function_place(node: cst.FunctionDef, positions: Positions) -> Place:
 
 
 def statement_place(node: cst.BaseSmallStatement, positions: Positions) -> Place:
-    """Where LibCST sees a small statement."""
     span = positions[node]
     return Place(kind=type(node).__name__, start=_point(span.start), to=_point(span.end))
 
 
 def line_after(node: cst.SimpleStatementLine | cst.SimpleStatementSuite, positions: Positions) -> int:
-    """Index of the first line after a line of statements; backslashes may follow the last of them."""
+    """Index of the first line after a line of statements, including backslash continuations."""
     space = node.trailing_whitespace.whitespace.value
     semicolon = node.body[-1].semicolon
     if isinstance(semicolon, cst.Semicolon):
@@ -74,7 +71,7 @@ def _point(position: CodePosition) -> _Point:
 
 
 def places_by_ast(tree: ast.Module) -> frozenset[Place]:
-    """Where `ast` sees functions, and statements that can be anchors; columns in bytes of UTF-8."""
+    """The positions of functions and anchorable statements in `ast`; columns in bytes of UTF-8."""
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

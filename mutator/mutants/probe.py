@@ -1,8 +1,8 @@
-"""The probe's contract: where `_fi` lies, what it is rendered with, how it works, and what it reports.
+"""The probe's contract: the path of `_fi`, its template values, its operation and its report.
 
-Every mutant carries the probe, a module rendered from `templates/_fi.py.j2`; how injected lines call it is
-told by `mutants.injected_lines`. Code inside a target's process cannot import this module, so engines pass on
-what that code needs.
+Every mutant carries the probe, a module rendered from `templates/_fi.py.j2`; `mutants.injected_lines` has the
+calls of injected lines. Code inside a target's process cannot import this module, so engines pass it what it
+needs.
 """
 
 import math
@@ -18,7 +18,7 @@ from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.targets.observation import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 
-# a probe's own part: its docstring, its settings, its condition
+# a probe's own part: docstring, settings, condition
 _OWN = re.compile(
     r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^_TINY = .*\n|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
 )
@@ -26,12 +26,11 @@ _ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$(?s:.*)^_TINY = (.+)$", re.MULTILINE
 
 
 def probe_path(package: str | None) -> str:
-    """Path of the probe in a mutated tree, relative to the tree's root; None: it lies in no package."""
+    """Path of the probe in a mutated tree, relative to the tree's root; None: outside of packages."""
     return f"{package}/{PROBE_NAME}.py" if package else f"{PROBE_NAME}.py"
 
 
 def probe_module(package: str | None) -> str:
-    """The probe's module name."""
     return f"{package}.{PROBE_NAME}" if package else PROBE_NAME
 
 
@@ -41,7 +40,7 @@ def is_probe(path: str) -> bool:
 
 
 def injection_id(index: int, injection: Injection) -> str:
-    """The id that an injection has in tags and reports: from its content and its place in the fault."""
+    """The id of an injection in tags and reports, from its content and its position in the fault."""
     return content_id([index, injection])[:8]
 
 
@@ -55,9 +54,9 @@ def template_values(
     *,
     sets: bool = False,
 ) -> dict[str, object]:
-    """What the probe's template is rendered with; `sets`: the probe is to set constants or defaults.
+    """The values for the probe's template; with `sets`, the probe sets constants or defaults.
 
-    MutatorError for a hold time that is missing, and for a condition over what the target does not observe.
+    MutatorError for a missing hold time, and for a condition over unobserved values.
     """
     if hold is Hold.FOR and trigger.hold_s is None:
         raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
@@ -83,9 +82,9 @@ def template_values(
 
 
 def parts_of(probe: str) -> tuple[str, str]:
-    """A probe's source in two parts: its own, and what all probes of a target share.
+    """A probe's source in two parts: its own, and the part that all probes of a target share.
 
-    Run one after the other, they do what the whole does. Blank lines keep their line numbers.
+    Run in sequence, they equal the whole. Blank lines keep the line numbers.
     """
     own, common, at = [], [], 0
     for found in _OWN.finditer(probe):
@@ -97,7 +96,7 @@ def parts_of(probe: str) -> tuple[str, str]:
 
 
 def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
-    """The time (s) from which a probe is armed, and its condition, to be called with what it observes.
+    """The time (s) from which a probe is armed, and its condition as a function of the observed values.
 
     A fault is first active where the probe is armed and the condition holds. Calling `observe` for every
     value instead takes almost four times as long.
@@ -108,17 +107,16 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
 
 
 def decision_in(own: str) -> tuple[float, str]:
-    """The same from the source of a probe's own part, with the condition as the source of its function."""
+    """The same from the source of a probe's own part; the condition is the source of its function."""
     armed = _ARMED.search(own)
     assert armed is not None
     return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
-    """The object in which a probe keeps its observations, and its attributes after `observed` of them.
+    """The object with a probe's observations, and its attributes after `observed` of them.
 
-    The first one was made at time `began` (s), the last at `t`. A probe that takes the place of another is
-    given these.
+    The first was at time `began` (s), the last at `t`. A probe that replaces another one gets these.
     """
     return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
 
@@ -127,14 +125,14 @@ def state_after(observed: int, began: float | None, t: float | None) -> tuple[st
 
 
 def silent_report(mutant: str | None) -> dict[str, Any]:
-    """The report of a mutant whose trigger never holds, as far as it is read."""
+    """The parts that are read from the report of a mutant whose trigger never holds."""
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
 
 def report_problem(report: object, mutant: str, injections: Sequence[str]) -> str:
-    """What is wrong with what the probe of a mutant with these injections reported; empty if nothing is.
+    """What is wrong with a probe's report for a mutant with these injections; empty if nothing is.
 
-    A mutant may have overwritten whatever its probe knows.
+    A mutant may have overwritten anything in its probe.
     """
     if not isinstance(report, dict):
         return "its probe has no report"
@@ -151,7 +149,7 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
 
 
 def _is_told(told: object, number: str) -> bool:
-    """Whether that is a first time, a last one and a number of times, or says that there was none."""
+    """Whether this is a first time, a last time and a count, or says that there was none."""
     if not isinstance(told, dict) or told.keys() != {"first", "last", number}:
         return False
     first, last, count = told["first"], told["last"], told[number]
@@ -166,7 +164,7 @@ def was_triggered(report: Mapping[str, Any] | None) -> bool:
 
 
 def activation_of(report: Mapping[str, Any]) -> Activation | None:
-    """All injections together: first and last execution, and their number; None if nothing was executed."""
+    """First and last execution of all injections together, and their number; None if nothing ran."""
     injections = report.get("injections")
     ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
     if not ran:

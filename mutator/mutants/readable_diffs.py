@@ -1,4 +1,4 @@
-"""Reading patches: file by file, and without the probe that every mutant has."""
+"""Read patches file by file, without the probe that every mutant has."""
 
 import re
 from collections.abc import Iterator

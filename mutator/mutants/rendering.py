@@ -1,4 +1,4 @@
-"""Rendering: a fault model's template and its parameters to lines of Python.
+"""Render a fault model's template and its parameters to lines of Python.
 
 Templates run in Jinja2's sandbox, where an undefined name is an error. Every printed value is a Python
 literal or a checked name, so it cannot become other code.
@@ -26,7 +26,7 @@ from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetK
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 
-_EXACT = 2.0**53  # up to it every whole number is a double
+_EXACT = 2.0**53  # up to it every integer is a double
 _ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast.unparse` writes it
 
 
@@ -39,13 +39,16 @@ def literal(value: object) -> str:
     if isinstance(value, int):
         return repr(value)
     if isinstance(value, str | Undefined):
-        return str(value)  # of an undefined name it raises UndefinedError
+        return str(value)  # an undefined name raises UndefinedError
     raise MutatorError(f"a {type(value).__name__} in a template", expected="a number or a name")
 
 
 def signed(value: int | float) -> str:
-    """`+ 3` or `- 2.5`: how a term is added in an expression. A whole number has no point, so that an integer
-    plus the term stays one; to a float that makes no difference."""
+    """A term to add in an expression: `+ 3` or `- 2.5`.
+
+    An integer has no point, so that adding it to an integer gives an integer; for a float it makes no
+    difference.
+    """
     negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
     size = -value if negative else value
     whole = isinstance(size, float) and size <= _EXACT and size.is_integer()
@@ -69,7 +72,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
 
 
 def taken_for(written: str, read: str) -> float:
-    """What a number is multiplied by if it is written in one unit and read as if it were in another."""
+    """The factor for a number that is written in one unit and read as if it were in another."""
     one, other = units.UNITS[written], units.UNITS[read]
     if one.dimension != other.dimension or one == other:
         raise MutatorError(
@@ -81,12 +84,12 @@ def taken_for(written: str, read: str) -> float:
 
 
 def refuse(why: str) -> NoReturn:
-    """How a template says that parameters do not go together."""
+    """Reject a combination of parameters; called from templates."""
     raise MutatorError(why, remedy="correct the parameters, or anchor elsewhere")
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
-    """Jinja2's sandbox without powers: 9 ** 9 ** 9 never ends."""
+    """Jinja2's sandbox without powers, since 9 ** 9 ** 9 never ends."""
 
     intercepted_binops = frozenset({"**"})
 
@@ -110,10 +113,10 @@ _FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError
 def snippet(
     model: FaultModel, params: Mapping[str, Value], fi: str, statements: Mapping[str, str] | None = None
 ) -> tuple[str, ...]:
-    """The model's lines for these parameters, untagged, 4 spaces a level. `fi` is the injection's id,
-    `statements` what the model needs of the source.
+    """The model's lines for these parameters, untagged, 4 spaces a level.
 
-    MutatorError when the template fails or its result is not whole lines of Python.
+    `fi` is the injection's id, `statements` what the model needs of the source. MutatorError if the template
+    fails or its result is not whole lines of Python.
     """
     if model.kind is SnippetKind.VALUE:
         target = str(_checked(next(param for param in model.params if param.name == "target"), params))
@@ -136,9 +139,10 @@ def changed_value(
     original: str,
     parts: Mapping[str, object] | None = None,
 ) -> str:
-    """What the model makes of the value `original`, source on one line; `parts` are what that consists of.
+    """The model's expression for the changed value of `original`, source on one line; `parts` are its
+    components.
 
-    MutatorError when the model changes no values, when the template fails, or does not give one expression.
+    MutatorError if the model changes no values, or if the template fails or does not render one expression.
     """
     if model.expression is None:
         raise MutatorError(
@@ -165,10 +169,10 @@ def changed_value(
 
 @lru_cache(maxsize=1024)
 def _is_expression(text: str) -> bool:
-    """Whether normalized source is an expression that does not yield, and so is all that it stands for."""
+    """Whether normalized source, and so all that it covers, is an expression without `yield`."""
     try:
         tree = ast.parse(text, mode="eval")
-        ast.parse(f"({text})", mode="eval")  # a comment would swallow the bracket
+        ast.parse(f"({text})", mode="eval")  # a comment would hide the bracket
     except (SyntaxError, ValueError, RecursionError):
         return False
     return "\n" not in text and not any(isinstance(n, ast.Yield | ast.YieldFrom) for n in ast.walk(tree))
@@ -176,7 +180,7 @@ def _is_expression(text: str) -> bool:
 
 @lru_cache(maxsize=1024)
 def _holds_together(text: str) -> bool:
-    """Whether an expression is what an `if` behind it takes: all but a tuple, a lambda, another `if`."""
+    """Whether an expression binds tighter than a following `if`: not a tuple, a lambda or another `if`."""
     whole = ast.parse(f"{text} if 0 else 0", mode="eval").body
     return isinstance(whole, ast.IfExp) and ast.dump(whole.body) == ast.dump(
         ast.parse(text, mode="eval").body
@@ -184,8 +188,10 @@ def _holds_together(text: str) -> bool:
 
 
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
-    """What the template finds as this parameter. A constant that is no number is Python source already, so
-    that a constant None differs from none at all."""
+    """The template's value for this parameter.
+
+    A constant that is not a number is already Python source, so that None differs from a missing one.
+    """
     value = params.get(param.name)
     if param.type == "constant":
         number = isinstance(value, int | float) and not isinstance(value, bool)
@@ -237,7 +243,7 @@ def _line_in(error: BaseException) -> int | None:
 
 @lru_cache(maxsize=1024)
 def _are_lines(text: str, kind: SnippetKind) -> bool:
-    """Whether normalized source passes `_check_lines`, and with it every source that it stands for."""
+    """Whether normalized source, and so all that it covers, passes `_check_lines`."""
     try:
         _check_lines(text, kind, Path())
     except MutatorError:
@@ -246,7 +252,7 @@ def _are_lines(text: str, kind: SnippetKind) -> bool:
 
 
 def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
-    """Every line must end a statement or open a block: only then can each carry its tag."""
+    """Check that every line ends a statement or opens a block, so that each can carry its tag."""
     text += "\n"
     whole = text + "    pass\n" if kind is SnippetKind.GUARD else text
     try:

@@ -1,9 +1,9 @@
 """Reusable changes: a changed file without its inserted lines, to be filled with those of other mutants.
 
-Splicing, comparing and compiling a file of some hundred lines takes milliseconds, and the mutants of a
-campaign differ in little: many insert the same lines at the same places, but for numbers and ids. The first
-of them is spliced and leaves a reusable change; the others fill it with their own lines, and get the bytes
-that splicing would give. How many there are depends on the library, not on the number of mutants.
+Splicing, comparing and compiling a file of some hundred lines takes milliseconds, and many mutants of a
+campaign insert the same lines at the same places, except for numbers and ids. The first is spliced and leaves
+a reusable change; the others fill it with their lines, which gives the same bytes. The number of reusable
+changes depends on the library, not on the number of mutants.
 """
 
 from collections.abc import Sequence
@@ -37,7 +37,7 @@ class ReusableChange:
 
     @classmethod
     def of(cls, change: Change) -> "ReusableChange":
-        """The change without its tagged lines: these are the inserted ones, since no target has tags."""
+        """The change without its tagged lines, which are the inserted ones, since no target has tags."""
         patch = change.patch.encode("utf-8", "surrogateescape")
         return cls(
             data=tuple(_parts(change.data, b"")), patch=tuple(_text(part) for part in _parts(patch, b"+"))
@@ -53,8 +53,9 @@ class ReusableChange:
 
 
 def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
-    """The reusable changes of a file so far, or one of their changes; kept with the tree, for callers to add
-    to."""
+    """The reusable changes of a file so far, or single changes; kept with the tree, and extended by
+    callers.
+    """
     return tree.derived(path, _none_yet)
 
 
@@ -76,9 +77,9 @@ def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
 
 
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
-    """Whether the change compiles with all lines of this key: it does if it compiles with normalized ones.
+    """Whether the change compiles with all lines of this key, i.e. with normalized ones.
 
-    It then un-splices too, since that depends on the tags alone, which are part of the key.
+    It then un-splices too, since that depends only on the tags, which are part of the key.
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line may have no end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
@@ -86,7 +87,7 @@ def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> 
 
 
 def _parts(data: bytes, sign: bytes) -> list[bytes]:
-    """What is around the tagged lines, with their `sign` and line ends."""
+    """The parts around the tagged lines, with their `sign` and line ends."""
     parts = [b""]
     for line in data.splitlines(keepends=True):
         if tag_of(line):

@@ -1,7 +1,6 @@
-"""What names mean in the functions of a source, as the compiler sees it.
+"""What names mean in the functions of a source, according to the compiler.
 
-One assignment anywhere in a function makes a name local to all of it, from its first line on and whether or
-not the assignment is ever carried out.
+One assignment anywhere in a function makes a name local to all of it, even if it never runs.
 """
 
 import unicodedata
@@ -15,7 +14,7 @@ FunctionNames = Mapping[tuple[int, str], frozenset[str]]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Moved:
-    """A name that means something else in a function or class than it did."""
+    """A name whose meaning has changed in a function or class."""
 
     name: str
     scope: str
@@ -29,12 +28,12 @@ def function_names(data: bytes) -> FunctionNames:
 
 
 def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
-    """`private` is what the compiler puts before private names (`__x`), in a class."""
+    """The same for one table; `private` is what the compiler puts before private names (`__x`) in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
         private = f"_{name}__" if name else ""
     names = set(table.get_identifiers())
-    if table.get_type() == "function" and ".0" not in names:  # the argument of a comprehension
+    if table.get_type() == "function" and ".0" not in names:  # a comprehension's argument
         names |= {name[len(private) - 2 :] for name in names if private and name.startswith(private)}
         yield (table.get_lineno(), table.get_name()), frozenset(names)
     for child in table.get_children():
@@ -42,7 +41,7 @@ def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[in
 
 
 def set_by_functions(data: bytes) -> frozenset[str]:
-    """The names of a module that its functions or classes set, declared `global` there."""
+    """The names of a module that its functions or classes bind, declared `global` there."""
     return frozenset(
         symbol.get_name()
         for table in _below(_table(data))
@@ -58,12 +57,12 @@ def _below(table: SymbolTable) -> Iterator[SymbolTable]:
 
 
 def as_compiled(name: str) -> str:
-    """An identifier as the compiler takes it: `µ` has two code points, which are one to it."""
+    """An identifier as the compiler normalizes it: `µ` has two code points, which are one to it."""
     return unicodedata.normalize("NFKC", name)
 
 
 def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[Moved]:
-    """The names that mean something else after lines were inserted: their numbers in `after`, from 1.
+    """The names whose meaning changed by inserting lines: their numbers in `after`, from 1.
 
     SyntaxError if `after` is not valid.
     """

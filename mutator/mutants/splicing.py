@@ -1,8 +1,8 @@
 """The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
-Edits are whole lines, so everything else keeps its bytes by construction: line ends, tabs, comments, a
-missing newline at the end. A guard also indents the statement it wraps; its tag says how many lines. A line
-with an expression whose value is changed gives way to one that keeps the old line in its tag.
+Edits are whole lines, so everything else keeps its bytes: line ends, tabs, comments, a missing newline at the
+end. A guard also indents the statement it wraps; its tag says how many lines. A line with a changed
+expression is replaced by one that keeps the old line in its tag.
 """
 
 from codecs import BOM_UTF8
@@ -20,9 +20,12 @@ from mutator.mutants.injected_lines import asks, changed_value, import_statement
 
 
 class Rank(IntEnum):
-    """Order of edits between the same two lines: first what follows the upper one, then what precedes the
-    lower one, then what changes that: a guard around it, a line in its place. What follows a whole function
-    comes after what follows the last line in it."""
+    """Order of edits between two lines: what follows the upper one, what precedes the lower one, what changes
+    it.
+
+    Changes are a guard around the lower line or a replacement. What follows a whole function comes after what
+    follows its last line.
+    """
 
     AFTER = 0
     AFTER_WHOLE = 1
@@ -35,7 +38,7 @@ class Rank(IntEnum):
 class Edit:
     """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`.
 
-    One of rank INSTEAD takes the place of that line.
+    An edit of rank INSTEAD replaces that line.
     """
 
     index: int
@@ -47,8 +50,10 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueEdit:
-    """What to write around an expression, which keeps its bytes. Its `start` and `end` are a line and a
-    byte in it, from 0."""
+    """What to write around an expression, which keeps its bytes.
+
+    Its `start` and `end` are a line and a byte in it, from 0.
+    """
 
     start: tuple[int, int]
     end: tuple[int, int]
@@ -101,8 +106,9 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
 def value_change(
     file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
 ) -> ValueEdit:
-    """The edit that has `expression` be worth `changed` (source on one line) while the fault is active: when
-    the probe, `asked`, says so."""
+    """The edit that makes `expression` evaluate to `changed` (source on one line) when the probe, `asked`,
+    says so.
+    """
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
         start=expression.start,
@@ -114,7 +120,7 @@ def value_change(
 
 
 def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
-    """The edits, those of values made into lines, each of which takes the place of one of the target."""
+    """The edits with those of values turned into lines, each of which replaces a line of the target."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
     for one, other in pairwise(values):
@@ -189,8 +195,10 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
 
 
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
-    """Edits from the top of the file to its end; those at one index and rank keep their order, but what
-    follows a whole class comes after what follows the last function in it."""
+    """Edits from the top of the file to its end; those at one index and rank keep their order.
+
+    What follows a whole class comes after what follows its last function.
+    """
     return sorted(edits, key=lambda e: (e.index, e.rank, -_depth(e)))
 
 
@@ -199,7 +207,7 @@ def _depth(edit: Edit) -> int:
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
-    """The edited file as pieces, for `joined`; MutatorError when two guards wrap one statement."""
+    """The edited file as pieces, for `joined`; MutatorError if two guards wrap one statement."""
     pieces: list[Piece] = []
     done = 0
     for edit in in_order(edits):
@@ -235,7 +243,9 @@ def _keep(pieces: list[Piece], lines: tuple[bytes, ...]) -> None:
 
 
 def _indented(lines: Sequence[bytes], unit: bytes) -> tuple[bytes, ...]:
-    """Lines one level deeper. The first gets `unit` after its own indentation, lest tabs and spaces mix."""
+    """Lines one level deeper. The first gets `unit` after its own indentation, so that tabs and spaces do
+    not mix.
+    """
     start = len(_margin(lines[0]))
     first = lines[0][:start] + unit + lines[0][start:]
     return (first, *(unit + line if line.strip() else line for line in lines[1:]))
@@ -264,10 +274,10 @@ def joined(pieces: Iterable[Piece]) -> bytes:
 
 
 def unsplice(data: bytes) -> bytes:
-    """The original bytes of a mutated file: inserted lines removed, changed and guarded ones put back."""
+    """The original bytes of a mutated file: inserted lines removed, changed and guarded ones restored."""
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
-    left = 0  # lines that are still indented by a guard
+    left = 0  # lines still indented by a guard
     margin = unit = b""
     for line in lines:
         tag = tag_of(line)

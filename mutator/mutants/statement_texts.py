@@ -1,4 +1,6 @@
-"""The text of an anchored statement and of the one after it: fault models repeat and reorder statements."""
+"""The text of an anchored statement and of the next one, for fault models that repeat or reorder
+statements.
+"""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -18,10 +20,10 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[str, str]]:
-    """The texts, each on one line, by their names in templates; and the site, which has both statements if
-    the model needs the next one, too.
+    """The texts by their names in templates, each on one line, and the site.
 
-    MutatorError if there is no such statement, or if its lines cannot be moved.
+    The site has both statements if the model needs the next one. MutatorError if there is no such statement,
+    or if its lines cannot be moved.
     """
     anchored, following = _small_statements(file.data).get(site.first, (None, None))
     if anchored is None or site.first == site.last or not site.alone:
@@ -74,8 +76,10 @@ def _unfit(file: ParsedFile, site: Site, what: str) -> MutatorError:
 
 @lru_cache(maxsize=32)
 def _small_statements(data: bytes) -> Mapping[int, tuple[ast.stmt, ast.stmt | None]]:
-    """The small statements that begin a line (from 0), each with the one after it in its block: None if that
-    is none, or shares its lines with another."""
+    """The small statements that begin a line (from 0), each with the next one in its block.
+
+    The next one is None if it is missing or shares its lines with another.
+    """
     return {
         one.lineno - 1: (one, following if _is_fit(one, following, beyond) else None)
         for block in _blocks(ast.parse(data))

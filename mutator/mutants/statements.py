@@ -1,4 +1,4 @@
-"""What a function's statements assign, call and return, and the lines they are on."""
+"""What a function's statements assign, call and return, and their lines."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -15,8 +15,8 @@ from mutator.mutants.scopes import FunctionNames, as_compiled
 class Statement:
     """A small statement; with a `reason`, something that binds or calls but is not a statement, and why.
 
-    Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns has the
-    empty name in `returns`, too: it matches any return. `place` is None if there is a reason.
+    Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also has
+    the empty name in `returns`, which matches any return. `place` is None if there is a reason.
     """
 
     first: int
@@ -30,7 +30,7 @@ class Statement:
     one_line_suite: bool = False
     spanning_string: bool = False
     reason: str | None = None
-    opens: int | None = None  # of what the head of a block binds: the block's first line
+    opens: int | None = None  # for a binding in the head of a block: the block's first line
 
     def names(self, verb: str) -> tuple[str, ...]:
         """The names that it assigns, calls or returns, as `verb` says."""
@@ -81,7 +81,7 @@ def dotted(node: cst.CSTNode | None) -> str | None:
 
 
 def item(node: cst.Subscript) -> str | None:
-    """`a['b']`, as anchors name it; None if something in it is calculated: it could differ the next time."""
+    """`a['b']`, as anchors name it; None if it has a computed part, which could change."""
     text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
     return text if assignable(text) else None
 
@@ -94,7 +94,7 @@ class _Collector(cst.CSTVisitor):
         self.functions: dict[str, list[Function]] = {}
         self.scope: list[str] = []
         self.open: list[list[Statement] | None] = []  # None for a class
-        self.heads: set[int] = set()  # targets in heads of blocks, by their identity
+        self.heads: set[int] = set()  # ids of targets in heads of blocks
 
     def visit_ClassDef(self, node: cst.ClassDef) -> None:  # noqa: N802
         self.scope.append(as_compiled(node.name.value))
@@ -178,7 +178,7 @@ class _Collector(cst.CSTVisitor):
             )
 
     def _add_head(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
-        """What the head of a block binds: its block is where a snippet goes, if that has lines of its own."""
+        """Add what the head of a block binds; the snippet goes into the block if that has its own lines."""
         self.heads.add(id(target))
         statements, names = self.open[-1] if self.open else None, _targets(target)
         if statements is None or not names:
@@ -215,7 +215,7 @@ def _value(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
 
 
 def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
-    """The call that is the statement's whole value, under an `await` or not."""
+    """The call that is the statement's whole value, with or without `await`."""
     value = _value(small)
     if isinstance(value, cst.Await):
         value = value.expression
@@ -241,8 +241,10 @@ def _effects(
 
 
 def _that_stay(names: Sequence[str]) -> Iterator[str]:
-    """The names that are assigned to, each once, but for items of which something is assigned to after them:
-    in `a[i], i = 1, 2` the item is another one then."""
+    """Yield the assigned names without duplicates, and without items whose index is assigned later.
+
+    In `a[i], i = 1, 2`, `a[i]` is another item afterwards.
+    """
     unique = list(dict.fromkeys(names))
     for place, name in enumerate(unique, 1):
         parts = ast.walk(ast.parse(name, mode="eval")) if "[" in name else ()
@@ -270,7 +272,7 @@ def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Itera
 
 
 def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
-    """Whether a string literal runs over the end of a line: its lines must not be indented."""
+    """Whether a string literal spans lines, which must then not be indented."""
     stack: list[cst.CSTNode] = [small]
     while stack:
         node = stack.pop()

@@ -24,12 +24,12 @@ def check_file(manifest: TargetManifest, named: str) -> None:
     if path in manifest.tree.overlaid:
         raise MutatorError(
             f"file '{path}' is in the overlay of target {manifest.name}",
-            expected="a file of the controller: faults are not injected into glue",
+            expected="a file of the controller: glue is no place for a fault",
             remedy="inject somewhere else",
         )
     if matches(path, manifest.forbid):
         raise MutatorError(
-            f"faults are forbidden in file '{path}'",
+            f"file '{path}' is forbidden to faults",
             expected=f"a file that `forbid` of {manifest.path.name} does not match",
             remedy="inject somewhere else",
         )

@@ -90,7 +90,7 @@ def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> 
             raise MutatorError(
                 f"'{path}' is in the overlay and in {root}",
                 where=overlay,
-                expected="files that the root does not have",
+                expected="files that the root has not",
                 remedy="rename the overlay's file",
             )
     files |= laid_over
@@ -114,10 +114,10 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
         check_is_text(path)
         if path.is_symlink() and not path.exists():
             raise MutatorError(
-                f"a dangling link to {path.readlink()}",
+                f"a link to {path.readlink()}, where nothing is",
                 where=path,
                 expected="a file",
-                remedy="correct or remove it, or leave it out of `files`",
+                remedy="mend or remove it, or leave it out of `files`",
             )
         if path.is_file():
             files[found[path]] = path.read_bytes()

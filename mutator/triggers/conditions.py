@@ -68,7 +68,7 @@ def _checked(
         else:
             _function(canonical, names_in(canonical), number)
     except (SyntaxError, RecursionError, MemoryError):
-        raise _refuse("an expression that is too complex", text, variables, "write it shorter") from None
+        raise _refuse("too much in one expression", text, variables, "write it shorter") from None
     return canonical
 
 
@@ -164,9 +164,7 @@ class _Writer:
             if len(node.args) != 1 or node.keywords:
                 raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
             return f"ever({self.boolean(node.args[0])})"
-        raise self._refuse(
-            f"{ast.unparse(node)!r} is not a truth value", "compare it with something: t <= 2.0"
-        )
+        raise self._refuse(f"{ast.unparse(node)!r} is no truth value", "compare it with something: t <= 2.0")
 
     def number(self, node: ast.expr) -> str:
         """A formula: a number, or a choice between two."""

@@ -45,7 +45,7 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
     if uneven.size:
         raise MutatorError(
-            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, to be judged by {formula!r}",
+            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, and {formula!r} to judge it by",
             expected=f"steps of {step_s:g} s, the manifest's `step_s`: a formula of signal temporal logic "
             "counts steps",
             remedy="record even steps, or write the hazard with `when`",

@@ -32,7 +32,7 @@ def test_lists_places(cli: Cli, toy: Workspace) -> None:
     ("where", "words"),
     [
         ("toycar/sensin.py", "no Python file 'toycar/sensin.py' in target toycar"),
-        ("toycar/world.py", "faults are forbidden in"),
+        ("toycar/world.py", "is forbidden to faults"),
         ("toycar/sensing.py::Sensor.sens", "no function 'Sensor.sens'"),
     ],
 )
