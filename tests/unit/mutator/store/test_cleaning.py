@@ -112,7 +112,7 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
     """Neither a link to a run folder nor one in it is followed: what it leads to stays."""
     link = tmp_path / "latest"
     link.symlink_to(run)
-    with pytest.raises(MutatorError, match=r"a link to .*; name the folder"):
+    with pytest.raises(MutatorError, match=r"a link to .*; name the link.s target"):
         clean(link)
     elsewhere = tmp_path / "elsewhere"
     (elsewhere / "S1").mkdir(parents=True)

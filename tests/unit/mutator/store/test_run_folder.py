@@ -109,16 +109,16 @@ def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
     place.unlink(missing_ok=True)
     place.parent.mkdir(exist_ok=True)
     os.mkfifo(place)
-    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+    with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
         locks.owned(folder.path).__enter__()
     place.unlink()
     place.mkdir(parents=True)
-    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+    with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
         locks.owned(folder.path).__enter__()
     place.rmdir()
     head = (folder.path / "run.json").read_bytes()
     place.symlink_to(folder.path / "run.json")
-    with pytest.raises(MutatorError, match=rf"{name}: no file"):
+    with pytest.raises(MutatorError, match=rf"{name}: not a regular file"):
         locks.owned(folder.path).__enter__()
     assert (folder.path / "run.json").read_bytes() == head
 
