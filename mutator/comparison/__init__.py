@@ -1,4 +1,1 @@
-"""Two runs of the same faults, experiment by experiment: what became better, worse, hazardous.
-
-Nothing here runs an experiment or changes a run folder.
-"""
+"""Compares two runs of the same faults by experiment. Runs no experiment and writes to no run folder."""

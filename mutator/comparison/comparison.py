@@ -1,4 +1,4 @@
-"""A comparison of two runs: everything that is said of it, and what a gate finds in it."""
+"""A comparison of two runs: its tables and remarks, and the findings of gates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from mutator.statistics.sheet import Sheet
 
 
 class Gate(StrEnum):
-    """What a gate can fail on: changes for the worse, and experiments that have no partner."""
+    """Reasons for a gate to fail: changes for the worse, and unmatched experiments."""
 
     NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard where there was none
     #: a hazard that did not occur before, in addition to one that did
@@ -44,7 +44,7 @@ class Gate(StrEnum):
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
     NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
     HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, the first has one
-    UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
+    UNMATCHED = "unmatched"  # a contact of at least this class, after a milder one or none
     SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, where it was milder or none before
     SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, where it was milder or none before
     SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, where it was milder or none before
@@ -53,7 +53,7 @@ class Gate(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One experiment that a gate fails on: its id (in the second run, if it is there), and what is wrong."""
+    """An experiment that a gate fails on: its id (in the second run, if it is there) and the problem."""
 
     gate: Gate
     experiment_id: str
@@ -62,7 +62,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two runs, matched. `alerts_notes` say which alerts their fault-free runs raise, too; empty for none."""
+    """Two matched runs. `alerts_notes` say which alerts their fault-free runs also raise; empty for none."""
 
     a: Side
     b: Side
@@ -71,7 +71,7 @@ class Comparison:
 
     @cached_property
     def names(self) -> Names:
-        """What the runs are called: their folders' names, made different where these are the same."""
+        """The runs' display names: their folder names, made distinct if they are equal."""
         a, b = self.a.name, self.b.name
         return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
 
@@ -81,7 +81,7 @@ class Comparison:
 
     @cached_property
     def changed(self) -> tuple[Pair, ...]:
-        """The pairs with any change: new hazards first, then as in `Change`, and as in the plan."""
+        """The pairs with any change: new hazards first, then in the order of `Change` and the plan."""
         order = list(Change)
         changed = (pair for pair in self.pairs if pair.changes)
         return tuple(sorted(changed, key=lambda pair: sorted(map(order.index, pair.changes))))
@@ -99,7 +99,7 @@ class Comparison:
 
     @cached_property
     def remarks(self) -> tuple[str, ...]:
-        """What to know before believing the tables."""
+        """Caveats to read before the tables."""
         noted = zip((self.names.a, self.names.b), self.alerts_notes, strict=True)
         own = tuple(f"{name}: {note}" for name, note in noted if note)
         first = (self.parts_remark,) if self.parts_remark else ()
@@ -107,12 +107,12 @@ class Comparison:
 
     @cached_property
     def parts_remark(self) -> str:
-        """That the runs are unlike parts of a campaign; empty where they are not."""
+        """A remark that the runs are different parts of a campaign; empty if they are not."""
         return parts_remark(self.a, self.b)
 
     @cached_property
     def sheets(self) -> tuple[Sheet, ...]:
-        """The tables, those first that are read first."""
+        """The tables, most important first."""
         frame = frame_of(self.pairs)
         rates, rates_by_type = rates_sheets(frame, self.names)
         spans, spans_by_type = times_sheets(frame, self.names)
@@ -127,7 +127,7 @@ class Comparison:
 
     @cached_property
     def unmatched(self) -> tuple[tuple[str, Experiment], ...]:
-        """What could not be compared, with the reason."""
+        """The experiments that could not be compared, with reasons."""
         m, names = self.matching, self.names
         groups: tuple[tuple[str, Sequence[Experiment]], ...] = (
             (f"only in {names.a}", m.only_a),
@@ -140,7 +140,7 @@ class Comparison:
 
     @property
     def incomplete(self) -> int:
-        """Results that are missing in one run or the other, of experiments that both have planned."""
+        """The number of missing results among experiments that both runs planned."""
         m = self.matching
         return (
             len(m.no_result_a)
@@ -152,9 +152,9 @@ class Comparison:
 def compare(
     run_a: Path, run_b: Path, only: str | None = None, alerts_notes: tuple[str, str] = ("", "")
 ) -> Comparison:
-    """Compare two run folders; `only` chooses experiments by what is known of them before running.
+    """Compare two run folders; `only` filters experiments by plan columns.
 
-    MutatorError when none of them has a partner; CheckFailed when the proof of a run failed.
+    MutatorError if no experiment has a partner; CheckFailed if a run's equivalence check failed.
     """
     a, b = read_side(run_a, only), read_side(run_b, only)
     scale = b.folder.scale if a.folder.scale else None  # both by one scale, or neither
@@ -173,7 +173,7 @@ def compare(
 
 
 def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:
-    """What the gates fail on, in their order."""
+    """The experiments that the gates fail on, in gate order."""
     found: list[Finding] = []
     for gate in gates:
         if gate is Gate.UNMATCHED:
@@ -190,21 +190,21 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
 
 
 def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
-    """The pairs that are in this class of severity, or a worse one, in the second run alone."""
+    """The pairs with at least this severity class only in the second run."""
     for side in (comparison.a, comparison.b):
         if side.folder.scale is None:
             raise MutatorError(
-                f"{side.name} has no classes of severity",
+                f"{side.name} has no severity classes",
                 where=side.folder.path,
                 argument="fail_on",
-                expected="runs of a target whose manifest has `severity`, both planned since it had",
-                remedy="leave out the severity, or run the campaign again",
+                expected="two runs planned with a manifest that has `severity`",
+                remedy="omit the severity gate, or rerun the campaign",
             )
     return tuple(p for p in comparison.pairs if p.usable and p.row_a.severity < least <= p.row_b.severity)
 
 
 def ending_change(pair: Pair) -> str:
-    """What became of a pair: `sdc -> hazard (NEAR 7.10 s after activation)`."""
+    """A pair's results: `sdc -> hazard (NEAR 7.10 s after activation)`."""
     return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
 
 

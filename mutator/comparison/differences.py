@@ -1,7 +1,4 @@
-"""What differs between two runs before any result: their sources, choices and versions.
-
-A difference of results means what it seems to mean only where this list is what one wanted to compare.
-"""
+"""Differences between two runs other than results: sources, choices and versions."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -14,14 +11,14 @@ from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
 from mutator.verification.seal import not_verifiable
 
-_SHORT = 12  # digits of a digest that are shown
+_SHORT = 12  # digits of a digest shown
 _HEAD = ("campaign", "target", "seed", "reading")
 _PARTS = ("limit", "shard", "only", "exclude")  # choices that leave experiments out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Fact:
-    """One thing of both runs."""
+    """A named value of both runs."""
 
     name: str
     a: str
@@ -34,7 +31,7 @@ class Fact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Files:
-    """Files of the target that differ between the runs, by path."""
+    """Target files that differ between the runs, by path."""
 
     changed: tuple[str, ...]
     only_a: tuple[str, ...]
@@ -42,10 +39,10 @@ class Files:
 
 
 def facts(a: Side, b: Side) -> tuple[Fact, ...]:
-    """What the runs were made of: first all that a result depends on, then packages that differ."""
+    """The runs' inputs: all that results depend on, then packages that differ."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
-    if not all("stretches" in side.folder.head for side in (a, b)):  # one of before lists all installed ones
+    if not all("stretches" in side.folder.head for side in (a, b)):  # older runs list all installed packages
         names = {n: None for n in names if not n.startswith("package ") or all(n in head for head in heads)}
     return tuple(Fact(name=n, a=heads[0].get(n, "-"), b=heads[1].get(n, "-")) for n in names)
 
@@ -67,7 +64,7 @@ def _facts(side: Side) -> dict[str, str]:
 
 
 def files(a: RunFolder, b: RunFolder) -> Files | None:
-    """The target's files that differ; None where a run, made before they were written down, does not say."""
+    """The target's files that differ; None if a run is too old to list them."""
     of_a, of_b = (_files(folder.head) for folder in (a, b))
     if of_a is None or of_b is None:
         return None
@@ -84,16 +81,15 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
-    """Which run is not verifiable; what is not the same within pairs although they have one name, with the
-    number of such pairs."""
+    """Runs that cannot be verified, and differences within pairs of equal name, with the number of pairs."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
         ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("wait for another condition", lambda p: p.a.trigger.condition != p.b.trigger.condition),
-        ("hold otherwise, or wait for another time", lambda p: _hold(p.a) != _hold(p.b)),
-        ("drive a scenario with another text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
+        ("have another hold or trigger time", lambda p: _hold(p.a) != _hold(p.b)),
+        ("have a scenario with different text", lambda p: p.a.scenario_digest != p.b.scenario_digest),
         ("have another seed", lambda p: p.a.seed != p.b.seed),
         (
-            "end at their first terminal hazard in only one run, which did not see what came after it",
+            "end at their first terminal hazard in only one run, which lacks what came later",
             lambda p: p.a.after_hazard != p.b.after_hazard,
         ),
     )
@@ -106,8 +102,8 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
 
 
 def parts_remark(a: Side, b: Side) -> str:
-    """That the runs are unlike parts of their campaign, which makes the tables about few of them; empty where
-    the same part was chosen."""
+    """A remark that the runs are different parts of a campaign, so the tables cover only their overlap; empty
+    if they are the same part."""
     of_a, of_b = (
         {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
         for side in (a, b)
@@ -118,18 +114,18 @@ def parts_remark(a: Side, b: Side) -> str:
         f"{side.name} has {', '.join(f'--{name} {value}' for name, value in chosen.items()) or 'all of it'}"
         for side, chosen in ((a, of_a), (b, of_b))
     ]
-    return f"The runs are unlike parts of a campaign: {', '.join(told)}. Only what both have is compared."
+    return f"The runs are different parts of a campaign: {', '.join(told)}. Only their overlap is compared."
 
 
 def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
-    """What to know of the classes of severity: both runs are put into those of the second one."""
+    """Remarks on severity classes: both runs use those of the second."""
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
         (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]
         return (f"Severity is not compared: {without.name} has none.",) if any(scales) else ()
     if scales[0] == scales[1]:
         return ()
-    return (f"The runs have different scales of severity; both are put into the classes of {b.name}.",)
+    return (f"The runs have different severity scales; both use the classes of {b.name}.",)
 
 
 def _hold(experiment: Any) -> tuple[object, ...]:

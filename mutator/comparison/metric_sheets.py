@@ -1,4 +1,4 @@
-"""How bad it was, in both runs: medians of metrics in pairs, classes of severity."""
+"""Tables of how bad both runs were: medians of metrics in pairs, and severity classes."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ NO_CONTACT = "no contact"
 
 
 def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
-    """Of each metric that both runs have, medians, their difference and Wilcoxon's test over the pairs with a
-    value on both sides: of all pairs, and by fault type."""
+    """For each metric that both runs have: medians, their difference and Wilcoxon's test over pairs with a
+    value on both sides, for all pairs and by fault type."""
     whole: list[tuple[Cell, ...]] = []
     parts: list[tuple[Cell, ...]] = []
     units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
@@ -32,16 +32,16 @@ def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tup
         groups = {str(kind): (unit, worse, *_medians(group)) for kind, group in frame.groupby("kind")}
         parts += adjusted(name, groups)
     note = (
-        f"Of pairs with a value on both sides. Difference: the median of {names.b} less that of {names.a}, "
-        "its interval resampled by fault (variant and value; none where all of them say the same). p: "
-        "Wilcoxon's signed-rank test (none where no pair differs)"
+        f"Pairs with a value on both sides. Difference: the median of {names.b} minus that of {names.a}, "
+        "with an interval resampled by fault (variant and value; none if all faults agree). p: "
+        "Wilcoxon's signed-rank test (none if no pair differs)"
     )
     heads = ("unit", "worse", "pairs", names.a, names.b, "difference", "difference, low", "difference, high")
     return whole_and_parts("metrics", "How bad it was", note, ("metric", (*heads, "p")), tuple(whole), parts)
 
 
 def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
-    """The pairs that have a value of a metric on both sides: `kind`, `fault`, `first`, `second`."""
+    """The pairs with a value of a metric on both sides: `kind`, `fault`, `first`, `second`."""
     rows = [
         (by_fault_type(p.row_a), p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name))
         for p in pairs
@@ -58,15 +58,15 @@ def _medians(frame: pd.DataFrame) -> tuple[Cell, ...]:
 
 
 def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """How many pairs had a contact of which class in the first run (lines) and in the second (columns);
-    without lines where there was none."""
+    """Pairs by severity class in the first run (lines) and the second (columns); no lines without
+    contacts."""
     order = [*CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.usable)
     seen = [name for name in order if any(name in pair for pair in counts)]
     return Sheet(
         name="severity",
         title="How severe they were",
-        note=f"Each line is the class of the contact in {names.a}, each column that in {names.b}.",
+        note=f"Lines: severity class in {names.a}. Columns: severity class in {names.b}.",
         heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in seen)),
         lines=tuple((one or NO_CONTACT, *(counts[one, other] for other in seen)) for one in seen)
         if any(seen)

@@ -1,6 +1,6 @@
 "use strict";
-/* Filters the table of changed experiments by text and by kinds of change, and shows the first of what is left;
-   the choice is kept in the fragment. */
+/* Filters the table of changed experiments by text and change, and shows the first matches. The fragment keeps the
+   choice. */
 (() => {
   const place = document.getElementById("changed");
   if (!place) return;
@@ -12,7 +12,7 @@
     row, text: row.textContent.toLowerCase(), changes: [...row.querySelectorAll(".change")].map((e) => e.textContent),
   }));
 
-  /** Show the rows that have all chosen changes and all words, as many as the limit allows. */
+  /** Show the rows with all chosen changes and words, up to the limit. */
   function filter() {
     const chosen = buttons.filter((b) => b.getAttribute("aria-pressed") === "true").map((b) => b.dataset.change);
     const parts = words.value.toLowerCase().split(/\s+/).filter(Boolean);

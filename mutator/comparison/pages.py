@@ -1,4 +1,4 @@
-"""A comparison written down: Markdown, one HTML page that needs nothing else, CSV of pairs and tables."""
+"""Writes a comparison as Markdown, one self-contained HTML page, and CSV files of pairs and tables."""
 
 import csv
 import io
@@ -17,14 +17,14 @@ from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.outcomes.rows import Row
 from mutator.web import asset
 
-LISTED = 50  # experiments of one kind of change that the Markdown names; page and CSV have all
-SHOWN = 500  # rows of the page's table that are seen at once: a browser needs seconds to lay out thousands
+LISTED = 50  # experiments that the Markdown names for each kind of change; page and CSV have all
+SHOWN = 500  # table rows that the page shows at once: browsers need seconds to lay out thousands
 _BAD = frozenset(gate.value for gate in Gate)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Written:
-    """Where a comparison was written."""
+    """The files of a comparison."""
 
     markdown: Path
     page: Path
@@ -32,7 +32,7 @@ class Written:
 
 
 def write(comparison: Comparison, out: Path) -> Written:
-    """Write all forms of the comparison into `out`, made if missing; the same bytes each time."""
+    """Write all forms of the comparison into `out`, which is created if missing; deterministic."""
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
@@ -50,7 +50,7 @@ def pairs_csv(comparison: Comparison) -> bytes:
 
 
 def unmatched_csv(comparison: Comparison) -> bytes:
-    """The experiments that could not be compared, and why."""
+    """The experiments that could not be compared, with reasons."""
     unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
     return _table(unmatched, heads=("why", "experiment", "words"))
 
@@ -66,25 +66,23 @@ def summary(comparison: Comparison) -> str:
     else:
         text += "None of them changed."
     if unusable := sum(not p.usable for p in c.pairs):
-        text += f" {unusable} of them say nothing of their fault in a run (a harness error, or a mutant that "
-        text += "could not be made) and are in no rate."
+        text += f" {unusable} of them have no valid result in one run (a harness error or an invalid mutant) "
+        text += "and are not in the rates."
     if c.unmatched:
         text += " Not compared: " + ", ".join(f"{n} {why}" for why, n in reasons(c)) + "."
     return text
 
 
 def reasons(comparison: Comparison) -> list[tuple[str, int]]:
-    """Why experiments could not be compared, and how many."""
+    """The reasons why experiments could not be compared, with counts."""
     return list(Counter(why for why, _ in comparison.unmatched).items())
 
 
 def files_text(comparison: Comparison) -> str:
-    """Which of the target's files differ, in words."""
+    """The target's files that differ, as text."""
     found = comparison.files
     if found is None:
-        return (
-            "Which files of the target differ is not known: a run was planned before that was written down."
-        )
+        return "It is not known which target files differ: one run is too old to list them."
     parts = {
         "changed": found.changed,
         f"only in {comparison.names.a}": found.only_a,
@@ -110,8 +108,8 @@ def markdown(comparison: Comparison) -> str:
             parts += [f"## {change.value}: {len(pairs)}", _listed(pairs)]
     if c.unmatched:
         parts += ["## Not compared", _reasons(c).as_markdown()]
-        parts.append("Each of them is in `unmatched.csv`.")
-    parts.append("The table of all pairs is `pairs.csv`; `index.html` lists those that changed.")
+        parts.append("They are listed in `unmatched.csv`.")
+    parts.append("All pairs are in `pairs.csv`; `index.html` lists those that changed.")
     return "\n\n".join(parts) + "\n"
 
 
@@ -136,7 +134,7 @@ def _reasons(comparison: Comparison) -> Table:
 
 
 def page(comparison: Comparison) -> str:
-    """The comparison as one HTML page; every text of a run in it is escaped."""
+    """The comparison as one HTML page; all text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -160,12 +158,12 @@ def page(comparison: Comparison) -> str:
 
 
 def style() -> str:
-    """The CSS that the page carries."""
+    """The page's CSS."""
     return asset("base.css") + _own("page.css").replace("LIMIT", str(SHOWN + 1))
 
 
 def script() -> str:
-    """The JavaScript that the page carries."""
+    """The page's JavaScript."""
     return _own("page.js")
 
 
@@ -174,7 +172,7 @@ def _own(name: str) -> str:
 
 
 def _changed(comparison: Comparison) -> Table:
-    """The experiments that changed, as the page lists them; its script filters the rows by their changes."""
+    """The changed experiments as the page lists them; its script filters the rows by change."""
     a, b = comparison.names.a, comparison.names.b
     heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
     return Table(heads=heads, rows=list(map(_changed_row, comparison.changed)), right=(4, 5))
@@ -196,7 +194,7 @@ def _changed_row(pair: Pair) -> tuple[str, ...]:
 
 
 def _ending(row: Row) -> str:
-    """How a run ended, as a badge, then its hazards, alerts and what was said."""
+    """A run's outcome as a badge, then its hazards, alerts and message."""
     from markupsafe import Markup
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]
@@ -213,7 +211,7 @@ def _hazard_time(row: Row) -> str:
 
 
 def pair_line(pair: Pair) -> dict[str, object]:
-    """A pair's line of pairs.csv; times are s of simulation since its start."""
+    """A pair's line of pairs.csv; times are simulated seconds."""
     row = pair.row_b
     line: dict[str, object] = {
         "experiment_a": pair.a.id,

@@ -1,4 +1,4 @@
-"""Experiments of two runs matched, and what changed in each pair."""
+"""Matches the experiments of two runs and classifies the changes in each pair."""
 
 from collections import Counter
 from collections.abc import Iterable
@@ -11,28 +11,28 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.rows import Row
 
 _HARM = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
-_TIME_DIGITS = 6  # of a time from activation: floats apart, equal times are equal
+_TIME_DIGITS = 6  # of a time from activation: absorbs rounding errors
 
 
 class Change(StrEnum):
-    """What may be said of the second run of a pair, against the first."""
+    """A change in the second run of a pair, relative to the first."""
 
-    NEW_HAZARD = "new-hazard"  # a hazard, where there was none
-    OTHER_HAZARD = "other-hazard"  # a hazard that did not come before, beside one that did
-    HIGHER_SEVERITY = "higher-severity"  # a contact of a higher class, or where there was none
+    NEW_HAZARD = "new-hazard"  # a hazard instead of none
+    OTHER_HAZARD = "other-hazard"  # a hazard not in the first run, which had another
+    HIGHER_SEVERITY = "higher-severity"  # a contact of a higher class, or a contact instead of none
     HAZARD_GONE = "hazard-gone"
     LOWER_SEVERITY = "lower-severity"
-    EARLIER_HAZARD = "earlier-hazard"  # the first hazard comes sooner after the activation
+    EARLIER_HAZARD = "earlier-hazard"  # the first hazard comes sooner after activation
     LATER_HAZARD = "later-hazard"
     LOST_ALERT = "lost-alert"
     NEW_ALERT = "new-alert"
-    WORSE = "worse"  # outcome: no effect, sdc, hazard; a new hazard is worse, too
+    WORSE = "worse"  # outcome: no effect, sdc, hazard; includes new hazards
     BETTER = "better"
-    NEW_CRASH = "new-crash"  # the controller crashed, or never came to its end
+    NEW_CRASH = "new-crash"  # the controller crashed or did not finish
     CRASH_GONE = "crash-gone"
-    HARNESS_ERROR = "harness-error"  # no result of the second run's, where the first has one
-    MENDED = "mended"  # a result, where the first run has none
-    OTHERWISE = "otherwise"  # it ended otherwise, which is no better or worse: masked, not activated
+    HARNESS_ERROR = "harness-error"  # no result, although the first run has one
+    MENDED = "mended"  # a result, although the first run has none
+    OTHERWISE = "otherwise"  # a different outcome that is neither better nor worse: masked, not activated
 
 
 @dataclass(frozen=True)
@@ -46,31 +46,31 @@ class Pair:
 
     @property
     def usable(self) -> bool:
-        """Whether both runs say something about the fault."""
+        """Whether both runs have a valid result for the fault."""
         return self.row_a.usable and self.row_b.usable
 
     @cached_property
     def changes(self) -> frozenset[Change]:
-        """All that changed; nothing for a pair with the same result."""
+        """All changes; empty for equal results."""
         return frozenset(_changes(self.row_a, self.row_b))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:
-    """What of two runs can be compared and what not; all lists in the order of the plans."""
+    """The comparable and incomparable experiments of two runs, in plan order."""
 
     pairs: tuple[Pair, ...]
     only_a: tuple[Experiment, ...]  # not in the other run's plan
     only_b: tuple[Experiment, ...]
-    no_result_a: tuple[Experiment, ...]  # planned in both, not run (yet) in this one
+    no_result_a: tuple[Experiment, ...]  # planned in both, not (yet) run in this one
     no_result_b: tuple[Experiment, ...]
-    ambiguous: tuple[Experiment, ...]  # of either run, that have the key of another one of their run
+    ambiguous: tuple[Experiment, ...]  # in either run, with the same key as another experiment of that run
 
 
 def match(a: Side, b: Side) -> Matching:
-    """Match the experiments: first those that are the very same (by id), then the others by their key.
+    """Match the experiments first by id, then by key.
 
-    A key that several experiments of a run have left matches none of them.
+    A key shared by several remaining experiments of a run matches none of them.
     """
     by_id = {e.id: e for e in b.experiments}
     same = {e.id for e in a.experiments if e.id in by_id}
@@ -138,7 +138,7 @@ def _hazard_changes(a: Row, b: Row) -> Iterable[Change]:
 
 
 def time_to_hazard(row: Row) -> float | None:
-    """Time from activation to the first hazard, s; None: there is none."""
+    """Time from activation to the first hazard, s; None without a hazard."""
     if not row.hazards or row.t_activation is None:
         return None
     return round(row.hazards[0][1] - row.t_activation, _TIME_DIGITS)

@@ -1,4 +1,4 @@
-"""The tables of a comparison: what changed, rates and times in pairs."""
+"""The tables of a comparison: changes, rates and times in pairs."""
 
 import math
 from collections import Counter
@@ -16,15 +16,15 @@ from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, P, Sheet
 
 FLAGS = {"activated": "t_activation", "manifested": "t_manifest", "alert": "t_alert", "hazard": "t_hazard"}
-# of an experiment, each counted from its activation; the last from its first alert
+# measured from activation; the last from the first alert
 TIMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
 
 
 def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
-    """A row for each pair in which both runs say something about the fault.
+    """A row for each pair with valid results in both runs.
 
-    `kind` (`sensor/bias`), `fault` (what is resampled: variant and value), flags `activated_a`, `activated_b`
-    and so on, times `activation to hazard_a` and so on, s, NaN: not both of them came.
+    Columns: `kind` (`sensor/bias`), `fault` (the resampling unit: variant and value), flags `activated_a`,
+    `activated_b` etc., times `activation to hazard_a` etc. in s (NaN: one of the events is missing).
     """
     rows = [
         {
@@ -57,22 +57,22 @@ def _span(start: float | None, end: float | None) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """What the two runs are called in tables."""
+    """The names of the two runs in tables."""
 
     a: str
     b: str
 
 
 def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
-    """Rates, their difference and McNemar's exact test of each flag: of all pairs, and of each fault type."""
+    """Rates, differences and McNemar's exact test of each flag, for all pairs and by fault type."""
     whole = tuple((flag, *_rates(frame, flag)) for flag in FLAGS)
     parts: list[tuple[Cell, ...]] = []
     for flag in FLAGS:
         found = {str(kind): _rates(group, flag) for kind, group in frame.groupby("kind")}
         parts += adjusted(flag, found)
     note = (
-        f"Pairs with a result on both sides. Difference: the rate of {names.b} less that of {names.a} "
-        "(of 1), its interval resampled by fault (variant and value; none where all of them say the same). "
+        f"Pairs with a result on both sides. Difference: the rate of {names.b} minus that of {names.a} "
+        "(of 1), with an interval resampled by fault (variant and value; none if all faults agree). "
         "p: McNemar's exact test of the pairs "
         "that differ"
     )
@@ -94,15 +94,15 @@ def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
 
 
 def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
-    """Medians, their difference and Wilcoxon's test of each time: of all pairs, and by fault type."""
+    """Medians, differences and Wilcoxon's test of each time, for all pairs and by fault type."""
     known = {name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIMES}
     whole = tuple((name, *_times(some, name)) for name, some in known.items() if len(some))
     parts: list[tuple[Cell, ...]] = []
     for name, some in known.items():
         parts += adjusted(name, {str(kind): _times(group, name) for kind, group in some.groupby("kind")})
     note = (
-        f"Medians in s. Difference: the median of the pairs' differences, {names.b} less {names.a}, with its "
-        "exact interval (none for fewer than six pairs). p: Wilcoxon's signed-rank test (none where no pair "
+        f"Medians in s. Difference: the median of the pairs' differences, {names.b} minus {names.a}, with "
+        "its exact interval (none for fewer than six pairs). p: Wilcoxon's signed-rank test (none if no pair "
         "differs)"
     )
     heads = ("pairs", names.a, names.b, "difference", "difference, low", "difference, high", "p")
@@ -117,7 +117,7 @@ def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
 
 
 def adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
-    """The lines of one thing by fault type; behind p, which is the last cell, what it is after Holm."""
+    """The lines of one measure by fault type; Holm's adjusted p follows p, the last cell."""
     p_values = {kind: cells[-1] for kind, cells in found.items()}
     known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
     holm_values = dict(zip(known, map(P, holm(list(known.values()))), strict=True))
@@ -132,7 +132,8 @@ def whole_and_parts(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
-    """A table of all pairs, and one by fault type; `heads` are that of the first column, and the rest."""
+    """A table of all pairs and one by fault type. `heads`: the heading of the first column, then the
+    others."""
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),
@@ -147,7 +148,7 @@ def whole_and_parts(
 
 
 def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
-    """How many pairs of each fault type changed how; only changes that there are."""
+    """The number of pairs with each change by fault type; only changes that occur."""
     seen = [change for change in Change if any(change in p.changes for p in pairs)]
     kinds = sorted({by_fault_type(p.row_a) for p in pairs})
     parts = {kind: [p for p in pairs if by_fault_type(p.row_a) == kind] for kind in kinds}
@@ -155,7 +156,7 @@ def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
     return Sheet(
         name="changes",
         title="What changed",
-        note="A pair may have changed in several ways. Same: none of what is listed here changed.",
+        note="A pair can change in several ways. Same: none of these changes.",
         heads=("fault type", "pairs", "same", *(change.value for change in seen)),
         lines=(*lines, _count_line("total", pairs, seen)),
     )
@@ -167,14 +168,14 @@ def _count_line(name: str, pairs: Sequence[Pair], seen: Sequence[Change]) -> tup
 
 
 def endings_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """How many pairs ended how in the first run (lines) and in the second (columns)."""
+    """Pairs by outcome in the first run (lines) and the second (columns)."""
     counts = Counter((p.row_a.ending, p.row_b.ending) for p in pairs)
     order = [*(o.value for o in Outcome), *(s.value for s in Status if s is not Status.OK)]
     before, after = ([e for e in order if any(pair[i] == e for pair in counts)] for i in (0, 1))
     return Sheet(
         name="endings",
         title="How they ended",
-        note=f"Each line is how the experiments ended in {names.a}, each column how in {names.b}.",
+        note=f"Lines: outcome or status in {names.a}. Columns: outcome or status in {names.b}.",
         heads=(f"{names.a} / {names.b}", *after),
         lines=tuple((a, *(counts[a, b] for b in after)) for a in before),
     )

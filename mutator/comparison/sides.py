@@ -1,4 +1,4 @@
-"""The two sides of a comparison: the experiments of a run, and what became of them."""
+"""The two sides of a comparison: a run's experiments and their results."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,9 +16,9 @@ from mutator.verification import equivalence
 
 
 class Key(NamedTuple):
-    """What an experiment is called in any run, whatever its target, reading, setting or seed.
+    """An experiment's identity across runs, independent of target, reading, setting and seed.
 
-    Ids will not do: drawn times, the reading, the setting and the scenario's text are in them, too.
+    Ids are not suitable: they include drawn times, reading, setting and the scenario's text.
     """
 
     spec: str  # with its variant: sensor/bias/distance
@@ -30,9 +30,9 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One run: its folder, the experiments that were planned for it, and the rows of those that have one.
+    """One run: its folder, its planned experiments, and their rows.
 
-    Rows and metrics are by experiment id; of the metrics, by their names, only those that have a value.
+    Rows and metrics are by experiment id. Metrics without a value are left out.
     """
 
     folder: RunFolder
@@ -45,7 +45,7 @@ class Side:
         return self.folder.path.name
 
     def classed(self, scale: Scale | None) -> "Side":
-        """The same run with the contacts in the classes of a scale; in none without one."""
+        """The run with its contacts classified by a scale; unclassified without one."""
         rows = {}
         for name, row in self.rows.items():
             severity = ""
@@ -56,10 +56,10 @@ class Side:
 
 
 def read_side(run: Path, only: str | None = None) -> Side:
-    """The run folder `run`, of its experiments those for which `only` holds (a filter over plan columns).
+    """Read the run folder `run`, with the experiments that match `only` (a filter over plan columns).
 
-    Made from plan and records, so nothing is written into the folder. MutatorError when it is none,
-    CheckFailed when the proof of its engine failed: its results are not to be compared.
+    Uses plan and records, and writes nothing. MutatorError if it is not a run folder; CheckFailed if its
+    equivalence check failed.
     """
     folder = RunFolder.open(run)
     records = folder.records()
@@ -81,6 +81,6 @@ def _metrics(record: Record) -> dict[str, float]:
 
 
 def key_of(experiment: Experiment) -> Key:
-    """What the experiment is matched by."""
+    """The key that an experiment is matched by."""
     fault = experiment.fault
     return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)

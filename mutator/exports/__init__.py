@@ -1,13 +1,10 @@
-"""A run written for other tools: mutation testing viewers, CI servers, spreadsheets, data frames.
-
-What people look at in a browser is in `report`, never here.
-"""
+"""Writes runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
 
 from enum import StrEnum
 
 
 class Format(StrEnum):
-    """What a run can be written as."""
+    """The formats that a run can be written in."""
 
     MUTATION_ELEMENTS = "mutation-elements"  #: JSON that viewers of mutation reports read
     JUNIT = "junit"  #: JUnit XML, as CI servers read it

@@ -1,9 +1,9 @@
-"""A run as a mutation testing report (the mutation-testing-elements schema, version 2).
+"""Writes a run as a mutation testing report (the mutation-testing-elements schema, version 2).
 
-A mutant is a fault at its first location, with its value; one that changes the value of an expression
-replaces that alone. The tests it is put to are drives: a scenario and a
-trigger. *Killed* means that a drive ended in a hazard: the hazard checks are what a fault-free drive passes.
-A high score therefore speaks against the controller, not for it; thresholds are set so that none is green.
+A mutant is a fault at its first location, with its value; a mutant that changes an expression's value
+replaces only the expression. Its tests are runs: a scenario and a trigger. *Killed* means that a run ended in
+a hazard, because fault-free runs pass the hazard checks. So a high score speaks against the controller;
+thresholds are set so that no score is green.
 """
 
 import json
@@ -29,7 +29,7 @@ SCHEMA_VERSION = "2.0"
 
 
 def content(folder: RunFolder, workspace: Workspace) -> bytes:
-    """The report as JSON, the same bytes each time."""
+    """The report as JSON; deterministic."""
     manifest = single_run.manifest_of(workspace, folder)
     return (
         json.dumps(report(folder, manifest, workspace.fault_models()), ensure_ascii=False) + "\n"
@@ -87,15 +87,15 @@ def _line(manifest: TargetManifest, injection: Injection) -> int:
 
 
 def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
-    """What the fault's first injection replaces, and by what."""
+    """What the fault's first injection replaces, and the replacement."""
     first = fault.injections[0]
     file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
     name, span = injection_id(0, first), file.span(first.location)
     if first.location.anchor.kind in VALUE_ANCHORS:
         expression, changed = replaced_value(file, model, first, name)
-        # in parentheses where an operator beside it could tear it apart
+        # in parentheses if an adjacent operator could bind more tightly
         return _located(file, expression.start, expression.end, enclosed(changed))
-    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the statement is left out
+    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the statement is omitted
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
         return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")
@@ -105,8 +105,8 @@ def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict
 def _located(
     file: ParsedFile, start: tuple[int, int], end: tuple[int, int], replacement: str
 ) -> dict[str, Any]:
-    """A replacement for what stands from `start` to `end` (line and byte, from 0), in the schema's places:
-    lines and characters, from 1, the end excluded."""
+    """A replacement of the text from `start` to `end` (line and byte, from 0), in the schema's positions:
+    lines and characters, from 1, end excluded."""
     first, last = (
         {"line": line + 1, "column": len(file.lines[line][:column].decode(file.encoding)) + 1}
         for line, column in (start, end)
@@ -115,7 +115,7 @@ def _located(
 
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
-    """The anchored lines, whole (at a function's entry the line there), and what replaces them."""
+    """The anchored lines as a whole (for a function's entry the line there), and their replacement."""
     first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0
@@ -130,7 +130,8 @@ def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> d
 
 
 def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
-    """Status of a fault over its drives, the reason, and which drives activated it and ended in a hazard."""
+    """Status of a fault over its runs, the reason, the runs that activated it, and those that ended in a
+    hazard."""
     known = {e: records[e.id] for e in experiments if e.id in records}
     of = {status: [r for r in known.values() if r.status is status] for status in Status}
     hazardous = [e for e, r in known.items() if r.hazards]
@@ -164,7 +165,7 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
 
 
 def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
-    """A file of tests for each scenario: its drives, by method and trigger."""
+    """A file of tests for each scenario: its runs, by method and trigger."""
     files: dict[str, Any] = {}
     for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})

@@ -1,8 +1,8 @@
-"""A run as JUnit XML: a suite for each fault type, a case for each experiment.
+"""Writes a run as JUnit XML: a suite for each fault type, a case for each experiment.
 
-A hazard is data, not a failure: every experiment with a result passes, whatever it found, unless its ending
-is among those that one wants to see as failures. A harness error, or a mutant that could not be made, is an
-error; what has not run yet, or was never active, is skipped.
+Hazards are data, not failures: every experiment with a result passes, unless its outcome is listed as a
+failure. Harness errors and invalid mutants are errors; experiments that have not run or were never active are
+skipped.
 """
 
 import re
@@ -22,7 +22,7 @@ _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
-    """The XML, the same bytes each time. MutatorError for an ending that cannot be a failure."""
+    """The XML; deterministic. MutatorError for an outcome that cannot be a failure."""
     known = [ending.value for ending in ENDINGS]
     if strangers := [name for name in failures if name not in known]:
         raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
@@ -65,12 +65,12 @@ def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) ->
 
 
 def _count(element: ET.Element) -> None:
-    """The totals of a suite, or of all suites."""
+    """Set the totals of a suite, or of all suites."""
     element.set("tests", str(len(list(element.iter("testcase")))))
     for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(attribute, str(len(list(element.iter(tag)))))
 
 
 def _clean(text: str) -> str:
-    """The text without characters that XML cannot have."""
+    """The text without characters that XML forbids."""
     return _NO_XML.sub("?", text)

@@ -1,10 +1,9 @@
-"""Experiments as MCAP files: golden and faulty run as two sets of topics, and what happened as messages.
+"""Writes experiments as MCAP files: golden and faulty run as two sets of topics, and events as messages.
 
-A file for each experiment: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each value that is
-kept, `/events` with one for each thing that happened. Messages are JSON and have schemas; log times are
-simulated time in ns. They cannot be below 0: where the run begins before, they count from its first message,
-and the metadata `times` has that message's simulated time. What a run folder has is written: nothing is
-driven.
+Each experiment has a file: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each stored value, and
+`/events`. Messages are JSON with schemas; log times are simulated time in ns. Log times cannot be negative:
+if the run begins before 0, they count from its first message, whose simulated time is in the metadata
+`times`. Only existing data is written; nothing is rerun.
 """
 
 import io
@@ -36,14 +35,14 @@ from mutator.workspace import Workspace
 
 EVENTS = "/events"
 KINDS = ("activation", "last_active", "manifested", "alert", "hazard", "end_of_drive")
-_VALUE: dict[str, Any] = {"type": ["number", "null"]}  # null: no value, or one that is not finite
+_VALUE: dict[str, Any] = {"type": ["number", "null"]}  # null: missing or not finite
 
 Values = list[tuple[float, float]]  # time (s) and value
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """A channel of one run: what is known of it, and its values."""
+    """A channel of one run, with its values."""
 
     name: str
     about: Mapping[str, str]  # unit, role, component, about
@@ -53,21 +52,21 @@ class Topic:
 def write_experiments(
     folder: RunFolder, out: Path, workspace: Workspace | None, only: str | None = None
 ) -> Path:
-    """Write `<id>.mcap` into `out` for each experiment that has a series or a kept trace, or for those of
-    them for which the filter `only` over the columns of the results holds.
+    """Write `<id>.mcap` into `out` for each experiment with a series or a kept trace that matches the filter
+    `only` over results columns.
 
-    MutatorError where the package mcap is missing, and where none has one; MutatorWarning of those without.
+    MutatorError if the package mcap is missing or no experiment has data; MutatorWarning for those without.
     """
     content = Content(folder, workspace)
     wanted = _chosen(folder, only)
     found = [name for name in wanted if content.has(name)]
-    remedy = f"drive one again: `mutator rerun {(wanted or ['ID'])[0]} --run {folder.path} --trace`"
+    remedy = f"rerun one: `mutator rerun {(wanted or ['ID'])[0]} --run {folder.path} --trace`"
     if not found:
         raise MutatorError(
-            f"{counted(len(wanted), 'experiment')}, and none with a series",
+            f"{counted(len(wanted), 'experiment')}, none with a series",
             where=folder.path,
             argument="only",
-            expected="experiments whose series are kept",
+            expected="experiments with stored series",
             remedy=remedy if wanted else "widen `only`",
         )
     if len(found) < len(wanted):
@@ -85,7 +84,7 @@ def write_experiments(
 
 
 class Content:
-    """Makes the files of a run folder's experiments, the same bytes each time."""
+    """Builds the files of a run folder's experiments; deterministic."""
 
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
         self._folder = folder
@@ -98,11 +97,11 @@ class Content:
         return {experiment.id: experiment for experiment in plan_file.read_all(self._folder.path)}
 
     def has(self, experiment_id: str) -> bool:
-        """Whether there is anything to write of an experiment."""
+        """Whether an experiment has data to write."""
         return self._series.has(experiment_id) or self._exact(experiment_id) is not None
 
     def of(self, experiment_id: str) -> bytes:
-        """The file of an experiment: its exact traces where they are kept, else its series."""
+        """The file of an experiment: its exact traces if they are kept, else its series."""
         experiment, record = self._experiments[experiment_id], self._records[experiment_id]
         if (traces := self._exact(experiment_id)) is not None:
             assert self._traces is not None
@@ -119,8 +118,8 @@ class Content:
         return written.finish()
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
-        """The kept traces, where both runs have one; never driven again. MutatorError for one that is not the
-        campaign's: the series would be coarser, and nobody would know."""
+        """The kept traces, if both runs have one; never reruns. MutatorError if a trace is not the
+        campaign's: the series would be silently coarser."""
         kept = self._folder.path / "traces" / experiment_id
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
@@ -132,14 +131,14 @@ class Content:
             raise MutatorError(
                 f"the kept trace of {experiment_id} is not the one of its record",
                 where=faulty,
-                expected="the trace of the campaign's run, whole",
-                remedy=f"drive it again: {making_again(self._folder.path, experiment_id)}, or delete {kept}",
+                expected="the complete trace of the campaign's run",
+                remedy=f"rerun it: {making_again(self._folder.path, experiment_id)}, or delete {kept}",
             )
         return self._traces.of(experiment_id)
 
     def _of_series(self, experiment_id: str) -> tuple[list[Topic], list[Topic]]:
         found = self._series.read(experiment_id)
-        assert found is not None  # `has` was asked
+        assert found is not None  # `has` was checked
         golden, faulty = found
         points = faulty.points
         topics: tuple[list[Topic], list[Topic]] = ([], [])
@@ -169,7 +168,7 @@ class Content:
 
 
 class _Written:
-    """A file under way: messages are collected, and written in the order of their times."""
+    """A file in progress: collects messages and writes them in time order."""
 
     def __init__(self) -> None:
         try:
@@ -229,7 +228,7 @@ class _Written:
 
 
 def _chosen(folder: RunFolder, only: str | None) -> list[str]:
-    """The experiments with a result for which `only` holds, in the order of the table."""
+    """The experiments with a result that match `only`, in table order."""
     frame = Results.up_to_date(folder.path).frame().reset_index()
     if only is None:
         return list(frame["experiment_id"])
@@ -258,7 +257,7 @@ def _pairs(time: np.ndarray, values: np.ndarray) -> Values:
 
 
 def _events(record: Record) -> Iterator[tuple[float, str, str]]:
-    """Time, kind and name of all that happened."""
+    """Time, kind and name of each event."""
     if record.activation:
         yield record.activation.first, "activation", ""
         yield record.activation.last, "last_active", ""

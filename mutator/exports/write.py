@@ -1,4 +1,4 @@
-"""Writes a run in the format that is asked for."""
+"""Writes a run in the requested format."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ FILES = {Format.MUTATION_ELEMENTS: "mutation-elements.json", Format.JUNIT: "juni
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """Which part of a run is written, and how: `failures` are the endings that JUnit is told as failures,
-    `only` is a filter over the columns of the results for MCAP, `table` what CSV and Parquet are of."""
+    """The part of a run to write: `failures` are the outcomes that JUnit reports as failures, `only` is a
+    filter over results columns for MCAP, `table` is the table for CSV and Parquet."""
 
     failures: Sequence[str] = ()
     only: str | None = None
@@ -37,8 +37,8 @@ def export(
     """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file, or the
     folder of several.
 
-    A mutation report shows sources, so it needs the `workspace` with the target that was run; with one, MCAP
-    has the exact traces that are kept. MutatorError for a target that has changed since.
+    A mutation report shows sources, so it needs the `workspace` with the target; MCAP uses it to read kept
+    exact traces. MutatorError for a target that has changed since.
     """
     folder = RunFolder.open(run)
     if parts.only is not None and format is not Format.MCAP:

@@ -1,4 +1,2 @@
-"""What results and runs look like: figures drawn from a frame of results, or from traces.
-
-Nothing here counts, tests, or reads a run folder.
-"""
+"""Figures of results and runs, drawn from frames or traces. Nothing here counts, tests, or reads a run
+folder."""

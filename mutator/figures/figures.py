@@ -1,4 +1,4 @@
-"""The figures of a run: chosen by what there is to compare, written as SVG and PNG."""
+"""The figures of a run, chosen by what can be compared, written as SVG and PNG."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ FOLDER = "figures"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """One figure. `name` is its files', `note` says what is shown, or why there is none.
+    """One figure. `name` is the file name, `note` says what is shown or why there is no figure.
 
-    `codes` are lines to be copied, each with what it is.
+    `codes` are lines to copy, each with a description.
     """
 
     name: str
@@ -31,12 +31,12 @@ class Drawing:
     codes: tuple[tuple[str, str], ...] = ()
 
     def link(self, suffix: str) -> str:
-        """Where the report finds it; `suffix` is svg or png."""
+        """The path from the report; `suffix` is svg or png."""
         return f"{FOLDER}/{self.name}.{suffix}"
 
 
 def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
-    """The figures of a frame of results; none of what has nothing to be compared with."""
+    """The figures of a frame of results that have something to compare."""
     frame = slim(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
@@ -55,7 +55,7 @@ def write_drawings(made: Sequence[Drawing], out: Path) -> None:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:
             save(drawing.figure, paths)
-        else:  # what an earlier report drew is not of these results
+        else:  # drawn by an earlier report from other results
             for path in paths:
                 path.unlink(missing_ok=True)
 
@@ -64,8 +64,8 @@ def _hazards(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="hazards_by_fault_type",
         title="Hazards by fault type",
-        note="Left: runs with a hazard, of all injected. Right: their share of the activated faults; a fault "
-        "type without a mark was never activated.",
+        note="Left: runs with a hazard among all injected. Right: their share of activated faults. Fault "
+        "types without a mark were never activated.",
         figure=hazards.draw(frame),
     )
 
@@ -74,8 +74,8 @@ def _propagation(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="propagation_by_scenario",
         title="Propagation times by scenario",
-        note="From event to event, in the runs that had both (their number stands above). Alert to hazard: "
-        "where the alert came first. Runs that ended before the second event are not shown.",
+        note="Times between events, in runs with both (number above). Alert to hazard: "
+        "only if the alert came first. Runs that ended before the second event are not shown.",
         figure=propagation.draw(frame),
     )
 
@@ -84,7 +84,6 @@ def _heat_map(frame: pd.DataFrame) -> Drawing:
     return Drawing(
         name="fault_type_by_scenario",
         title="Fault type and scenario",
-        note="Runs with a hazard / activated faults. 0/0, without colour: never activated. "
-        "An empty cell had no run.",
+        note="Runs with a hazard / activated faults. 0/0 without colour: never activated. Empty: no run.",
         figure=heat_map.draw(frame),
     )

@@ -1,4 +1,4 @@
-"""Hazards by fault type: how many and which, and of what share of the activated faults."""
+"""Hazards by fault type: counts by hazard, and shares of activated faults."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ SEVERAL = "several"
 
 
 def hazard_sets(frame: pd.DataFrame) -> pd.Series:
-    """The hazard of each run with just one, `several` of one with more, empty of one without."""
+    """The hazard of each run with exactly one, `several` for more, empty for none."""
     names = hazard_names(frame)
     had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
     count = had.sum(axis=1)
@@ -52,7 +52,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
-    """Bars of hazards, cut by which ones; at their ends the count and how many were injected."""
+    """Bars of hazards, divided by hazard, with the count and the number injected at the end."""
     names = hazard_names(frame)
     counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
     injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)

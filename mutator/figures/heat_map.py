@@ -1,4 +1,4 @@
-"""Fault type x scenario: where the hazards are."""
+"""Fault type x scenario: where hazards occur."""
 
 from typing import TYPE_CHECKING
 
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-COLOURS = "cividis"  # even in lightness, the same to colour-blind readers
-DARK_BELOW = 50.0  # %: text is white on a cell that is darker than this, else black
+COLOURS = "cividis"  # perceptually uniform, also for colour-blind readers
+DARK_BELOW = 50.0  # %: text is white on cells below this value, else black
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
@@ -32,7 +32,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[str]) -> "AxesImage":
-    """Cells where nothing was activated stay empty but for their text."""
+    """Cells without activated faults have only text."""
     import numpy as np
 
     groups = {(str(k), str(s)): tally(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
@@ -56,7 +56,7 @@ def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[
 
 
 def _text_colour(rate: float) -> str:
-    """Seen on a cell of that colour (NaN: on none, where it is as all other text)."""
+    """The text colour for a cell of this rate (NaN: no colour, normal text)."""
     if rate != rate:
         return "black"
-    return "white" if rate < DARK_BELOW else "#010101"  # not black, which follows a page's theme
+    return "white" if rate < DARK_BELOW else "#010101"  # not black, which follows the page's theme

@@ -1,6 +1,6 @@
-"""Golden against faulty on one time axis, with marks for trigger, manifestation, alerts and hazards.
+"""Golden and faulty run on one time axis, with marks for trigger, manifestation, alerts and hazards.
 
-Figures of matplotlib without pyplot: no display, no global state, the same bytes each time.
+Uses matplotlib without pyplot: no display, no global state, deterministic.
 """
 
 import io
@@ -24,16 +24,16 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: told apart by colour-blind readers and in grey
+GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: distinguishable in grey and by colour-blind readers
 FAULTY_COLOUR = "#d55e00"
-LATER_COLOUR = "#999999"  # of what comes after the end of the drive
+LATER_COLOUR = "#999999"  # after the end of the drive
 PANEL_HEIGHT = 1.1  # inches
 WIDTH = 9.0
 PNG_DPI = 110
 
 
 class MarkKind(StrEnum):
-    """What happened at a marked time."""
+    """The event at a marked time."""
 
     TRIGGER = "trigger"
     MANIFEST = "manifest"
@@ -52,7 +52,7 @@ MARK_LINES = {MarkKind.TRIGGER: "-", MarkKind.MANIFEST: ":", MarkKind.ALERT: "--
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A vertical line at `t` (s of simulation), and what to call it."""
+    """A vertical line at `t` (s of simulation), with its label."""
 
     kind: MarkKind
     t: float
@@ -60,7 +60,7 @@ class Mark:
 
 
 def marks_of(record: Record) -> tuple[Mark, ...]:
-    """What a record knows of times, earliest first."""
+    """The recorded events, earliest first."""
     marks = []
     if record.activation is not None:
         marks.append(Mark(kind=MarkKind.TRIGGER, t=record.activation.first, label="activated"))
@@ -80,10 +80,10 @@ def draw_run(
     marks: Iterable[Mark] = (),
     end: float | None = None,
 ) -> "Figure":
-    """The manifest's channels of two runs, one panel a channel; `save` writes the figure.
+    """The manifest's channels of two runs, one panel for each; `save` writes the figure.
 
-    What comes after the `end` of the drive (s) is grey, and no axis is made for it. Compared channels
-    (actuators) come first. A channel that either run lacks is left out; MutatorError when none is left.
+    Data after the `end` of the drive (s) is grey and does not affect the axes. Compared channels (actuators)
+    come first. Channels that either run lacks are left out; MutatorError if none is left.
     """
     channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
     if not channels:
@@ -108,7 +108,7 @@ def _figure_type() -> type["Figure"]:
     from matplotlib.figure import Figure
 
     class RunFigure(Figure):
-        """A figure that a notebook shows, whatever back end pyplot has there."""
+        """A figure that notebooks show, whatever pyplot's backend."""
 
         def _repr_png_(self) -> bytes:
             self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
@@ -120,13 +120,13 @@ def _figure_type() -> type["Figure"]:
 def _panel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
-    """One channel: golden broad beneath, faulty narrow above, so that equal lines show in both colours."""
+    """One channel: golden broad below, faulty narrow above, so that equal lines show both colours."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
         driven = np.where(time <= end, finite(values), np.nan)
         axis.plot(time, driven, color=colour, linewidth=width, alpha=alpha, label=label)
-    axis.set_ylim(axis.get_ylim())  # of the drive alone
+    axis.set_ylim(axis.get_ylim())  # limits from the drive only
     for (time, values), _, width, alpha, _ in looks:
         if (time > end).any():
             later = np.where(time >= end, finite(values), np.nan)
@@ -149,7 +149,7 @@ def _decorate(
             axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
     axes[0].set_xlim(left, right)
     top = axes[0]
-    # Names of marks close together would lie on each other, so they take turns on three levels.
+    # Names of close marks would overlap, so they alternate between three levels.
     for i, (mark, colour) in enumerate(zip(marks, colours, strict=True)):
         top.annotate(
             f"{mark.label} {mark.t:.2f}",
@@ -166,13 +166,13 @@ def _decorate(
 
 
 def save(figure: "Figure", paths: Sequence[Path]) -> None:
-    """Write a figure into each of `paths` (.svg or .png by suffix), the same bytes each time."""
+    """Write a figure to each of `paths` (.svg or .png by suffix); deterministic."""
     import matplotlib
 
-    if figure.get_layout_engine() is not None:  # once for all of them: it takes as long as drawing
+    if figure.get_layout_engine() is not None:  # once for all: layout takes as long as drawing
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
-    # A salt and no date: the same run draws the same SVG.
+    # A fixed salt and no date keep the SVG deterministic.
     with matplotlib.rc_context({"svg.hashsalt": "mutator", "svg.fonttype": "none"}):
         for path in paths:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -182,6 +182,6 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
 
 
 def finite(values: Any) -> Any:
-    """Infinities (time headway at standstill) become gaps; everything else stays."""
+    """Replace infinities (time headway at standstill) with gaps."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

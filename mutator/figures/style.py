@@ -1,7 +1,7 @@
-"""How the figures of a report look alike: colours, sizes, the empty page they are drawn on.
+"""The common style of a report's figures: colours, sizes, the blank figure.
 
-A page shows them in its light or dark theme (`themed`). Colours are those of Okabe and Ito, told apart by
-colour-blind readers; methods differ in their markers, too.
+A page shows figures in its light or dark theme (`themed`). Colours are those of Okabe and Ito, which
+colour-blind readers can distinguish; methods also differ in their markers.
 """
 
 from typing import TYPE_CHECKING
@@ -21,12 +21,12 @@ _METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7
 
 
 def method_look(method: str) -> tuple[str, str]:
-    """Colour and marker: a method looks the same in every report, also where it is alone."""
+    """Colour and marker: a method looks the same in every report."""
     return _METHOD_LOOKS[list(Method).index(Method(method)) % len(_METHOD_LOOKS)]
 
 
 def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:
-    """A figure of `height` inches with its axes, row after row."""
+    """A figure of `height` inches with its axes, row by row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -45,7 +45,7 @@ svg { color: #1b2027; --several: #444444; --hazard: #b00020 } text { fill: curre
   svg { color: #e4e8ec; --several: #a5afba; --hazard: #ff9a90 }
 }
 </style>"""
-_THEMED = {  # what is drawn in black or nearly so follows the theme; a white ground lets the page show
+_THEMED = {  # (nearly) black parts follow the theme; a transparent background shows the page
     'style="fill: #ffffff"': 'style="fill: none"',
     "#000000": "currentColor",
     INK: "currentColor",
@@ -56,7 +56,7 @@ _THEMED = {  # what is drawn in black or nearly so follows the theme; a white gr
 
 
 def themed(svg: str) -> str:
-    """A figure's SVG as a page shows it: without a ground, its ink light where the page is dark."""
+    """A figure's SVG for a page: transparent, with light ink on a dark page."""
     for colour, shown in _THEMED.items():
         svg = svg.replace(colour, shown)
     return svg.replace("<defs>", f"{_DARK}<defs>", 1)

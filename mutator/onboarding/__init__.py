@@ -1,2 +1,2 @@
-"""A first library for somebody's controller: what a source tree seems to be, read but never imported, and the
-files that are written for it. What a target truly is, its manifest says; no campaign asks this package."""
+"""Writes a first library for a user's controller from its source tree, which is read but never imported.
+Campaigns do not use this package; they use the manifest."""

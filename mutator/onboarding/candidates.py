@@ -1,4 +1,4 @@
-"""Where in a tree the loop and its values may be: a guess from names, state and calls, best first."""
+"""Guesses where in a tree the loop and its values are, from names, state and calls, best first."""
 
 import ast
 import re
@@ -10,7 +10,7 @@ from mutator.onboarding.survey import Module, Survey
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-_WORDS = {  # names of steps, by how surely they are one
+_WORDS = {  # names of steps, by certainty
     6: "step update control compute_control run_step",
     5: "act compute compute_command drive get_control",
     4: "__call__ tick calculate decide iterate acceleration steering",
@@ -20,16 +20,16 @@ _WORDS = {  # names of steps, by how surely they are one
 _STEP = {word: score for score, words in _WORDS.items() for word in words.split()}
 _CONTROLLER = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
 _WORLD = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
-_MOST_STATE = _MOST_VALUES = 6  # beyond so many, more of them say no more
-_IN_CONTROLLER = 3  # the file is named for a controller
-_NO_HINT = -6  # neither name nor calls say that it is a step
-_NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # calls that give one
+_MOST_STATE = _MOST_VALUES = 6  # more than these do not add certainty
+_IN_CONTROLLER = 3  # the file name suggests a controller
+_NO_HINT = -6  # neither name nor calls suggest a step
+_NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # return numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueCandidate:
-    """A name that is given a number, at a line; `nth` of several assignments in its function (None: the only
-    one)."""
+    """A name that is assigned a number, with its line; `nth` among several assignments in its function (None:
+    the only one)."""
 
     name: str
     line: int
@@ -39,15 +39,15 @@ class ValueCandidate:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopCandidate:
-    """A function that may be what a loop calls in each step, and the values that it works out, best first.
+    """A function that a loop may call in each step, and the values that it computes, best first.
 
-    `needs` are the arguments that it cannot do without, `builds` those of its class's constructor.
+    `needs` are its required arguments, `builds` those of its class's constructor.
     """
 
     module: str
     path: str
     line: int
-    owner: str | None  # its class
+    owner: str | None  # class
     function: str
     needs: tuple[str, ...]
     builds: tuple[str, ...]
@@ -56,12 +56,12 @@ class LoopCandidate:
 
     @property
     def name(self) -> str:
-        """As a fault spec names it: `PID.update`."""
+        """The name in a fault spec: `PID.update`."""
         return f"{self.owner}.{self.function}" if self.owner else self.function
 
 
 def loop_candidates(found: Survey) -> tuple[LoopCandidate, ...]:
-    """Functions that may be the step of a loop, the likeliest first; none that is private."""
+    """Public functions that may be the step of a loop, likeliest first."""
     looped = Counter(name for module in found.modules for name in _called_in_loops(module.tree))
     candidates = [one for module in found.modules for one in _of_module(module, looped)]
     return tuple(sorted(candidates, key=lambda one: (-one.score, one.path, one.line)))
@@ -78,7 +78,7 @@ def _of_module(module: Module, looped: Counter[str]) -> Iterator[LoopCandidate]:
 
 
 def _may_step(function: Function) -> bool:
-    """Whether it is public, and no property, class method, coroutine or empty."""
+    """Whether it is public and not a property, class method, coroutine or empty."""
     if isinstance(function, ast.AsyncFunctionDef):
         return False
     if function.name.startswith("_") and function.name not in _STEP:
@@ -132,7 +132,7 @@ def _class_score(name: str) -> int:
 
 
 def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
-    """The arguments that have no default."""
+    """The arguments without defaults."""
     given = function.args
     positional = [*given.posonlyargs, *given.args]
     positional = positional[: len(positional) - len(given.defaults)]
@@ -142,7 +142,7 @@ def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
 
 
 def _state(owner: ast.ClassDef) -> set[str]:
-    """The attributes that a class's methods give itself."""
+    """The attributes that a class's methods assign on `self`."""
     return {
         target.attr
         for node in ast.walk(owner)
@@ -160,7 +160,7 @@ def _targets(node: ast.AST) -> Iterable[ast.expr]:
 
 
 def _called_in_loops(tree: ast.Module) -> Iterator[str]:
-    """The names of the functions and methods that loops call."""
+    """The names of functions and methods called in loops."""
     for loop in ast.walk(tree):
         if isinstance(loop, ast.For | ast.While):
             for node in ast.walk(loop):
@@ -170,7 +170,7 @@ def _called_in_loops(tree: ast.Module) -> Iterator[str]:
 
 
 def _values(function: Function) -> Iterator[ValueCandidate]:
-    """The names that a function gives numbers, the likeliest first: arithmetic, of a name assigned once."""
+    """The names that a function assigns numbers to, likeliest first: arithmetic, then names assigned once."""
     assigned = [(node, target) for node in _statements(function.body) for target in _targets(node)]
     names = [ast.unparse(target) for _, target in assigned]
     found = []
@@ -186,7 +186,7 @@ def _values(function: Function) -> Iterator[ValueCandidate]:
 
 
 def _statements(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a function in their order, but for those of functions and classes inside."""
+    """The statements of a function in order, without those of nested functions and classes."""
     for node in body:
         yield node
         if isinstance(node, Function | ast.ClassDef):
@@ -198,7 +198,7 @@ def _statements(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _number_score(value: ast.expr | None) -> int:
-    """How surely an expression is a number that the controller works out; 0: it is none."""
+    """The certainty that an expression is a computed number; 0: it is not."""
     if isinstance(value, ast.BinOp):
         return 0 if any(isinstance(n, ast.JoinedStr) or _is_text(n) for n in ast.walk(value)) else 4
     if isinstance(value, ast.UnaryOp):

@@ -1,4 +1,4 @@
-"""The places of a generated library that are still for its owner to fill in."""
+"""Finds the places of a generated library that its owner must still fill in."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +9,7 @@ MARK = "TODO(init)"
 
 
 def unfilled(library: Path) -> Iterator[MutatorError]:
-    """Every line of the library's YAML and Python that has the mark, in the order of the files."""
+    """Every line of the library's YAML and Python that has the mark, in file order."""
     for path in sorted(library.rglob("*")):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
@@ -21,12 +21,12 @@ def unfilled(library: Path) -> Iterator[MutatorError]:
                     f"not filled in: {_whole(text, lines[number:])}",
                     where=path,
                     line=number,
-                    remedy=f"do so, and delete the comment with {MARK}",
+                    remedy=f"fill it in, and delete the comment with {MARK}",
                 )
 
 
 def _whole(text: str, following: list[str]) -> str:
-    """A comment with the comments on the lines right below it."""
+    """A comment together with the comments on the lines directly below."""
     words = [text.strip()]
     for line in map(str.strip, following):
         if not line.startswith("# ") or MARK in line:

@@ -17,7 +17,7 @@ from mutator.onboarding.candidates import LoopCandidate, loop_candidates
 from mutator.onboarding.marks import MARK
 from mutator.onboarding.survey import Survey
 
-MOST_SHOWN = 5  # candidates for the loop; values of each
+MOST_SHOWN = 5  # candidates for the loop, and values of each
 _TIME_STEPS = ("dt", "delta_t", "time_step", "timestep")
 _FILES = {
     "README.md": "README.md",
@@ -30,8 +30,8 @@ _FILES = {
 
 
 def write_library_for(found: Survey, folder: Path) -> None:
-    """Write the files into a new or empty folder; MutatorError for one that holds anything. A MutatorWarning
-    says so if the source has nothing that may be a controller's step."""
+    """Write the files into a new or empty folder; MutatorError if it has content. MutatorWarning if no
+    function in the source looks like a controller's step."""
     make_empty(folder)
     words = _words(found, folder.resolve())
     templates = Environment(
@@ -40,7 +40,7 @@ def write_library_for(found: Survey, folder: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,  # what is written is YAML, Python and Markdown
+        autoescape=False,  # output is YAML, Python and Markdown
     )
     templates.filters["yaml"] = _as_yaml
     for template, place in _FILES.items():
@@ -53,22 +53,22 @@ def write_library_for(found: Survey, folder: Path) -> None:
 
 
 def _nothing_found(found: Survey) -> str:
-    """That no controller was found, and why."""
+    """The warning that no controller was found, with reasons."""
     why = [f"{place} cannot be read: {problem}" for place, problem in found.unread[:MOST_SHOWN]]
     if found.modules:
         why.insert(0, f"no function in {counted(len(found.modules), 'file')} looks like a step")
-    reasons = "; ".join(why) or "no Python but tests and the like"
+    reasons = "; ".join(why) or "no Python files except tests and the like"
     return f"{found.installed or found.root}: no controller found: {reasons}; fill in the files by hand"
 
 
 def _as_yaml(text: str) -> str:
-    """A text as a YAML value: quoted where it would be something else."""
+    """A text as a YAML value, quoted if necessary."""
     plain = re.fullmatch(r"[\w./][\w./ -]*", text) and yaml.safe_load(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 
 
 def _words(found: Survey, folder: Path) -> dict[str, Any]:
-    """What the templates say."""
+    """The variables of the templates."""
     candidates = loop_candidates(found)[:MOST_SHOWN]
     title = found.installed or (found.packages[0] if len(found.packages) == 1 else found.root.name)
     name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower()
@@ -96,7 +96,7 @@ def _words(found: Survey, folder: Path) -> dict[str, Any]:
 
 
 def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
-    """What the entry and the first fault say of the likeliest step of the loop."""
+    """The variables for the likeliest step of the loop, in the entry and the first fault."""
     if best is None:
         return dict.fromkeys(
             ("module", "imported", "builder", "call", "path", "function", "value", "others"), ""
@@ -128,7 +128,7 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
 
 
 def _arguments(best: LoopCandidate) -> str:
-    """The state for the first argument that is needed, a place to fill in for every other but a time step."""
+    """The state for the first required argument, and a placeholder for every other except a time step."""
     first, *others = best.needs or ("",)
     texts = [f"{name}={'self.step_s' if name in _TIME_STEPS else '...'}" for name in others]
     return ", ".join(["state", *texts]) if first else ""

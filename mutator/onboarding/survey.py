@@ -1,4 +1,4 @@
-"""What a source tree holds: its packages, its flat modules and their syntax trees. Nothing is imported."""
+"""Surveys a source tree: packages, flat modules and their syntax trees. Nothing is imported."""
 
 import ast
 import keyword
@@ -22,24 +22,24 @@ _NO_MODULES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Module:
-    """A file of Python: its path relative to the root, and its syntax tree."""
+    """A Python file: its path relative to the root, and its syntax tree."""
 
     path: str
     tree: ast.Module
 
     @property
     def name(self) -> str:
-        """What it is imported as."""
+        """The import name."""
         return self.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """A source tree, as a manifest would name it.
+    """A source tree in a manifest's terms.
 
-    `root` is the folder that goes on `sys.path`, `packages` are import packages and flat modules (`drive.py`)
-    in it. `modules` could be read, `unread` could not: path and line, and why. `requires` is the installed
-    distribution that the tree is of, as a requirement.
+    `root` is the folder for `sys.path`; `packages` are its import packages and flat modules (`drive.py`).
+    `modules` were read; `unread` were not: path and line, and reason. `requires` is the tree's installed
+    distribution, as a requirement.
     """
 
     root: Path
@@ -51,7 +51,7 @@ class Survey:
 
 
 def look_at(target: str) -> Survey:
-    """Look at a folder, or at the package `installed:NAME`. MutatorError where there is no such thing."""
+    """Survey a folder, or the package `installed:NAME`. MutatorError if it does not exist."""
     if target.startswith(INSTALLED):
         return _installed(target.removeprefix(INSTALLED))
     folder = Path(target).resolve()
@@ -76,25 +76,25 @@ def _installed(name: str) -> Survey:
         raise MutatorError(
             f"no installed package '{name}'",
             argument="target",
-            expected="the name that Python code imports it by",
-            remedy="install it beside mutator, or correct the name",
+            expected="its import name in Python",
+            remedy="install it in mutator's environment, or correct the name",
         )
     return replace(_of(place.parent, (place.name,)), installed=name, requires=_distribution(name))
 
 
 def _distribution(name: str) -> str | None:
-    """The installed distribution of an import package, and that it is at least of this version."""
+    """The installed distribution of an import package, with its version as the minimum."""
     owners = metadata.packages_distributions().get(name)
     return f"{owners[0]}>={metadata.version(owners[0])}" if owners else None
 
 
 def _packages_in(folder: Path) -> Iterator[str]:
-    """Packages, with or without `__init__.py`, and flat modules of a folder, but for tests and the like."""
+    """Packages, with or without `__init__.py`, and flat modules of a folder, without tests and the like."""
     try:
         entries = sorted(folder.iterdir())
     except OSError as err:
         raise MutatorError(
-            f"cannot be looked at ({err.strerror})", where=folder, remedy="check its permissions"
+            f"cannot be read ({err.strerror})", where=folder, remedy="check its permissions"
         ) from None
     for path in entries:
         stem = path.name.removesuffix(".py")
@@ -108,7 +108,7 @@ def _packages_in(folder: Path) -> Iterator[str]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Files of Python below a folder, but for tests, hidden folders and environments."""
+    """Python files below a folder, without tests, hidden folders and environments."""
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(n for n in folders if _importable(n) and n not in _NOT_THE_CONTROLLER)
         if "pyvenv.cfg" in names:
@@ -118,7 +118,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _is_module(path: Path) -> bool:
-    """Whether a file can be imported, by its name."""
+    """Whether the file name allows an import."""
     return path.suffix == ".py" and _importable(path.stem) and path.is_file()
 
 
@@ -128,7 +128,7 @@ def _importable(name: str) -> bool:
 
 def _parsed(path: Path) -> ast.Module:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of the controller's own style
+        warnings.simplefilter("ignore")  # about the controller's code
         return ast.parse(path.read_bytes())
 
 
@@ -139,10 +139,10 @@ def _of(root: Path, packages: tuple[str, ...]) -> Survey:
         for path in [root / name] if name.endswith(".py") else _files(root / name):
             if len(modules) + len(unread) == _MOST_FILES:
                 raise MutatorError(
-                    f"more than {_MOST_FILES} files of Python",
+                    f"more than {_MOST_FILES} Python files",
                     where=root,
                     expected="the source of one controller",
-                    remedy="name the folder of a part of it",
+                    remedy="use a subfolder",
                 )
             relative = path.relative_to(root).as_posix()
             try:

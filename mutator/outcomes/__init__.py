@@ -1,4 +1,1 @@
-"""The outcome of a run: golden runs, differences from them, verdicts, and the table of results.
-
-Nothing here runs anything or compares two campaigns.
-"""
+"""The outcome of a run: golden runs, differences from them, verdicts, and the results table. Runs nothing."""

@@ -1,7 +1,7 @@
-"""The results table counted, a column at a time: how many faults were activated, manifested, did harm.
+"""Counts in the results table by column: faults activated, manifested, harmful.
 
-`texts` is what `Results.texts` gives. An experiment whose harness failed, or whose mutant could not be made,
-says nothing about its fault: it is counted apart and is in no other number.
+`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted separately and excluded
+from all other numbers.
 """
 
 from collections.abc import Mapping
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 
 def endings(texts: "pd.DataFrame") -> "pd.Series[str]":
-    """Of each row the outcome of a run that worked, the status of one that did not."""
+    """For each row the outcome of a successful run, or the status of a failed one."""
     worked = (texts["status"] == Status.OK.value) & (texts["outcome"] != "")
     return texts["outcome"].where(worked, texts["status"])
 
 
 def outcome_counts(texts: "pd.DataFrame") -> dict[str, int]:
-    """How many rows ended how: outcomes of the runs that worked, statuses of those that did not."""
+    """Rows by outcome of successful runs and by status of failed ones."""
     seen = endings(texts).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
     return {name: int(seen[name]) for name in order if name in seen}
 
 
 def hazard_names(texts: "pd.DataFrame") -> tuple[str, ...]:
-    """Every hazard that was looked for: one that never came is a result too."""
+    """Every hazard that was checked, including those that never occurred."""
     return tuple(sorted(name for name in hazards_in(texts.columns) if (texts[name.lower()] != "").any()))
 
 
 def came(texts: "pd.DataFrame", hazard: str) -> "pd.Series[bool]":
-    """In which rows a hazard that was looked for came."""
+    """The rows in which a checked hazard occurred."""
     name = hazard.lower()
     return (texts[name] != "") & (texts[f"t_{name}"] != "")
 
@@ -45,7 +45,7 @@ def kinds(texts: "pd.DataFrame") -> "pd.Series[str]":
 
 
 def counts_by(texts: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
-    """One count for each of the `groups` that rows are in, in order of their names, and the total last."""
+    """One count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
     hazards = hazard_names(texts)

@@ -1,4 +1,4 @@
-"""What a run folder's fault-free runs do by themselves: hazards, alerts, how far each channel goes."""
+"""The hazards, alerts and channel ranges of a run folder's fault-free runs."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -16,18 +16,18 @@ Events = tuple[tuple[str, float], ...]  # (name, s of simulation)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultFreeRun:
-    """One of them. `ranges` are the least and the largest value of each plotted channel that it recorded."""
+    """One fault-free run. `ranges` are the minimum and maximum of each recorded plotted channel."""
 
     scenario: str
     changes: tuple[str, ...]
-    seed: int | None  # None: that of the run folder
+    seed: int | None  # None: the run folder's seed
     hazards: Events
     alerts: Events
     ranges: tuple[tuple[str, float, float], ...]
 
 
 def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
-    """Those of a run folder, by name. MutatorError where one cannot be read."""
+    """The fault-free runs of a run folder, by name. MutatorError if one cannot be read."""
     found = []
     for one in sorted(folder.goldens):
         place = folder.golden(*one)
@@ -46,8 +46,8 @@ def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultF
 
 
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Table:
-    """A line for each run: its alerts, if the target has some, and hazards with their first times, and the
-    range of each channel."""
+    """A line for each run: its alerts (if the target has any) and hazards with first times, and channel
+    ranges."""
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
     rows = []
     for run in runs:
@@ -60,7 +60,7 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
-    """Which alerts the fault-free runs raise, as a sentence for whatever counts alerts; empty if none."""
+    """A sentence on the alerts that fault-free runs raise, for tables that count alerts; empty if none."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, _ in run.alerts:
@@ -68,12 +68,12 @@ def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
     if not scenarios:
         return ""
     told = "; ".join(f"{name} in {', '.join(scenarios[name])}" for name in sorted(scenarios))
-    return f"Not every alert is a fault's doing: fault-free runs raise {told}."
+    return f"Not every alert is caused by a fault: fault-free runs raise {told}."
 
 
 def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
-    """The names of the alerts that fault-free runs raise, by scenario and seed ('': that of the run folder);
-    those of a scenario with and without changes together."""
+    """The alerts that fault-free runs raise, by scenario and seed ('': the run folder's); runs of a scenario
+    with and without changes are combined."""
     names: dict[tuple[str, str], frozenset[str]] = {}
     for run in runs:
         key = (run.scenario, "" if run.seed is None else str(run.seed))

@@ -1,4 +1,4 @@
-"""Golden runs and how a faulty run differs from them."""
+"""Loads golden runs and compares faulty runs with them."""
 
 import json
 import sys
@@ -28,13 +28,13 @@ _TINY = 1e-9  # s
 
 
 class BadOutput(MutatorError):
-    """A run ended well but did not leave the trace or record that the manifest promises."""
+    """A run that finished without the trace or record that the manifest promises."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """Where a trace leaves golden: time of the first difference beyond tolerance (s), and the largest
-    difference of each compared channel, in the whole run and (`dev`) up to the end of the drive."""
+    """How a trace differs from golden: time of the first difference beyond tolerance (s), and the largest
+    difference of each compared channel in the whole run and (`dev`) up to the end of the drive."""
 
     t_first: float | None
     max_dev: tuple[tuple[str, float], ...]
@@ -56,8 +56,8 @@ def load_trace(
     channels: Sequence[Channel] | None = None,
     also: Sequence[Channel] = (),
 ) -> Trace:
-    """Channels (default: all that there are) and time of the trace in the output folder `out`; channels in
-    `also` may be missing."""
+    """Channels (default: all) and time of the trace in the output folder `out`; channels in `also` may be
+    missing."""
     path = out / manifest.trace_file
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
@@ -68,7 +68,7 @@ def load_trace(
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
     except MutatorError:
         raise
-    except Exception as err:  # a run may write anything, and readers fail at it in any way
+    except Exception as err:  # a run can write anything, and readers fail in many ways
         _check_is_of_output(err)
         raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected=kind) from None
     _check_arrays(trace, manifest, path)
@@ -79,7 +79,7 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
     times = {own_times(name) for name in trace}
     for name, values in trace.items():
         if values.dtype.kind not in "biuf":
-            raise BadOutput(f"channel {name} of something else than numbers", where=path)
+            raise BadOutput(f"channel {name} is not numeric", where=path)
         wanted = values if name in times else times_of(trace, name, manifest.time_channel)
         if values.ndim != 1 or values.shape != wanted.shape:
             raise BadOutput("channels of different lengths", where=path, expected="one value per step")
@@ -88,17 +88,17 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
         if not (np.isfinite(values).all() and (np.diff(values) >= 0.0).all()):
             channel = name.removesuffix(own_times(""))
             raise BadOutput(
-                f"times of {channel} that go back or are none", where=path, expected="s, in order"
+                f"times of {channel} that decrease or are missing", where=path, expected="s, in order"
             )
 
 
 def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
-    """The times (s) of a channel's values: its own, or those of the steps, in the channel `time`."""
+    """The times (s) of a channel's values: its own, or those of the steps in the channel `time`."""
     return trace.get(own_times(channel), trace[time])
 
 
 def until(trace: Trace, end: float, time: str) -> Trace:
-    """A trace up to a time, s."""
+    """A trace cut at a time, s."""
     cut = {}
     for name, values in trace.items():
         times = values if name.endswith(own_times("")) else times_of(trace, name, time)
@@ -107,7 +107,7 @@ def until(trace: Trace, end: float, time: str) -> Trace:
 
 
 def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
-    """A channel's value in each step: the newest one of a channel with times of its own, NaN before its
+    """A channel's value at each step; for a channel with its own times the newest value, NaN before its
     first."""
     own = trace.get(own_times(channel))
     return trace[channel] if own is None else _newest(own, trace[channel], steps)
@@ -118,8 +118,8 @@ def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray
 
 
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
-    """What the target itself said about a run in `out`: hazards, alerts, and more; nothing, where the
-    manifest names no record."""
+    """The target's own record of a run in `out`: hazards, alerts and more; empty if the manifest names no
+    record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
     path = out / manifest.record_file
@@ -138,17 +138,18 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Shortage where an output could not be read for want of memory or files here: not the run's doing."""
+    """Raise Shortage if an output could not be read because memory or files ran out here, which is not the
+    run's fault."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
                 bytes(_TRIAL)
-                return  # there is plenty: a trace that says that it is larger than memory
+                return  # memory is plentiful: the trace claims to be larger
         raise short from err
 
 
 def _why(err: Exception) -> str:
-    """The error without the path in it, which differs from run to run."""
+    """The error without its path, which differs between runs."""
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 
@@ -165,27 +166,27 @@ def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
 
 
 def _events(record: Mapping[str, Any]) -> Any:
-    """Every raise of an alert, or its first ones, whichever the record has."""
+    """All raises of alerts, or only the first ones, depending on the record."""
     return record.get("alert_events") or record.get("alerts") or []
 
 
 def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
-    """(alert, time) of every raise that the record knows, of the alerts that count."""
+    """(alert, time) of every recorded raise of a counted alert."""
     return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
 def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
-    """The faulty trace, whose channel `time` is golden's own where they are the same: no comparison of a
-    channel needs to look at the times then."""
+    """The faulty trace with golden's `time` channel object if both are equal, so that comparisons can skip
+    times."""
     return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
 
 
 def compare(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None = None
 ) -> Difference:
-    """Compare channels value by value; NaN equals NaN. Traces of two lengths differ where one ends, and
-    values that come at other times where the first of them does. `t_end` is the end of the drive, if it has
-    one before that of the run."""
+    """Compare channels value by value; NaN equals NaN. Traces of different lengths differ from the shorter's
+    end, and values at different times from the first of these. `t_end` is the end of the drive, if it is
+    before that of the run."""
     end = np.inf if t_end is None else t_end + _TINY
     first = end_of_shorter(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
@@ -201,7 +202,7 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """|faulty - golden| of a channel at the times that both runs have. `t_first` is when it first exceeds the
+    """|faulty - golden| of a channel at the times of both runs. `t_first` is when it first exceeds the
     tolerance or its times differ; infinite: never."""
 
     at: np.ndarray
@@ -209,18 +210,18 @@ class Deviation:
     t_first: float
 
     def largest(self, end: float = np.inf) -> float:
-        """The largest one up to a time."""
+        """The largest deviation up to a time."""
         return float(self.values[self.at <= end].max(initial=0.0))
 
 
 def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Deviation:
-    """How a channel of a run differs from golden."""
+    """The deviation of a run's channel from golden."""
     times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
     values = [golden[channel.name], faulty[channel.name]]
     at, values = _on_same_times(times, values)
     apart = values[0] != values[1]
     begin = int(apart.argmax()) if apart.size else 0
-    if not apart[begin : begin + 1].any():  # as most channels are
+    if not apart[begin : begin + 1].any():  # true for most channels
         return Deviation(at[:0], at[:0], _other_times(*times))
     at, values = at[begin:], [one[begin:] for one in values]
     values_apart = _deviation(*values)
@@ -230,7 +231,7 @@ def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Devi
 
 
 def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """When the times of two runs first differ, or one has ended; infinite where they are the same."""
+    """When the times of two runs first differ or one ends; infinite if they are equal."""
     if golden is faulty:
         return np.inf
     rows = min(len(golden), len(faulty))
@@ -241,16 +242,14 @@ def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
 
 
 def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """The first time that one run has and the other, which has ended, has not; infinite where both are as
-    long."""
+    """The first time that only the longer run has; infinite for equal lengths."""
     rows = min(len(golden), len(faulty))
     longer = max(golden, faulty, key=len)
     return float(longer[rows]) if rows < len(longer) else np.inf
 
 
 def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Times that both runs have, with the values of each; where the times differ, at all of them, the newest
-    value of each."""
+    """Times of both runs with the values of each; if the times differ, all times with the newest values."""
     if times[0] is times[1]:
         return times[0], values
     rows = min(map(len, times))
@@ -261,7 +260,7 @@ def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[n
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """|faulty - golden|, 0 where both are the same number, infinity or NaN; infinite where one is none."""
+    """|faulty - golden|, 0 if both are the same number, infinity or NaN; infinite if only one is NaN."""
     golden, faulty = golden.astype(float), faulty.astype(float)
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
     with np.errstate(invalid="ignore", over="ignore"):

@@ -1,4 +1,4 @@
-"""What a run came to: its hazards, where its drive ended, and its metrics, from trace and record."""
+"""Judges a run from trace and record: hazards, the end of the drive, and metrics."""
 
 import math
 from collections.abc import Mapping
@@ -23,10 +23,9 @@ _TINY = 1e-9  # s; times are sums of steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """`hazards` are (name, first time) of those that came; `alerts` (name, time) of every raise. `t_end` is
-    when a terminal hazard ended the drive (None: none did). `metrics` are numbers, margins among them; one
-    that has no value is left out. Times are in s.
-    """
+    """`hazards` are (name, first time); `alerts` are (name, time) of every raise. `t_end` is when a terminal
+    hazard ended the drive, or None. `metrics` are numbers, including margins; metrics without a value are
+    left out. Times are in s."""
 
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[tuple[str, float], ...]
@@ -35,22 +34,22 @@ class Judged:
 
 
 def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
-    """The run in the output folder `out`: those of the manifest's channels that it recorded, and what it came
-    to. BadOutput for one that left no trace or record, or none that can be judged."""
+    """The recorded channels and the judgement of the run in the output folder `out`. BadOutput if trace or
+    record is missing or cannot be judged."""
     trace = load_channels(manifest, out)
     return trace, judge_run(manifest, trace, load_record(manifest, out))
 
 
 def load_channels(manifest: TargetManifest, out: Path) -> Trace:
-    """Every channel of the manifest that the run in `out` recorded; BadOutput where one is missing that its
-    verdict needs."""
+    """The manifest's channels that the run in `out` recorded; BadOutput if one needed for the verdict is
+    missing."""
     needed = {*manifest.compared, *manifest.judged}
     others = [channel for channel in manifest.channels if channel not in needed]
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
 
 def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:
-    """What a run came to. `trace` has at least the channels that the manifest judges by."""
+    """Judge a run. `trace` must have the channels that the manifest judges by."""
     values = values_of(manifest, trace)
     hazards, metrics = [], []
     ends: dict[str, float] = {}
@@ -80,9 +79,9 @@ def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any])
 
 
 def values_of(manifest: TargetManifest, trace: Trace) -> Values:
-    """What the manifest's formulas are over, a number for each step: time, channels, derived values.
+    """The variables of the manifest's formulas, a number for each step: time, channels, derived values.
 
-    A channel with times of its own keeps its newest value; before the first it has none (NaN).
+    A channel with its own times keeps its newest value; before its first it has none (NaN).
     """
     time = np.asarray(trace[manifest.time_channel], dtype=float)
     values = {TIME: time}
@@ -105,7 +104,7 @@ def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.
 def _first(
     hazard: Hazard, values: Values, robust: np.ndarray | None, record: Mapping[str, Any]
 ) -> float | None:
-    """When a hazard first came."""
+    """The first time of a hazard."""
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
     holds = robust < 0.0 if robust is not None else over_time.holds(hazard.when, values)
@@ -113,7 +112,7 @@ def _first(
 
 
 def _lasting(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
-    """Whether a condition has held for so long."""
+    """Whether a condition has held for `for_s`."""
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))
@@ -127,7 +126,7 @@ def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
 
 
 def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
-    """When the drive is over because of a hazard; None: it is not."""
+    """When a hazard ends the drive; None: it does not."""
     if hazard.terminal == "True":
         return first
     if not hazard.terminal:
@@ -142,9 +141,9 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
 
 
 def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
-    """One number of a metric's values up to the end of the drive; None where there is nothing to tell.
+    """A metric's aggregate up to the end of the drive; None without values.
 
-    Sums are exact (`fsum`), so they do not depend on how a processor adds.
+    Sums are exact (`fsum`), so they do not depend on the processor.
     """
     time = values[TIME]
     driven = time <= (math.inf if t_end is None else t_end + _TINY)
@@ -154,7 +153,7 @@ def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float
     if metric.where:
         counts &= over_time.holds(metric.where, values)
     if metric.aggregate in ("integral", "duration"):
-        until = np.append(time[1:], time[-1:])  # each value lasts until the next step, or the drive's end
+        until = np.append(time[1:], time[-1:])  # each value lasts until the next step or the end of the drive
         lengths = np.minimum(until, math.inf if t_end is None else max(t_end, time[0])) - time
         return math.fsum((numbers * lengths)[counts].tolist())
     kept = numbers[counts]

@@ -1,9 +1,9 @@
-"""The path of a fault: from the components that it was injected into, along the control structure, to the
-controlled process.
+"""The path of a fault: from the components with the injection along the control structure to the controlled
+process.
 
-Feedback is no part of the path, so links out of the process and those of people are left out, and those that
-are not studied. A component of the path that left golden only after the process had is taken for one that the
-feedback changed, where feedback can have come to it, and did so no later than the fault along the path.
+The path excludes feedback: links out of the process, links of people, and links that are not studied. A
+component that left golden only after the process had counts as changed by feedback, if feedback can have
+reached it no later than the fault along the path.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -23,14 +23,14 @@ from mutator.targets.channels import Role
 
 
 class State(StrEnum):
-    """What became of the fault at a component."""
+    """The fault's effect at a component."""
 
     INJECTED = "injected"
-    REACHED = "reached"  # a channel of it left golden
-    PASSED = "passed"  # it has channels, and none left golden, but what it alone feeds did
-    FEEDBACK = "feedback"  # a channel of it left golden, but only after the process had
+    REACHED = "reached"  # one of its channels left golden
+    PASSED = "passed"  # none of its channels left golden, but a component that only it feeds did
+    FEEDBACK = "feedback"  # one of its channels left golden, but only after the process had
     HELD = "held"  # it has channels, and none left golden
-    UNSEEN = "unseen"  # nothing of it is recorded
+    UNSEEN = "unseen"  # it has no recorded channels
 
 
 class Passage(StrEnum):
@@ -38,16 +38,16 @@ class Passage(StrEnum):
 
     THROUGH = "through"
     STOPPED = "stopped"
-    UNKNOWN = "unknown"  # what it leads to is not recorded
-    NONE = "none"  # the fault did not come to its start
+    UNKNOWN = "unknown"  # the end of the link is not recorded
+    NONE = "none"  # the fault did not reach its start
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stage:
     """A component on a path, and its channels that left golden.
 
-    `t_by` is when (s) what it alone feeds left golden, where that was before any channel of its own: by then
-    it had changed, although what is recorded of it did not show that yet.
+    `t_by` is when (s) a component that only it feeds left golden, if that was before its own channels: by
+    then it had changed, too.
     """
 
     component: str
@@ -63,7 +63,7 @@ class Stage:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """A link of a path, the components at its ends, and whether the fault got through."""
+    """A link of a path with its ends, and whether the fault got through."""
 
     link: str
     tail: str
@@ -73,10 +73,10 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """The stages of a path in causal order, and how the fault fared at each of its links.
+    """The stages of a path in causal order, and the fault's passage at each link.
 
-    `reached` is the furthest component that left golden. `stopped_at` are those that held a fault which
-    changed no actuator. Both may be empty.
+    `reached` is the furthest component that left golden. `stopped_at` are the components that held a fault
+    which changed no actuator. Both may be empty.
     """
 
     stages: tuple[Stage, ...]
@@ -86,17 +86,17 @@ class Path:
 
     @property
     def injected(self) -> tuple[str, ...]:
-        """The components that the fault was injected into."""
+        """The components with the injection."""
         return tuple(stage.component for stage in self.stages if stage.state is State.INJECTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """What paths have in common whose faults came in at the same components, which left golden in the same
-    order: all but the times.
+    """The common part of paths that start at the same components, which left golden in the same order:
+    everything except times.
 
-    `late` has for each component that had changed before its channels show it the place of the time by which
-    it had, in the order of times. `entered` is the link by which the fault came to the first actuator.
+    For each component that changed before its channels show it, `late` has the index of that time in the
+    order of times. `entered` is the link by which the fault reached the first actuator.
     """
 
     states: Mapping[str, State]  # in causal order
@@ -108,13 +108,13 @@ class Course:
 
     @property
     def injected(self) -> tuple[str, ...]:
-        """The components that the fault was injected into."""
+        """The components with the injection."""
         return tuple(name for name, state in self.states.items() if state is State.INJECTED)
 
 
 class Sight(NamedTuple):
-    """All that a course follows from: where the fault was `injected`, the place of the time at which each
-    component left golden, of those that did, and whether it was masked."""
+    """The inputs of a course: where the fault was `injected`, the rank of the time at which each component
+    left golden, and whether the fault was masked."""
 
     injected: frozenset[str]
     order: tuple[tuple[str, int], ...]
@@ -122,11 +122,11 @@ class Sight(NamedTuple):
 
 
 class Ways:
-    """Paths of faults through a target.
+    """The paths of faults through a target.
 
-    `channels` are name, unit, role, component and meaning of each, as run.json has them. Without a
-    `structure` the components are a chain: those of internal channels in the order of the manifest, then
-    those of actuators, then those of the true state; where in it a fault was injected is not known.
+    `channels` are name, unit, role, component and meaning, as in run.json. Without a `structure` the
+    components form a chain: those of internal channels in manifest order, then of actuators, then of the true
+    state. The place of injection in a chain is unknown.
     """
 
     def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
@@ -135,20 +135,20 @@ class Ways:
         self._actuators = {component for _, _, role, component, _ in channels if role == Role.ACTUATOR.value}
         self.structure = structure
         self._links = links_of(structure) if structure else {}
-        # from what is not recorded back to what leads to it
+        # from unrecorded components back to those that lead to them
         self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
         self._course = lru_cache(maxsize=None)(self._course_of)
-        self._where: dict[str, frozenset[str]] = {}  # the components of each fault by its id
+        self._where: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
 
     @property
     def processes(self) -> frozenset[str]:
-        """The components that are controlled."""
+        """The controlled components."""
         if self.structure is None:
             return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
         return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
 
     def _injected(self, fault: Fault) -> frozenset[str]:
-        """The components of the structure whose files the fault is injected into."""
+        """The components whose files the fault is injected into."""
         if fault.id not in self._where:
             files = {injection.location.path for injection in fault.injections}
             components = self.structure.components if self.structure else {}
@@ -157,8 +157,8 @@ class Ways:
         return self._where[fault.id]
 
     def path(self, experiment: Experiment, record: Record) -> Path | None:
-        """The path of an experiment; None where its fault was not active, ended without an outcome, or is in
-        no component that is known."""
+        """The path of an experiment; None if its fault was not active, ended without an outcome, or is in no
+        known component."""
         course = self.course(experiment.fault, record)
         if course is None:
             return None
@@ -183,18 +183,16 @@ class Ways:
         )
 
     def course(self, fault: Fault, record: Record) -> Course | None:
-        """The course of an experiment with that fault, the same object for all that have it; None as of
-        `path`."""
+        """The course of an experiment, one shared object for equal courses; None as for `path`."""
         sight = self.sight(fault, record)
         return sight and self.course_of(sight)
 
     def course_of(self, sight: Sight) -> Course | None:
-        """The course of experiments of which that was seen."""
+        """The course for a sight."""
         return self._course(*sight)
 
     def sight(self, fault: Fault, record: Record) -> Sight | None:
-        """What is seen of an experiment's course; None where the fault was not active, or ended without an
-        outcome."""
+        """The sight of an experiment; None if the fault was not active or ended without an outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -209,7 +207,7 @@ class Ways:
     def _course_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
     ) -> Course | None:
-        """As `course_of`."""
+        """See `course_of`."""
         way = self._way_of(injected)
         if not way.components:
             return None
@@ -237,9 +235,9 @@ class Ways:
     def _states(
         self, way: Way, shown: Collection[str], left: Mapping[str, float]
     ) -> tuple[dict[str, State], set[str]]:
-        """The state of each component of a way, by the times (s) by which components had left golden, which
-        the channels of those that are `shown` show; and which of them the fault came to, as far as is known:
-        an unseen one if it came to what feeds it."""
+        """The state of each component of a way, and the components that the fault reached. `left` has the
+        times (s) by which components left golden; those `shown` have channels that show it. An unrecorded
+        component counts as reached if one that feeds it was."""
         moved = self._moved(left)
         states: dict[str, State] = {}
         arrived: set[str] = set()
@@ -267,9 +265,9 @@ class Ways:
         return min((left[name] for name in self.processes if name in left), default=inf)
 
     def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
-        """The times (s) by which components had left golden: when a channel of theirs did, or what they alone
-        feed. One without such a channel passed the fault on, if feedback cannot have come there yet. Without
-        knowing where the fault was injected nothing follows from what a component feeds."""
+        """The times (s) by which components left golden: by a channel of theirs, or of components that only
+        they feed. A component without such a channel passed the fault on, if feedback cannot have reached it
+        yet. If the place of injection is unknown, nothing is inferred."""
         moved, times = self._moved(left), dict(left)
         for name in reversed(way.components if way.injected else ()):
             only = way.feeders(name) | way.fed.get(name, frozenset())
@@ -285,15 +283,15 @@ class Ways:
         return structured(self.structure.components, self._links, self.processes, injected)
 
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
-        """When (s) feedback can first have come through one of these components: when it left golden, or what
-        leads to it did where it is not recorded; infinite: it cannot."""
+        """The earliest time (s) of feedback through one of these components: when it, or (if it is not
+        recorded) one that leads to it, left golden; infinite: impossible."""
         unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
 
 def ways_of(head: Head) -> Ways | None:
-    """The ways of a run's target, as its run.json has them; None where no channel names a component, and in
-    runs of earlier versions."""
+    """The ways of a run's target, from its run.json; None if no channel names a component, and for older
+    runs."""
     if not any(component for *_, component, _ in head.get("channels", ())):
         return None
     try:
@@ -320,8 +318,8 @@ def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collecti
 
 
 def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
-    """The components that held a fault: next to the ones that it reached, or to where it came in if it
-    reached none."""
+    """The components that held a fault: next to the ones that it reached, or to its entry if it reached
+    none."""
     held = [name for name in way.components if states[name] is State.HELD]
     reached = {name for name in way.components if states[name] is State.REACHED}
     after_reached = [name for name in held if way.feeders(name) & reached]

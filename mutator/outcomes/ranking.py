@@ -1,4 +1,4 @@
-"""Which results are the worst: one order for pages, budgets and the command line."""
+"""Ranks results from worst to best: one order for pages, budgets and the command line."""
 
 import math
 from collections.abc import Iterable
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import numpy as np
     import pandas as pd
 
-_ENDINGS = (  # the worst first
+_ENDINGS = (  # worst first
     Outcome.HAZARD.value,
     Status.CRASHED.value,
     Status.TIMEOUT.value,
@@ -27,10 +27,10 @@ _ENDINGS = (  # the worst first
 
 
 def worst(rows: Iterable[Row]) -> list[Row]:
-    """The rows, the worst first; the order in which they come does not matter.
+    """The rows, worst first; input order does not matter.
 
-    By class of severity, then delta-v; what has no class by its ending, then by margin: hazards take turns,
-    as metres are not to be compared with metres a second. At last by id.
+    Order: severity class, then delta-v; rows without a class by outcome, then by margin, alternating between
+    hazards because margins in different units are not comparable; finally id.
     """
     found = list(rows)
     turns = _turns(found)
@@ -46,8 +46,7 @@ def worst(rows: Iterable[Row]) -> list[Row]:
 
 
 def places(texts: "pd.DataFrame") -> "np.ndarray":
-    """The place of each row of `Results.texts` among the worst, from 0: the order of `worst`, a column at a
-    time."""
+    """The rank of each row of `Results.texts`, from 0: the order of `worst`, computed by column."""
     import numpy as np
     import pandas as pd
 
@@ -72,7 +71,7 @@ def places(texts: "pd.DataFrame") -> "np.ndarray":
 def _turn(
     texts: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
 ) -> "np.ndarray":
-    """As `_turns`; infinite for rows without a margin."""
+    """See `_turns`; infinite for rows without a margin."""
     import numpy as np
     import pandas as pd
 
@@ -92,14 +91,14 @@ def _turn(
 
 
 def worth_of(texts: "pd.DataFrame") -> dict[str, int]:
-    """As `worth`, of a frame as `Results.texts` has it."""
+    """See `worth`, for a frame from `Results.texts`."""
     found = places(texts)
     ended = (texts["status"] == Status.OK.value).to_numpy()
     return dict(zip(texts["experiment_id"][ended], found[ended].tolist(), strict=True))
 
 
 def worth(rows: Iterable[Row]) -> dict[str, int]:
-    """What the experiments that ended well are sorted by where there is no room for the series of all."""
+    """The priority of finished experiments when there is no room for all series."""
     return {row.experiment_id: i for i, row in enumerate(worst(rows)) if row.status is Status.OK}
 
 
@@ -108,8 +107,8 @@ def _has_class(row: Row) -> bool:
 
 
 def _turns(rows: Iterable[Row]) -> dict[str, int]:
-    """The place of each row without a class among those that ended alike, by the margin to one hazard, the
-    least first; of several hazards the place nearest to the front. Rows without a margin have none."""
+    """The rank of each row without a class within its outcome, by margin to one hazard, least first; with
+    several hazards the best rank. Rows without a margin have none."""
     lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
         for hazard, margin in () if _has_class(row) else row.margins:

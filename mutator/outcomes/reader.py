@@ -1,6 +1,6 @@
-"""The one reader of a run's results: rows, pandas frames and bytes of results.csv and results.parquet.
+"""The only reader of a run's results: rows, pandas frames, and bytes of results.csv and results.parquet.
 
-pandas is imported only where a frame is asked for.
+pandas is imported only for frames.
 """
 
 import csv
@@ -40,27 +40,26 @@ _NEEDED = (
 )
 _NAMES = ("module", "fault_type", "reading", "unit", "scenario", "method", "trigger", "variant", "aim")
 _SCALES = {"status": [s.value for s in Status], "outcome": [o.value for o in Outcome]}
-_REMEDY = "make it anew: `mutator report DIR`"
+_REMEDY = "rebuild it: `mutator report DIR`"
 
 
 @dataclass(frozen=True, slots=True)
 class Results:
-    """A results table: the results.csv at `path`, and the results.parquet beside it.
+    """A results table: the results.csv at `path`, and the results.parquet next to it.
 
-    Files are read when asked for, each time anew. MutatorError for a file that is missing or is no results
-    table.
+    Files are read on every access. MutatorError if a file is missing or not a results table.
     """
 
     path: Path
 
     @classmethod
     def of_run(cls, run: Path) -> "Results":
-        """The table of a run folder, as it was last built."""
+        """The table of a run folder as last built."""
         return cls(run / results.CSV)
 
     @classmethod
     def up_to_date(cls, run: Path) -> "Results":
-        """The table of a run folder, built first where it is missing or older than the records."""
+        """The table of a run folder, rebuilt if it is missing or older than the records."""
         return cls(results.ensure(run))
 
     def csv(self) -> bytes:
@@ -79,36 +78,36 @@ class Results:
                 f"no results here (no {path.name})",
                 where=path.parent,
                 expected="a run folder",
-                remedy="make them: `mutator report DIR`; for a run folder see `mutator run --help`",
+                remedy="build them: `mutator report DIR`; for a run folder see `mutator run --help`",
             ) from None
         except OSError as err:
             raise MutatorError(f"the results cannot be read ({err.strerror})", where=path) from None
 
     def lines(self) -> Iterator[dict[str, str]]:
-        """The cells of each row as text, by column, in the order of the table."""
+        """The cells of each row as text, by column, in table order."""
         reader = csv.DictReader(io.TextIOWrapper(io.BytesIO(self.csv()), encoding="utf-8", newline=""))
         try:
             self._check_header(reader.fieldnames or ())
             for line in reader:
                 if None in line or None in line.values():
-                    raise self._no_table(f"line {reader.line_num} has another number of cells than the head")
+                    raise self._no_table(f"line {reader.line_num} does not have as many cells as the header")
                 yield line
         except (ValueError, csv.Error) as err:
             raise self._no_table(str(err)) from None
 
     def count(self) -> int:
-        """How many rows there are."""
+        """The number of rows."""
         return len(self.texts())
 
     def rows(self) -> tuple[Row, ...]:
-        """The rows, typed, in the order of the table."""
+        """The rows, typed, in table order."""
         try:
             return tuple(map(row_from, self.lines()))
         except (KeyError, TypeError, ValueError) as err:
             raise self._no_table(str(err)) from None
 
     def texts(self) -> "pd.DataFrame":
-        """A frame of the cells as text, '' where there is nothing, in the order of the table."""
+        """A frame of the cells as text, '' if empty, in table order."""
         import pandas as pd
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import csv as arrow_csv
@@ -127,7 +126,7 @@ class Results:
         except ValueError as err:
             raise self._no_table(str(err)) from None
         columns = {}
-        for name in names:  # one at a time, so that no more than one is in memory twice
+        for name in names:  # one at a time, to avoid two copies in memory
             columns[name] = table.select([name]).combine_chunks().to_pandas(use_threads=False)[name]
             table = table.drop_columns([name])
         return pd.DataFrame(columns)
@@ -136,15 +135,15 @@ class Results:
         try:
             return no_pipe(self.path).open("rb")
         except OSError:
-            self._read(self.path)  # which says what is wrong
+            self._read(self.path)  # raises the precise error
             raise
 
     def frame(self) -> "pd.DataFrame":
         """A frame of all columns, typed, by experiment id.
 
-        Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run did
-        not end well), times floats in s of simulation (NaN: did not happen). `kind` (`sensor/bias`), `hazard`
-        and `t_hazard` (any, the first) are added. `frame.attrs["units"]` has the unit of each number.
+        Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run
+        failed), times floats in simulated seconds (NaN: did not happen). Adds `kind` (`sensor/bias`),
+        `hazard` and `t_hazard` (any, first). `frame.attrs["units"]` has the unit of each number.
         """
         import pandas as pd
 
@@ -164,7 +163,7 @@ class Results:
         return frame
 
     def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
-        """The units of the target's metrics, as run.json has them; of a table alone they are not known."""
+        """The units of the target's metrics, from run.json; empty for a table alone."""
         folder = self.path.parent
         metrics = RunFolder.unverified(folder).head.get("metrics", ()) if RunFolder.exists(folder) else ()
         return {name: unit for name, unit, *_ in metrics if name in frame}
@@ -174,14 +173,14 @@ class Results:
         return _frame(self.propagation_parquet())
 
     def propagation_parquet(self) -> bytes:
-        """The bytes of propagation.parquet; MutatorError for a run that recorded none."""
+        """The bytes of propagation.parquet; MutatorError if the run has none."""
         path = self.path.with_name(results.PROPAGATION)
         if not path.exists():
             raise MutatorError(
                 "no propagation was recorded",
                 where=self.path.parent,
-                expected=f"{results.PROPAGATION}, as runs of this version have it",
-                remedy="run the campaign again, into another folder",
+                expected=f"{results.PROPAGATION}, which runs of this version have",
+                remedy="rerun the campaign into another folder",
             )
         return self._read(path)
 
@@ -205,13 +204,13 @@ class Results:
 def row_of(
     experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
 ) -> Row:
-    """The row that results.csv has, or would have, for an experiment and its record."""
+    """The results.csv row of an experiment and its record."""
     cells = result_rows.row(experiment, record, hazards, scale=scale)
     return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
 
 
 def same_parquet(path: Path, made: Path) -> bool:
-    """Whether the Parquet file at `path` has the rows of one that was made now, maybe by another version of
+    """Whether the Parquet file at `path` has the rows of a newly built one, perhaps from another version of
     pyarrow."""
     import pyarrow as pa
     from pyarrow import parquet
@@ -219,7 +218,7 @@ def same_parquet(path: Path, made: Path) -> bool:
     try:
         files = [parquet.ParquetFile(one, pre_buffer=False) for one in (path, made)]
         names, others = (file.schema_arrow.names for file in files)
-        return names == others and all(  # one column at a time: a table may be large
+        return names == others and all(  # one column at a time: tables can be large
             files[0].read([name], use_threads=False).equals(files[1].read([name], use_threads=False))
             for name in names
         )
@@ -233,15 +232,15 @@ def _frame(data: bytes) -> "pd.DataFrame":
 
 
 def _table(source: Path | io.BytesIO) -> Any:
-    """The table of a Parquet file, read in this thread alone: one of pyarrow's that gives bytes back while
-    Python ends aborts the process, after all its work."""
+    """The table of a Parquet file, read in this thread: a pyarrow thread that frees memory during interpreter
+    exit aborts the process."""
     from pyarrow import parquet
 
     return parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:
-    """The unit of each column of numbers; `unit` names that of `value`, row by row."""
+    """The unit of each numeric column; `unit` has that of `value` for each row."""
     numbers = frame.select_dtypes("number").columns
     times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
     times |= {column.name for column in SINCE}

@@ -1,4 +1,4 @@
-"""Rows of the results table: the cells of an experiment and its record, and the columns they are in."""
+"""Builds rows of the results table: the cells of an experiment and its record, and their columns."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from mutator.outcomes.verdicts import reaction_time, severity_of, since_activati
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
 
-_TIME_DIGITS = 6  # of a time in s: beyond any step length, within any double
+_TIME_DIGITS = 6  # of a time in s: finer than any step, within a double's precision
 
 
 def row(
@@ -27,11 +27,10 @@ def row(
     ends: bool = False,
     scale: Scale | None = None,
 ) -> dict[str, object]:
-    """One row by column, in any order; without the largest differences where the run left no trace.
+    """One row by column, unordered; without largest differences if the run left no trace.
 
-    `hazards` are those that the target checks; `ends` says that one of them can end the drive, and `scale`
-    makes classes of delta-v. None stands for nothing; flags are 0 or 1; times are seconds of simulation
-    since its start.
+    `hazards` are those that the target checks; `ends` says that one can end the drive; `scale` classifies
+    delta-v. None is an empty cell; flags are 0 or 1; times are simulated seconds.
     """
     cells = plan_row(experiment) | _verdict_cells(record, scale)
     ok, times = record.status is Status.OK, dict(record.hazards)
@@ -49,7 +48,7 @@ def row(
 
 
 def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
-    """The cells that every target's results have."""
+    """The cells that all targets' results have."""
     activation = record.activation
     ok = record.status is Status.OK
     return {
@@ -89,7 +88,7 @@ class ResultRows:
         self._names = [column.name for column in self.columns]
 
     def cells(self, experiment: Experiment, record: Record) -> list[object]:
-        """A row, in the order of the columns."""
+        """A row in column order."""
         made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
         course = self._ways.course(experiment.fault, record) if self._ways else None
         if course:

@@ -1,4 +1,4 @@
-"""The results table: a row per experiment, made from plan and records at any time, always the same bytes."""
+"""The results table: a row per experiment, built from plan and records, deterministic."""
 
 import gc
 import warnings
@@ -26,12 +26,11 @@ CSV, PARQUET, TIMINGS_PARQUET = "results.csv", "results.parquet", "timings.parqu
 PROPAGATION = "propagation.parquet"
 TABLES = (CSV, PARQUET, PROPAGATION, TIMINGS_PARQUET)
 SCHEMA, STAMP = "results/1", "results.json"
-_BATCH = 2_000  # experiments that are read before their rows are written
+_BATCH = 2_000  # experiments read at a time
 
 
 def ensure(run: Path) -> Path:
-    """results.csv of a run folder: as it is when all tables are what was made of what the folder holds now,
-    else built."""
+    """Return results.csv of a run folder, rebuilt if any table is out of date."""
     folder = RunFolder.unverified(run)
     stamp = _stamp(folder)
     if stamp.get("made_from") == _made_from(folder) and stamp["tables"] == _found(folder):
@@ -40,8 +39,8 @@ def ensure(run: Path) -> Path:
 
 
 def build(run: Path) -> Path:
-    """Write results.csv (returned) and the other tables of a run folder from its plan and records. A
-    MutatorWarning tells of a table that somebody has edited: it is no more."""
+    """Write results.csv (returned) and the other tables of a run folder from plan and records. MutatorWarning
+    if a table that was edited by hand is overwritten."""
     folder = RunFolder.open(run)
     made_from = _made_from(folder)
     with ExitStack() as stack:
@@ -49,8 +48,8 @@ def build(run: Path) -> Path:
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
-        # first what is there and what will be, so that a table which a kill left is not taken for an edited
-        # one; then, as the block ends, the tables
+        # Record old and new digests first, so that a table left by a kill is not taken for an edited one;
+        # then, at the end of the block, replace the tables.
         before = _unedited(folder, now)
         stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
         write_json(folder.path / STAMP, stamp)
@@ -58,15 +57,15 @@ def build(run: Path) -> Path:
 
 
 def names(folder: RunFolder) -> tuple[str, ...]:
-    """The tables that a folder has; runs of earlier versions recorded no propagation."""
+    """The tables of a folder; older runs have no propagation."""
     return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    """Write the tables of a run folder, made from its plan, records and timings, each to its path in `paths`.
+    """Write the tables of a run folder, built from plan, records and timings, to the given `paths`.
 
-    Experiments are read by their ids, a batch at a time: a million takes some hundred MB. Two processes make
-    the batches of a large run.
+    Experiments are read in batches: a million needs some hundred MB. Two processes build the batches of a
+    large run.
     """
     with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)) as end:
         _write_results(folder, paths)
@@ -74,7 +73,7 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    """As `write`, without the timings."""
+    """See `write`; without timings."""
     records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
     tells_propagation = PROPAGATION in paths
 
@@ -104,7 +103,7 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """No search for garbage in circles: rows and records are none, and a fifth of the time went there."""
+    """Disable cyclic garbage collection: rows and records have no cycles, and it took a fifth of the time."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -120,7 +119,7 @@ def _batches(items: Iterable[str]) -> list[list[str]]:
 
 
 def _made_from(folder: RunFolder) -> str:
-    """Digest of all that the tables follow from, this version of mutator included."""
+    """Digest of all inputs of the tables, including the version of mutator."""
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
@@ -133,14 +132,14 @@ def _made_from(folder: RunFolder) -> str:
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    """Digests of the tables as they are now; None of a missing one."""
+    """Digests of the current tables; None for missing ones."""
     known = names(folder)
     found = dict(zip(known, digests.of_files([folder.path / name for name in known]), strict=True))
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 
 def _stamp(folder: RunFolder) -> dict[str, Any]:
-    """What results.json says; as good as nothing where it is missing or damaged."""
+    """The content of results.json; empty values if it is missing or damaged."""
     try:
         known = read_json(folder.path / STAMP, SCHEMA)
         if all(isinstance(known[key], dict) for key in ("tables", "before")):
@@ -151,21 +150,21 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
 
 
 def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
-    """Digests of the tables that are there and were made by a build; a warning tells of any other one. Of old
-    folders without results.json nobody knows."""
+    """Digests of the tables that a build made; a warning names any others. Older folders without results.json
+    cannot be checked."""
     stamp = _stamp(folder)
     tells = folder.verifiable or stamp.get("made_from")
     found = {name: one for name, one in _found(folder).items() if one is not None}
     made = {name: (now[name], stamp["tables"].get(name), stamp["before"].get(name)) for name in found}
     for name in found:
         if tells and found[name] not in made[name]:
-            text = f"{folder.path / name}: not what was made from plan and records; made anew"
+            text = f"{folder.path / name}: does not match plan and records; rebuilt"
             warnings.warn(text, MutatorWarning, stacklevel=2)
     return {name: one for name, one in found.items() if one in made[name]}
 
 
 def _write_timings(folder: RunFolder, path: Path) -> None:
-    """What each experiment cost, where."""
+    """The cost and place of each experiment."""
     newest = folder.timings()
 
     def made(batch: Sequence[str]) -> Any:

@@ -1,4 +1,4 @@
-"""Rows of the results table, typed, a row for one experiment; and the table of what was counted of them."""
+"""Typed rows of the results table, one per experiment, and the table of counts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of results.csv, typed. Times are s of simulation, None: did not happen."""
+    """One line of results.csv, typed. Times are simulated seconds, None: did not happen."""
 
     experiment_id: str
     module: str
@@ -31,24 +31,24 @@ class Row:
     outcome: Outcome | None
     t_activation: float | None
     t_manifest: float | None
-    checked: tuple[str, ...]  # the hazards that the target looked for
+    checked: tuple[str, ...]  # hazards that the target checks
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[str, ...]
     t_alert: float | None
     reaction_time: float | None
     detail: str
-    severity: str = ""  # class of the contact that ended the drive
-    delta_v: float | None = None  # m/s, in it
-    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that came, else to all
+    severity: str = ""  # of the contact that ended the drive
+    delta_v: float | None = None  # m/s, of that contact
+    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred, else to all
 
     @property
     def margin(self) -> float | None:
-        """The least margin, as a number in whatever unit its hazard has it."""
+        """The least margin, as a number in its hazard's unit."""
         return min((margin for _, margin in self.margins), default=None)
 
     @property
     def ending(self) -> str:
-        """The outcome of a run that worked, the status of one that did not."""
+        """The outcome of a successful run, or the status of a failed one."""
         return self.outcome.value if self.status is Status.OK and self.outcome else self.status.value
 
     @property
@@ -63,13 +63,13 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Count:
-    """What became of the usable experiments of one group; `unusable` were none."""
+    """Counts over the usable experiments of one group; `unusable` counts the rest."""
 
     group: str
     injected: int
     activated: int
     manifested: int
-    hazards: tuple[int, ...]  # one number for each hazard named in the results
+    hazards: tuple[int, ...]  # one number for each hazard in the results
     any_hazard: int
     alerts: int
     hazards_without_alert: int
@@ -85,8 +85,8 @@ def by_fault_type(row: Row) -> str:
 def count_table(
     counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
 ) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows of a table of counts; crashes, timeouts and unusable runs only if there are any, and
-    `alerts` if the target has some."""
+    """Headings and rows of a table of counts; crashes, timeouts and unusable runs only if there are any, and
+    `alerts` only if the target has some."""
     heads = [head, "injected", "activated", "manifested", *hazards]
     heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
     table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
@@ -109,7 +109,7 @@ def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
 
 
 def row_from(line: Mapping[str, str]) -> Row:
-    """The row of a line of results.csv, by column; KeyError or ValueError when it is none."""
+    """Parse a line of results.csv, given by column; KeyError or ValueError if it is invalid."""
     checked = [name for name in hazards_in(line) if line[name.lower()]]
     times = {name: line[f"t_{name.lower()}"] for name in checked}
     hazards = [(name, float(time)) for name, time in times.items() if time]

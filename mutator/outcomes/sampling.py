@@ -1,10 +1,10 @@
-"""A run's channels as its series, six digits each: at most 20 values a second, 10 of what the controller
-believes.
+"""Samples a run's channels into its series, with six digits: at most 20 values a second, 10 for the
+controller's beliefs.
 
-A value is the newest one at its time, so what lasts for less than 50 ms may fall between two. So each
-channel that differs keeps more points: the first step that differs, those of the largest difference in the
-drive and in the whole run, and the last step of a run that ended early. And every channel keeps the steps in
-which a hazard first came, so that a replay shows there what the hazard was judged by.
+Each value is the newest at its time, so an event shorter than 50 ms may fall between samples. Therefore each
+channel that differs keeps extra points: the first differing step, those of the largest difference in the
+drive and in the whole run, and the last step of a run that ended early. All channels keep the steps in which
+a hazard first occurred, so that replays show what the hazard was judged by.
 """
 
 from functools import cached_property
@@ -21,13 +21,13 @@ from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
 RATE = 20.0  # samples a second, at most
-_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # which of them a channel has
-_HALF = np.uint32(8)  # of the lowest bit that is kept
+_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # which samples a channel keeps
+_HALF = np.uint32(8)  # of the lowest kept bit
 _TINY = 1e-9  # s; times are sums of steps
 
 
 class Sampler:
-    """Makes the series of runs that have one golden run, and its own."""
+    """Builds the golden series, and the series of runs with that golden run."""
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
         self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]
@@ -53,7 +53,7 @@ class Sampler:
         return encode(self.golden)
 
     def series(self, faulty: Trace, record: Record) -> Series:
-        """Of a run with a fault, and of what its record says."""
+        """The series of a faulty run and its record."""
         own = np.asarray(faulty[self._clock], dtype=float)
         last = own[-1] if len(own) else -np.inf
         time, golden, values = self._together(faulty, own)
@@ -77,7 +77,7 @@ class Sampler:
 
     @cached_property
     def _usual(self) -> np.ndarray:
-        """That of a run that is as long as golden."""
+        """`_sampled` for a run as long as golden."""
         return self._marked(len(self._time), self._at)
 
     def _marked(self, count: int, at: np.ndarray) -> np.ndarray:
@@ -91,7 +91,7 @@ class Sampler:
         return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Times of the steps of both runs, and the values of each there: NaN after its end."""
+        """The union of both runs' step times, and the values of each: NaN after its end."""
         rows = min(len(own), len(self._time))
         if np.array_equal(own[:rows], self._time[:rows]):
             time = max(own, self._time, key=len)
@@ -100,7 +100,7 @@ class Sampler:
         return time, self._held(self._values, self._time, time), self._held(self._on(faulty, own), own, time)
 
     def _on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
-        """A row for each channel, a column for each step; a channel that the run lacks has no values."""
+        """A row for each channel, a column for each step; missing channels have no values."""
         rows = np.full((len(self._channels), len(time)), np.nan)
         for row, channel in zip(rows, self._channels, strict=True):
             if channel.name in trace:
@@ -116,7 +116,7 @@ class Sampler:
 
 
 def _thinned(time: np.ndarray) -> np.ndarray:
-    """Which steps are kept: first and last one, and no more than RATE a second between them."""
+    """The steps to keep: first, last, and at most RATE a second in between."""
     kept: list[int] = []
     due = -np.inf
     for place, t in enumerate(time.tolist()):
@@ -136,12 +136,12 @@ def _filled(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _single(values: np.ndarray) -> np.ndarray:
-    """In single precision, rounded to six digits (20 bits): the last ones would take a tenth of the room."""
-    with np.errstate(over="ignore"):  # too large for single precision: infinite
+    """Single precision, rounded to six digits (20 bits): more would add a tenth to the size."""
+    with np.errstate(over="ignore"):  # overflow becomes infinity
         single = values.astype("<f4")
         words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)
     finite = np.isfinite(single)
-    single[np.isnan(single)] = np.nan  # one pattern of bits
+    single[np.isnan(single)] = np.nan  # one bit pattern
     return np.where(finite, words.view("<f4"), single)
 
 
@@ -161,7 +161,7 @@ def _points(
     for row, differs in enumerate((golden != faulty).any(axis=1).tolist()):
         steps = set(hazards)
         if differs:
-            gap = _gap(golden[row], faulty[row])  # row by row, as all rows do not fit into a cache
+            gap = _gap(golden[row], faulty[row])  # row by row, because all rows do not fit into a cache
             apart = gap > 0.0
             peaks = {int(np.argmax(apart)), int(np.argmax(gap[: max(drive, 1)])), int(np.argmax(gap)), end}
             steps |= {step for step in peaks if apart[step]}
@@ -173,13 +173,13 @@ def _points(
 
 
 def _until(time: np.ndarray, t: float) -> int:
-    """How many steps there are up to a time, which counts too."""
+    """The number of steps up to and including a time."""
     return int(np.searchsorted(time, t + _TINY, side="right"))
 
 
 def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """How far two runs are apart in each step: 0 where both are the same or have no value, infinite where one
-    has none."""
+    """The difference of two runs at each step: 0 if they are equal or both have no value, infinite if only
+    one has none."""
     with np.errstate(invalid="ignore", over="ignore"):
         gap: np.ndarray = np.abs(faulty - golden)
     odd = np.isnan(gap)
@@ -212,8 +212,8 @@ def _happened(record: Record) -> dict[str, Any]:
 
 
 def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
-    """The runs of a series as traces with the time channel `time`: a channel that has a value at each second
-    time alone keeps it to the next."""
+    """The runs of a series as traces with the time channel `time`. A channel sampled every second holds its
+    value in between."""
     names = [str(channel["name"]) for channel in golden.about["channels"]]
 
     def trace(run: Series) -> Trace:
@@ -224,7 +224,7 @@ def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Tr
 
 
 def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
-    """Write the series of one experiment into a file of its own in the run folder `run`."""
+    """Write the series of one experiment into its own file in the run folder `run`."""
     sampler = Sampler(manifest, golden)
     data = encode(sampler.series(faulty, record), sampler.golden)
     write_kept(SeriesFolder(run).kept(record.experiment_id), sampler.encoded, data)

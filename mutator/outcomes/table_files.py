@@ -1,4 +1,4 @@
-"""Tables as files, written a batch of rows at a time: CSV for everyone, Parquet for programs."""
+"""Writes tables in batches of rows: CSV for people, Parquet for programs."""
 
 import csv
 import io
@@ -9,20 +9,20 @@ from typing import Any
 
 from mutator.outcomes.columns import Column
 
-_ROWS = 1 << 20  # of a row group, as pyarrow has it by itself; less where there are many columns:
-_CELLS = 1 << 23  # of a row group, which is in memory as a whole
+_ROWS = 1 << 20  # of a row group, pyarrow's default; fewer with many columns:
+_CELLS = 1 << 23  # of a row group, which is completely in memory
 _TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
 
 
 def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
-    """Lines of a CSV file; None is an empty cell."""
+    """CSV lines; None is an empty cell."""
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()
 
 
 def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) -> Any:
-    """Rows of a Parquet file, given as a sequence of values for each column."""
+    """Parquet rows, given as a sequence of values for each column."""
     import pyarrow as pa  # type: ignore[import-untyped]
 
     schema = _schema(columns)
@@ -37,7 +37,7 @@ def _schema(columns: Sequence[Column]) -> Any:
 
 
 class CsvTable:
-    """A CSV file that begins with the names of its columns."""
+    """A CSV file that begins with its column names."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         self._file = path.open("wb")
@@ -47,7 +47,7 @@ class CsvTable:
         return self
 
     def append(self, lines: bytes) -> None:
-        """Append rows, as `csv_lines` makes them."""
+        """Append rows from `csv_lines`."""
         self._file.write(lines)
 
     def __exit__(self, *error: object) -> None:
@@ -55,7 +55,7 @@ class CsvTable:
 
 
 class ParquetTable:
-    """A Parquet file; nothing in it depends on when or where it was made, or in which batches."""
+    """A Parquet file, independent of time, place and batches."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         import pyarrow as pa
@@ -66,21 +66,21 @@ class ParquetTable:
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
         self._group = min(_ROWS, _CELLS // len(columns))
         self._held: list[Any] = []
-        self._count = 0  # rows that are held
+        self._count = 0  # rows waiting
         self._is_empty = True
 
     def __enter__(self) -> "ParquetTable":
         return self
 
     def append(self, batch: Any) -> None:
-        """Append rows, as `record_batch` makes them."""
+        """Append rows from `record_batch`."""
         self._held.append(batch)
         self._count += batch.num_rows
         while self._count >= self._group:
             self._write(self._group)
 
     def _write(self, count: int) -> None:
-        """Write the first rows of those that are held as a group."""
+        """Write the first waiting rows as a group."""
         held = self._pa.Table.from_batches(self._held, self._schema)
         self._writer.write_table(held.slice(0, count).combine_chunks(), self._group)
         self._held = held.slice(count).to_batches()

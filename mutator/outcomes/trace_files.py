@@ -1,4 +1,4 @@
-"""Trace files of runs, by suffix: each reader gives the arrays of the channels that it is asked for."""
+"""Reads trace files of runs by suffix: each reader returns the arrays of the requested channels."""
 
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -16,7 +16,7 @@ Arrays = dict[str, np.ndarray]
 
 
 class BadTrace(ValueError):
-    """What is wrong with a trace file, and what was expected."""
+    """An invalid trace file: what was found, and what was expected."""
 
     def __init__(self, got: str, expected: str) -> None:
         super().__init__(got)
@@ -24,18 +24,18 @@ class BadTrace(ValueError):
 
 
 def own_times(name: str) -> str:
-    """Where a trace keeps the times of a channel that is not there in each step."""
+    """The name under which a trace keeps the times of a channel that does not have a value at each step."""
     return f"{name}@"
 
 
 def read(
     path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
 ) -> Arrays:
-    """Channels and time of a trace, by the names that the manifest has for them; under `own_times` the times
-    of those that are not there in each step.
+    """Channels and time of a trace by manifest name; `own_times` names have the times of channels that lack
+    some steps.
 
-    Without `channels`: all that there is, also what the manifest does not name. Channels in `also` may be
-    missing. BadTrace, KeyError for another channel that is not there, and what the readers raise.
+    Without `channels`: everything, including names not in the manifest. Channels in `also` may be missing.
+    BadTrace, KeyError for another missing channel, and the readers' own errors.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
     if path.suffix == ".mcap":
@@ -47,7 +47,7 @@ def read(
     known = {channel.in_trace for channel in wanted} | {*of_time}
     rest = {name: column for name, column in columns.items() if channels is None and name not in known}
     time = columns[manifest.time_channel]
-    # a row of a table without the time of a step is of channels with times of their own
+    # a table row without the step time belongs to channels with their own times
     steps = slice(None) if path.suffix == ".npz" else ~_empty(time)
     values = {name: column[steps] for name, column in rest.items()} | {manifest.time_channel: time[steps]}
     for channel in wanted:
@@ -96,7 +96,7 @@ def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str])
 def _wanted(
     there: Collection[str], names: Iterable[str] | None, may_miss: Collection[str]
 ) -> dict[str, None]:
-    """What is read of a file that has `there`: these names, or all of them."""
+    """The names to read from a file that has `there`: these, or all."""
     if names is None:
         return dict.fromkeys(there)
     return {name: None for name in names if name in there or name not in may_miss}
@@ -110,7 +110,7 @@ _COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None, Collection[str]], A
 
 
 def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequence[Channel]) -> Arrays:
-    """Of JSON messages: `/topic:field.of.field`. Log times are the simulation's, in ns."""
+    """Read JSON messages: `/topic:field.of.field`. Log times are simulated time in ns."""
     try:
         from mcap.reader import make_reader
     except ImportError:

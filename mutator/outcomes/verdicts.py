@@ -1,4 +1,4 @@
-"""From what a run recorded to its verdict: pure functions."""
+"""Verdicts on recorded runs, as pure functions."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,9 +9,9 @@ Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
 def first_events(events: Iterable[tuple[str, float]], activation: Activation | None) -> Events:
-    """The first event of each name at or after the activation, by time then name; none without activation.
+    """The first event of each name at or after activation, by time then name; none without activation.
 
-    What came before cannot be the fault's doing.
+    Earlier events cannot be caused by the fault.
     """
     if activation is None:
         return ()
@@ -25,8 +25,8 @@ def first_events(events: Iterable[tuple[str, float]], activation: Activation | N
 def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
     """The outcome of an experiment that ran: not_activated, hazard, sdc or masked, the first that applies.
 
-    `hazards` are those at or after the activation. A hazard counts even if no actuator output differed: the
-    fault may act on the world itself.
+    `hazards` are those at or after activation. A hazard counts even without an actuator difference: the fault
+    may act on the world directly.
     """
     if activation is None:
         return Outcome.NOT_ACTIVATED
@@ -36,9 +36,9 @@ def judge(*, activation: Activation | None, t_manifest: float | None, hazards: E
 
 
 def reaction_time(hazards: Events, alerts: Events) -> float | None:
-    """First hazard minus first alert in s: the time a driver would have had.
+    """First hazard minus first alert in s: the time a driver would have.
 
-    None when either is missing and when the alert did not come strictly before the hazard.
+    None if either is missing or the alert did not come strictly first.
     """
     if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
         return None
@@ -53,15 +53,15 @@ def since_activation(record: Record) -> float | None:
 
 
 def since_manifestation(record: Record) -> float | None:
-    """First hazard minus manifestation in s; None when either is missing or the hazard came first."""
+    """First hazard minus manifestation in s; None if either is missing or the hazard came first."""
     if not record.hazards or record.t_manifest is None or record.t_manifest > record.hazards[0][1]:
         return None
     return record.hazards[0][1] - record.t_manifest
 
 
 def severity_of(record: Record, scale: Scale | None) -> str | None:
-    """The class of the contact that ended the drive; None without one, and when it came before the fault was
-    active: then it is not the fault's doing."""
+    """The class of the contact that ended the drive; None without a contact, or if it came before the fault
+    was active."""
     delta_v = dict(record.metrics).get(DELTA_V)
     if scale is None or delta_v is None or record.activation is None or record.t_end is None:
         return None

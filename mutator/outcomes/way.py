@@ -1,4 +1,4 @@
-"""Where faults may go: the components on their way to the controlled process, in causal order."""
+"""Where faults can go: the components on the way to the controlled process, in causal order."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,26 +10,26 @@ from mutator.targets.channels import Role
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
-    """Where the faults of some components may go: the components in causal order, the links between them."""
+    """Where the faults of some components can go: components in causal order, and their links."""
 
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
-    sources: frozenset[str]  # where the fault comes in
-    injected: bool  # whether these are known to be where
-    fed: Mapping[str, frozenset[str]]  # what else leads to a component, from off the way
-    steps: Mapping[str, int]  # links that are left to the process
+    sources: frozenset[str]  # where the fault enters
+    injected: bool  # whether the sources are known to be the place of injection
+    fed: Mapping[str, frozenset[str]]  # components off the way that lead to a component
+    steps: Mapping[str, int]  # links left to the process
 
     def feeders(self, component: str) -> set[str]:
-        """The components that lead to one."""
+        """The components that feed one."""
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
 def chained(roles: Mapping[str, str], processes: frozenset[str]) -> Way:
-    """The chain of components by the roles of their channels, without knowing where a fault comes in."""
+    """The chain of components by the roles of their channels; the place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
     links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
-    # what is seen of the process may come first
+    # the observed process may come first
     return Way(
         components=tuple(chain),
         links=links,
@@ -46,8 +46,7 @@ def structured(
     processes: frozenset[str],
     injected: frozenset[str],
 ) -> Way:
-    """The way from the components that a fault is injected into along `links`; those out of a
-    process are no part of it."""
+    """The way from the components with the injection along `links`, without links out of a process."""
     forward = {name: ends for name, ends in links.items() if ends[0] not in processes}
     steps = steps_from(processes, [(tip, tail) for tail, tip in forward.values()])
     on_way = (steps_from(injected, forward.values()).keys() & steps.keys()) | injected
@@ -67,14 +66,14 @@ def structured(
 
 
 def links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
-    """The ends of each link that is studied, and not from or to people."""
+    """The ends of each studied link that does not involve people."""
     people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
     ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 
 
 def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
-    """How many links away from `start` everything is that can be come to from there, itself included."""
+    """The distance in links from `start` of everything reachable, including `start`."""
     found = dict.fromkeys(start, 0)
     while more := {tip for tail, tip in links if tail in found} - found.keys():
         found |= dict.fromkeys(more, max(found.values()) + 1)
@@ -84,8 +83,8 @@ def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> di
 def _in_causal_order(
     nodes: Sequence[str], links: Mapping[str, tuple[str, str]], steps: Mapping[str, int]
 ) -> tuple[str, ...]:
-    """The nodes, each after all that feed it. Of several, and in a circle, the one with most `steps` to the
-    process comes first."""
+    """The nodes, each after all that feed it. Among several, and in cycles, the one with the most `steps` to
+    the process comes first."""
     left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []
     while left:

@@ -1,7 +1,7 @@
-"""What an unsafe control action looks like in the traces of a fault-free and a faulty run.
+"""Detects unsafe control actions in the traces of a fault-free and a faulty run.
 
-Each `Wanted` has a query that finds the runs in which it may be, and a `Look` that says whether two traces do
-show it, and in which steps.
+Each `Wanted` has a query for candidate runs, and a `Look` that decides whether two traces show the action,
+and in which steps.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,20 @@ from mutator.outcomes.golden import Trace
 
 Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
-APPLIED = 0.01  # of full gas or brake: less is none
-WRONG_S = 0.5  # of gas or brake at a wrong time: less is a flicker
-BRAKE_S = 0.1  # of braking that is too short: less is no braking
-SHORT = 0.5  # of the fault-free run's braking time: more is not too short
-RELEASED_S = 1.0  # after the alert: by then gas and brake must be gone
-MISSED_S = 0.1  # of gas, and of braking, that the fault-free run still gives
+APPLIED = 0.01  # of full gas or brake; less counts as none
+WRONG_S = 0.5  # minimum of wrong gas or brake
+BRAKE_S = 0.1  # minimum of braking that is too short
+SHORT = 0.5  # of the fault-free run's braking time; more is not too short
+RELEASED_S = 1.0  # after the alert: gas and brake must be gone by then
+MISSED_S = 0.1  # minimum of gas, and of braking, in the fault-free run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Both runs over the steps that they share.
+    """Both runs over their common steps.
 
-    `t`: s of simulation, one per step of `step_s`; `golden` and `faulty` have as many values. `start` and
-    `end` bound what is looked at: the fault's activation, and the hazard or the end of the run.
+    `t`: simulated s, one per step of `step_s`; `golden` and `faulty` have as many values. `start` and `end`
+    bound the search: the fault's activation, and the hazard or the end of the run.
     """
 
     t: np.ndarray
@@ -36,19 +36,19 @@ class Pair:
     step_s: float
     start: float
     end: float
-    alert: float | None  # first after the activation
+    alert: float | None  # first after activation
 
     @classmethod
     def of(
         cls, golden: Trace, faulty: Trace, record: Record, time: str, step_s: float, hazard: str | None
     ) -> "Pair":
-        """The runs of an experiment whose fault was activated, looked at until `hazard` or the end.
+        """The runs of an experiment with an activated fault, up to `hazard` or the end.
 
-        `time` is the name of the channel of times.
+        `time` is the name of the time channel.
         """
         steps = min(len(golden[time]), len(faulty[time]))
         t = faulty[time][:steps]
-        assert record.activation is not None  # the query asks for it
+        assert record.activation is not None  # required by the query
         return cls(
             t=t,
             golden={name: values[:steps] for name, values in golden.items()},
@@ -65,11 +65,11 @@ class Pair:
         return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
 
     def seconds(self, steps: Steps) -> float:
-        """How long that many steps last."""
+        """The duration of these steps."""
         return float(steps.sum() * self.step_s)
 
 
-Look = Callable[[Pair], Steps | None]  # the steps that show it; None: they do not show it
+Look = Callable[[Pair], Steps | None]  # the steps that show it; None: not shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,17 +78,17 @@ class Wanted:
 
     name: str
     title: str
-    query: str  # over the columns of results.csv: the runs it may be in
-    order: str  # the column they are looked at by, largest first
-    confirmed: str  # what the look finds, in words
+    query: str  # over the columns of results.csv: candidate runs
+    order: str  # candidates are tried by this column, largest first
+    confirmed: str  # what the look finds, as text
     look: Look
-    actions: tuple[str, ...]  # the channels looked at; their panels are shaded where it is
-    panels: tuple[tuple[str, str], ...]  # (channel, what it is), from the top
-    hazard: str | None  # what the runs lead to; None: they are looked at to their end
+    actions: tuple[str, ...]  # channels of the action; their panels are shaded
+    panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
+    hazard: str | None  # end of the search; None: end of the run
 
 
 def brake_too_short(pair: Pair) -> Steps | None:
-    """The steps in which golden brakes and faulty does not, if faulty brakes for half the time at most."""
+    """The steps in which only golden brakes, if faulty brakes at most half of golden's time."""
     golden, faulty = pair.applied("brake")
     if not BRAKE_S <= pair.seconds(faulty) <= SHORT * pair.seconds(golden):
         return None
@@ -96,7 +96,7 @@ def brake_too_short(pair: Pair) -> Steps | None:
 
 
 def at_a_wrong_time(channel: str) -> Look:
-    """The steps in which faulty gives gas (or brakes) and golden does not, if they last."""
+    """The steps in which only faulty gives gas (or brakes), if they last long enough."""
 
     def look(pair: Pair) -> Steps | None:
         golden, faulty = pair.applied(channel)
@@ -107,8 +107,8 @@ def at_a_wrong_time(channel: str) -> Look:
 
 
 def both_unavailable(pair: Pair) -> Steps | None:
-    """The steps to the end of the run after the last gas or brake of faulty, if that is soon after the alert
-    and golden has use for both."""
+    """The steps after faulty's last gas or brake, if that is soon after the alert and golden still uses
+    both."""
     used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
     last = pair.t[used].max(initial=pair.start)
     gone: Steps = pair.t > last

@@ -1,4 +1,4 @@
-"""Figures of single experiments: found by a query over the results, confirmed on their traces, drawn."""
+"""Figures of single experiments: found by a query over the results, confirmed on traces, drawn."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
@@ -17,7 +17,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 QUERY = "Query over results.csv"
-LOOKED_AT = 5  # candidates of each figure: each may have to be driven again
+LOOKED_AT = 5  # candidates for each figure
 
 
 def example_drawings(
@@ -26,10 +26,10 @@ def example_drawings(
     workspace: Workspace | None,
     wanted: Sequence[Wanted] = WANTED,
 ) -> tuple[Drawing, ...]:
-    """A drawing of each that is wanted; one without a figure says why there is none.
+    """A drawing for each wanted figure; a missing figure has a reason.
 
-    `frame` is of `statistics.frame.load`. Without a workspace there are no traces. They are the experiments'
-    series: nothing is driven.
+    `frame` comes from `statistics.frame.load`. Without a workspace there are no traces. Traces come from the
+    experiments' series; nothing is rerun.
     """
     traces = Traces(workspace, folder) if workspace else None
     made = []
@@ -37,13 +37,13 @@ def example_drawings(
         try:
             made.append(_drawing(frame, traces, one))
         except MutatorError as err:
-            made.append(_none(one, f"the traces it needs cannot be had: {err.got}"))
+            made.append(_none(one, f"its traces are not available: {err.got}"))
     return tuple(made)
 
 
 def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
-    """The rows that the query finds, in the order they are looked at; none where the target has no such
-    hazard or channel."""
+    """The rows that the query finds, in order of examination; empty if the target lacks the hazard or
+    channel."""
     numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
     try:
         found = numbers.query(wanted.query, engine="python")
@@ -57,9 +57,9 @@ def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
 def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Drawing:
     found = candidates(frame, wanted)
     if found.empty:
-        return _none(wanted, "no experiment of this run fits the query")
+        return _none(wanted, "no experiment of this run matches the query")
     if traces is None:
-        return _none(wanted, "no fault library was found here, which says what the channels are")
+        return _none(wanted, "no fault library was found, which defines the channels")
     manifest = traces.manifest
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in wanted.actions if name not in recorded]:
@@ -80,13 +80,13 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
                 codes=(
                     (QUERY, wanted.query),
                     (
-                        "All of it, DIR being this run folder",
+                        "The whole experiment (DIR: this run folder)",
                         f"mutator show {record.experiment_id} --run DIR",
                     ),
                 ),
             )
     return _none(
-        wanted, f"it is not to be seen in the first {len(looked_at)} of the {len(found)} that the query finds"
+        wanted, f"the first {len(looked_at)} of the {len(found)} that the query finds do not show it"
     )
 
 
@@ -101,11 +101,11 @@ def _none(wanted: Wanted, why: str) -> Drawing:
 
 
 def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
-    """What is shown, how it was found, and what the traces say."""
+    """What is shown, how it was found, and what the traces show."""
     fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "
         f"{row['trigger']}: experiment {row['experiment_id']}. It is number {number} of the {of} that the "
-        f"query finds, largest {wanted.order} first: the first (of at most {LOOKED_AT} that are looked at) "
+        f"query finds, largest {wanted.order} first: the first (of at most {LOOKED_AT} examined) "
         f"whose traces show that {wanted.confirmed}."
     )

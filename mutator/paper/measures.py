@@ -1,8 +1,8 @@
-"""What a published observation can be asked of: measures of a frame of results, each with an interval.
+"""The measures that published observations are evaluated with, over a frame of results, each with an
+interval.
 
-`runs` is what `mutator.statistics.frame.load` gives; `of`, `part` and `against` are pandas queries on it, an
-empty one means all runs. A report shows each claim as the call that was evaluated; the same call answers in
-a Python session:
+`runs` comes from `mutator.statistics.frame.load`; `of`, `part` and `against` are pandas queries on it, where
+an empty one means all runs. A report shows each claim as the evaluated call, which works in a Python session:
 
     from mutator.paper.measures import *
     from mutator.statistics.frame import load
@@ -33,13 +33,13 @@ __all__ = [
 ]
 
 
-_BOUNDS_A_MEDIAN = 6  # fewer runs are on one side of their median in more than 5 % of all cases
+_BOUNDS_A_MEDIAN = 6  # fewer runs are on one side of their median in over 5 % of cases
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """An estimate with its 95 % interval (NaN: none), from `n` runs or pairs; `count`: how many of them have
-    what is asked for, where that is countable. `text`: all of it in words."""
+    """An estimate with its 95 % interval (NaN: none) from `n` runs or pairs. `count`: those with the
+    property, if countable. `text`: everything as text."""
 
     estimate: float
     low: float
@@ -53,22 +53,22 @@ class Estimate:
 
 
 def share(runs: pd.DataFrame, *, of: str, part: str) -> Estimate:
-    """The share of the runs of `of` that are in `part`, too; Wilson interval."""
+    """The share of the runs of `of` that are also in `part`; Wilson interval."""
     return of_share(_share(runs, of, part))
 
 
 def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Estimate:
-    """The share of `part` in the runs of `of` less that in the runs of `against`; Newcombe interval."""
+    """The share of `part` among runs of `of` minus that among `against`; Newcombe interval."""
     return of_difference(_share(runs, of, part), _share(runs, against, part))
 
 
 def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Hazard rate of guided less that of random runs; whole faults (location and value) resampled."""
+    """Hazard rate of guided minus random runs; whole faults (location and value) are resampled."""
     chosen = _query(runs, of)
     one, other = (
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
     )
-    found = contrasts.resampled(chosen, "injected")  # of these runs: they are chosen already
+    found = contrasts.resampled(chosen, "injected")  # already selected
     return Estimate(
         estimate=found.difference,
         low=found.low,
@@ -79,7 +79,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Odds of a hazard, guided against random, common to the fault types (Mantel-Haenszel)."""
+    """Common odds of a hazard over fault types, guided against random (Mantel-Haenszel)."""
     parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
     found = contrasts.mantel_haenszel(parts)
     said = f"- ({found.strata} fault types)"
@@ -98,9 +98,9 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Of the pairs of guided and random run that differ in having a hazard, the share where the guided one
-    has it. Clopper-Pearson interval, which decides as McNemar's exact test does. `of` is a query on pairs:
-    its columns end in `_guided` and `_random`."""
+    """Among guided-random pairs that differ in having a hazard, the share in which the guided run has it.
+    Clopper-Pearson interval, which agrees with McNemar's exact test. `of` is a query on pairs: column names
+    end in `_guided` and `_random`."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     matched = contrasts.mcnemar(_query(contrasts.pairs(runs), of))
@@ -121,12 +121,12 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
-    """Mean of `end - start` in s over the runs of `of` that have both; interval of Student's t."""
+    """Mean of `end - start` in s over the runs of `of` that have both; Student's t interval."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
     chosen = _query(runs, of)
     known = (chosen[end] - chosen[start]).dropna()
-    if len(known) < 2 or known.nunique() < 2:  # of a single value nothing is known about the spread
+    if len(known) < 2 or known.nunique() < 2:  # a single value says nothing about the spread
         return Estimate(
             estimate=math.nan, low=math.nan, high=math.nan, n=len(known), text=f"- (N {len(known)})"
         )
@@ -136,7 +136,7 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
 
 def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     """Kaplan-Meier median of the time in s from the first alert to a hazard, censored at the end of the run
-    (column `t_end`, s of simulation). Infinite: most alerts are never followed by a hazard."""
+    (column `t_end`, s of simulation). Infinite: most alerts are not followed by a hazard."""
     chosen = _query(runs, of)
     if chosen["t_end"].isna().any():
         nan = math.nan
@@ -146,7 +146,7 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
     median, low, high = found.median, found.median_low, found.median_high
     if found.at_risk and math.isnan(
         low
-    ):  # the curve is nowhere near a half: always above, or past it in a step
+    ):  # the curve does not touch one half: always above, or past it in one step
         median = math.inf if math.isnan(median) else median
         if found.at_risk >= _BOUNDS_A_MEDIAN:
             low = high = median
@@ -154,12 +154,12 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def of_share(one: Share) -> Estimate:
-    """What a share says."""
+    """The estimate of a share."""
     return Estimate(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, text=str(one))
 
 
 def of_difference(one: Share, other: Share) -> Estimate:
-    """What two shares of different runs say, the first less the second (Newcombe, statsmodels)."""
+    """The difference of two shares of different runs, first minus second (Newcombe, statsmodels)."""
     from statsmodels.stats.proportion import confint_proportions_2indep
 
     low = high = math.nan
@@ -177,7 +177,7 @@ def _query(runs: pd.DataFrame, text: str) -> pd.DataFrame:
 
 
 def _share(runs: pd.DataFrame, of: str, part: str) -> Share:
-    words = {*re.findall(r"\w+", f"{of} {part}")}  # choosing rows of all columns of a million takes seconds
+    words = {*re.findall(r"\w+", f"{of} {part}")}  # selecting rows is slow with all columns
     chosen = _query(runs[[name for name in runs.columns if name in words]], of)
     return wilson(len(_query(chosen, part)), len(chosen))
 

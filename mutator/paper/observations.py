@@ -1,7 +1,7 @@
-"""The published observations, put to the test: each claim a query on the results, and a verdict by a rule.
+"""Tests published observations: each claim is a query on the results, and a rule gives the verdict.
 
-Claims, queries and rules are data of the fault library (`references/paper_observations.yaml`). The query that
-a report shows is the call that was evaluated; see `mutator.paper.measures`.
+Claims, queries and rules are data of the fault library (`references/paper_observations.yaml`). Reports show
+the evaluated calls; see `mutator.paper.measures`.
 """
 
 from collections.abc import Iterator, Sequence
@@ -19,11 +19,11 @@ from mutator.statistics.shares import share
 
 FILE = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
-FEWEST = 10  # runs of which an interval is believed
+FEWEST = 10  # runs needed to trust an interval
 
 
 class Verdict(StrEnum):
-    """What became of a claim."""
+    """The verdict on a claim."""
 
     HOLDS = "holds"
     FAILS = "does not hold"
@@ -31,10 +31,10 @@ class Verdict(StrEnum):
 
 
 class Rule(StrictModel):
-    """When a claim holds; exactly one of these. Shares and differences are of 1, times in s.
+    """The condition for a claim; exactly one field is set. Shares and differences are fractions, times in s.
 
-    `above, below, within`: where the whole interval must lie (within: of plus and minus). `some`: at least
-    one run must have it, `never`: none may; where none has, the interval must end at this share or below.
+    `above, below, within`: where the whole interval must lie (within: plus or minus). `some`: at least one
+    run must have it; `never`: none may. If none has it, the interval must end at or below this share.
     """
 
     above: float | None = None
@@ -50,12 +50,12 @@ class Rule(StrictModel):
         return self
 
     def verdict(self, found: Estimate) -> Verdict:
-        """What the rule says of an estimate."""
+        """The verdict on an estimate."""
         if self.some is not None or self.never is not None:
             return self._seen(found)
         if found.n < FEWEST:
             return Verdict.UNDECIDED
-        low, high = found.low, found.high  # NaN: no comparison is true
+        low, high = found.low, found.high  # NaN: comparisons are false
         if self.within is not None:
             holds, fails = -self.within < low and high < self.within, low > self.within or high < -self.within
         elif self.above is not None:
@@ -84,8 +84,8 @@ class _Each(StrictModel):
 
 
 class Claim(StrictModel):
-    """One claim; see the head of the file of observations. Without a measure it is one that results cannot
-    decide, and `see` says what may."""
+    """One claim; the head of the file of observations explains it. Without a measure, results cannot decide
+    it, and `see` names what might."""
 
     says: str
     measure: str | None = None
@@ -113,9 +113,9 @@ class Claim(StrictModel):
         return self
 
     def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
-        """The measure's arguments, by the group they are of (once, with an empty name, if there are none)."""
+        """The measure's arguments by group (one with an empty name if there are no groups)."""
         named = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
-        # `of` may be empty, which asks for all runs; the others are there or not
+        # an empty `of` means all runs
         arguments = {name: text for name, text in named.items() if text is not None}
         if self.each is None:
             yield "", arguments
@@ -125,7 +125,7 @@ class Claim(StrictModel):
             yield value, arguments | {"of": chosen}
 
     def published(self) -> Estimate | None:
-        """The paper's counts as our measures see them."""
+        """The paper's counts as an estimate."""
         shares = [share(count, of) for count, of in self.paper]
         if len(shares) == 2:
             return of_difference(*shares)
@@ -148,7 +148,7 @@ class Observations(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """One query and what it found; `group` is empty where the claim has no groups."""
+    """One query and its result; `group` is empty if the claim has no groups."""
 
     group: str
     query: str
@@ -158,13 +158,13 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedClaim:
-    """A claim, what was found, and its verdict; `why` says what the rule alone does not."""
+    """A claim, its results and verdict; `why` adds reasons beyond the rule."""
 
     number: str  # 1.2: the second claim of the first observation
     claim: Claim
     answers: tuple[Answer, ...]
     verdict: Verdict
-    paper: Verdict | None  # by the same rule on the published counts
+    paper: Verdict | None  # the same rule on the published counts
     why: str
 
 
@@ -181,11 +181,11 @@ class JudgedObservation:
 def judge(
     path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
 ) -> tuple[JudgedObservation, ...]:
-    """The observations of a file, put to a frame of results; with `only_needed` only the claims that they
-    rest on.
+    """Judge a file's observations on a frame of results; with `only_needed` only the claims that they depend
+    on.
 
-    `lacks`: why these are not the paper's mixture of faults, if they are not. MutatorError with file and line
-    for a file or a query that is wrong.
+    `lacks`: how the runs differ from the paper's mixture of faults. MutatorError with file and line for an
+    invalid file or query.
     """
     model, source = read(path, Observations, SCHEMA)
     made = []
@@ -203,7 +203,7 @@ def judge(
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
-    """All must hold: one that does not is enough against, one that cannot be told leaves the rest open."""
+    """All must hold: one that fails decides against; otherwise one without enough data leaves it open."""
     for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict

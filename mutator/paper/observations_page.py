@@ -42,13 +42,13 @@ def table(observation: JudgedObservation) -> Table:
 
 
 def published(one: JudgedClaim) -> str:
-    """What the paper says, counts first."""
+    """The paper's statement, counts first."""
     found = one.claim.published()
     return "; ".join(text for text in (found.text if found else "", one.claim.told) if text) or "-"
 
 
 def session(ends: Sequence[tuple[str, float]]) -> str:
-    """The lines of Python after which the queries below them can be run."""
+    """The Python lines that the queries need first."""
     if not ends:
         return SESSION
     times = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
@@ -58,7 +58,7 @@ def session(ends: Sequence[tuple[str, float]]) -> str:
 def markdown(
     observations: Sequence[JudgedObservation], ends: Sequence[tuple[str, float]], coverage: str
 ) -> str:
-    """All of it: verdicts, claims, rules, and the queries as they were evaluated."""
+    """The complete page: verdicts, claims, rules, and the evaluated queries."""
     parts = ["# The paper's observations", coverage, verdicts(observations), rules()]
     for one in observations:
         parts += [f"## {heading(one)}", table(one).as_markdown()]
@@ -85,7 +85,7 @@ def rules() -> str:
 
 
 def sheet(observations: Sequence[JudgedObservation]) -> Sheet:
-    """One line for each query, its numbers in columns of their own."""
+    """One line for each query, with each number in its own column."""
     return Sheet(
         name="observations",
         title="The paper's observations",

@@ -1,4 +1,4 @@
-"""The published observations in the report of a run: judged on its results, written, shown."""
+"""The published observations in a run's report: judged on its results, written, shown."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -50,11 +50,11 @@ _HTML = """\
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """The observations that the library cites, with observations.md and tables/observations.csv; of several
-    seeds also how many of them show each, with tables/observations_by_seed.csv.
+    """The observations that the library cites, with observations.md and tables/observations.csv; with several
+    seeds also counts by seed, with tables/observations_by_seed.csv.
 
-    None when the library cites none, when the run has none of the published fault types, or when its
-    experiments decide none of the observations. Those that they decide come first.
+    None if the library cites none, if the run has none of the published fault types, or if its experiments
+    decide no observation. Decided observations come first.
     """
     if run.workspace is None:
         return None
@@ -68,7 +68,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         return None
     ends = run.ends() or {}
     words = re.findall(r"\w+", file.read_text(encoding="utf-8"))
-    frame = slim(run.frame, *words)  # no query names another column
+    frame = slim(run.frame, *words)  # queries use no other columns
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))
     coverage = _coverage(run, len(kinds), missing)
@@ -105,12 +105,12 @@ def observations_panel(run: ReportedRun) -> Panel | None:
 
 
 def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
-    """The fault types of the paper that are not in these runs."""
+    """The paper's fault types that are missing from these runs."""
     return sorted(set(kinds) - set(runs["kind"].unique()))
 
 
 def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
-    """Why the run is not the paper's mixture of faults. A shard is only a part of its plan, too."""
+    """How the run differs from the paper's mixture of faults. A shard is also incomplete."""
     if missing:
         yield f"{len(missing)} of the paper's fault types are missing"
     if run.done < (planned := int(run.folder.head["experiments"])):

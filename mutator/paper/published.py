@@ -14,17 +14,17 @@ FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paper:
-    """The published counts. `summary` by (method, scenario), `coverage` by (method, module/fault type), where
-    only injected, activated and hazards are known."""
+    """The published counts. `summary` is by (method, scenario); `coverage` by (method, module/fault type) has
+    only injected, activated and hazards."""
 
     summary: dict[tuple[str, str], Tally]
     coverage: dict[tuple[str, str], Tally]
     driver_reaction_s: float
-    least_alert_to_hazard_s: float  # mean of the scenario where it is least, and most
+    least_alert_to_hazard_s: float  # mean in the scenarios with the least, and the most
     most_alert_to_hazard_s: float
 
     def published(self) -> Published:
-        """As tables show it beside the counts of a run."""
+        """The counts for tables next to those of a run."""
         least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
         return Published(
             source="paper",
@@ -83,7 +83,7 @@ class _Times(StrictModel):
 
 
 def load_paper(references: Path) -> Paper:
-    """The cited numbers in a folder; MutatorError with file and line for counts that cannot be."""
+    """Load the cited numbers of a folder; MutatorError with file and line for impossible counts."""
     summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
     coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
     times, _ = read(references / FILES[2], _Times, "paper_times/1")
@@ -117,7 +117,7 @@ def has_paper(references: Path) -> bool:
 
 
 def _check(tally: Tally, source: Source, row: int) -> None:
-    """Part and whole fit, and hazards with and without alert are the same number counted from both sides."""
+    """Parts must fit their whole, and both countings of hazards with and without alert must agree."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     fits = tally.activated <= tally.injected and max(parts) <= tally.activated
     if tally.alerts is not None:

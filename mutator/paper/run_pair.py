@@ -1,4 +1,5 @@
-"""A fault-free and a faulty run on one time axis: broken and full line, events marked, a stretch shaded."""
+"""Draws a fault-free and a faulty run on one time axis: dashed and solid line, events marked, a period
+shaded."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -22,10 +23,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BEFORE_S, AFTER_S = 4.0, 1.0  # of the run shown before the activation and past the hazard
+BEFORE_S, AFTER_S = 4.0, 1.0  # shown before activation and after the hazard
 SHADE = "#bbbbbb"
-LEAST_RANGE = 0.1  # of a vertical axis: a smaller one would show nothing as something
-LABEL_SHARE = 0.12  # of the time axis that the label of a mark takes
+LEAST_RANGE = 0.1  # of a vertical axis: less would magnify noise
+LABEL_SHARE = 0.12  # width of a mark's label, of the time axis
 
 
 def draw(
@@ -56,7 +57,7 @@ def draw(
 
 
 def first_ones(marks: Iterable[Mark]) -> list[Mark]:
-    """The marks without the alerts after the first, in their order."""
+    """The marks in order, with only the first alert."""
     kept: list[Mark] = []
     for mark in marks:
         if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in kept):
@@ -65,7 +66,7 @@ def first_ones(marks: Iterable[Mark]) -> list[Mark]:
 
 
 def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
-    """Golden broken above the full line of faulty, so that both are seen where they are equal."""
+    """Golden dashed above the solid faulty line, so that both are visible if equal."""
     t = pair.t[shown]
     axis.plot(t, finite(pair.faulty[channel][shown]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty")
     axis.plot(
@@ -76,15 +77,15 @@ def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
 
 
 def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
-    """A grey band over each stretch of `steps`."""
+    """A grey band over each run of `steps`."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
         axis.axvspan(t[begin], t[end - 1], color=SHADE, alpha=0.45, linewidth=0)
 
 
 def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
-    """A line through all panels for each mark; the names stand above the first, as low as there is room."""
-    free: list[float] = []  # where each level of names ends
+    """A line through all panels for each mark, with names above the first panel, as low as possible."""
+    free: list[float] = []  # the end of each level of names
     end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
     for mark in marks:
         for axis in axes:

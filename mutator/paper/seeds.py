@@ -1,4 +1,4 @@
-"""The published observations seed by seed: how many seeds show each of them."""
+"""The published observations by seed: how many seeds show each."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,15 +13,15 @@ from mutator.statistics.sheet import Cell, Sheet
 BySeed = Mapping[str, Sequence[JudgedObservation]]
 
 ABOUT = (
-    "Each seed is the whole campaign with other draws, and its observations are judged on its runs alone, by "
-    "the same rules. A seed has fewer runs than all together, so more of it cannot be told."
+    "Each seed is the whole campaign with different draws. Its observations are judged only on its runs, by "
+    "the same rules. A seed has fewer runs than all together, so more verdicts lack data."
 )
 
 
 def judge_by_seed(path: Path, runs: pd.DataFrame, lacks: Callable[[pd.DataFrame], Sequence[str]]) -> BySeed:
-    """The observations of a file, put to the runs of each seed by itself; nothing of a single seed.
+    """Judge a file's observations on each seed's runs separately; empty for a single seed.
 
-    `lacks` says of a seed's runs why they are not the paper's mixture of faults.
+    `lacks` returns how a seed's runs differ from the paper's mixture of faults.
     """
     seeds = seeds_of(runs)
     if len(seeds) < 2:
@@ -31,7 +31,7 @@ def judge_by_seed(path: Path, runs: pd.DataFrame, lacks: Callable[[pd.DataFrame]
 
 
 def table(together: Sequence[JudgedObservation], by_seed: BySeed) -> Table:
-    """How many seeds show each observation, and what all seeds together say."""
+    """How many seeds show each observation, and the verdict of all seeds together."""
     heads = ("observation", "", "all seeds together", *(verdict.value for verdict in Verdict), "seeds")
     rows = [
         (
@@ -45,12 +45,12 @@ def table(together: Sequence[JudgedObservation], by_seed: BySeed) -> Table:
 
 
 def _seeds_of(number: int, verdict: Verdict, by_seed: BySeed) -> list[str]:
-    """The seeds whose verdict on an observation is this one."""
+    """The seeds with this verdict on an observation."""
     return [seed for seed, judged in by_seed.items() if judged[number - 1].verdict is verdict]
 
 
 def sheet(by_seed: BySeed) -> Sheet:
-    """A line for each seed and each query of a claim that an observation rests on."""
+    """A line for each seed and each query of a claim that an observation depends on."""
     return Sheet(
         name="observations_by_seed",
         title="The paper's observations by seed",

@@ -1,4 +1,2 @@
-"""Review of generated diffs: mutants grouped by shape, decisions about the groups, the page and the gate.
-
-Nothing here runs an experiment.
-"""
+"""Review of generated diffs: groups of mutants, decisions, the review page and the gate. Runs no
+experiment."""

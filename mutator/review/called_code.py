@@ -1,8 +1,8 @@
-"""The target's code that injected lines call, found by its names: what runs beside what a reviewer reads.
+"""Finds the target code that injected lines call, by name, so that reviewers see it.
 
-A name leads through imports to a function, a class or a constant of the tree, and its source to further
-names. Classes count whole, with their bases; of `self` the method that is named. What only a value can tell
-(a method of an argument, say) is not followed, and annotations call nothing.
+Names are resolved through imports to functions, classes and constants of the tree, and on to the names in
+their sources. Classes count as a whole, with their bases; for `self`, only the named method counts. Calls
+that depend on values (a method of an argument, say) are not followed. Annotations are ignored.
 """
 
 import ast
@@ -18,13 +18,13 @@ from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
 
 _Class = tuple[str, str]  # its file, its name
-_FURTHEST = 20  # imports from one module to the next that a name is followed through
+_FURTHEST = 20  # longest chain of imports that a name is followed through
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
-    """Something in the tree that has source: `name` in the file at `path`, or all of it (no name). Of a
-    method, `me` is the class of the object: it may have methods of its own for a base's."""
+    """A piece of the tree with source: `name` in the file at `path`, or the whole file (no name). For a
+    method, `me` is the class of the object, whose own methods override those of bases."""
 
     path: str
     name: str
@@ -32,21 +32,22 @@ class _Place:
 
 
 class CalledCode:
-    """Finds what is called in one tree."""
+    """Finds called code in one tree."""
 
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
 
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
-        """What the injected lines of faults call in `data`, the mutated file at `path`.
+        """The code that injected lines call in `data`, the mutated file at `path`.
 
-        Source by place: `car/weather.py Rain`; of a file that is no Python all of it.
+        Returns sources by place: `car/weather.py Rain`; for a file that is not Python, all of it.
         """
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 
     def of_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
-        """The same for expressions that are to stand in a function; what is no expression calls nothing."""
+        """The code that expressions in a function would call; text that is not an expression calls
+        nothing."""
         node, owner = self._module(path).function(function), function.rpartition(".")[0]
         found: list[Use] = []
         for text in texts:
@@ -65,7 +66,7 @@ class CalledCode:
         return {f"{one.path} {one.name}".strip(): found[one] for one in sorted(found)}
 
     def _beyond(self, place: _Place) -> Iterator[_Place]:
-        """What the source of a place calls in its turn; a class has its methods already."""
+        """The places that a place's source calls; a class already includes its methods."""
         module = self._module(place.path)
         for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
@@ -79,7 +80,7 @@ class CalledCode:
         return text.decode("utf-8", "surrogateescape")
 
     def _files(self, path: str, node: ast.AST) -> Iterator[_Place]:
-        """Files beside this one that are no Python and that its source names: C code, a table."""
+        """Files next to this one that are not Python and that its source names: C code, a table."""
         folder = PurePosixPath(path).parent
         for one in ast.walk(node):
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and "." in one.value:
@@ -103,7 +104,8 @@ class CalledCode:
                 yield from self._named(path, use.words, 0)
 
     def _named(self, path: str, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
-        """What a name of the module at `path` leads to; `words` are the name and its attributes."""
+        """The places that a name of the module at `path` refers to; `words` are the name and its
+        attributes."""
         module = self._module(path)
         if depth > _FURTHEST or not words:
             return
@@ -116,11 +118,11 @@ class CalledCode:
                 yield from self._named(target, words, depth + 1)
 
     def _imported(self, path: str, one: Import, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
-        """What an import leads to, and the attributes after it."""
+        """The places that an import and the attributes after it refer to."""
         name = one.absolute(path)
         if one.name is not None:
             target, name = self._path(name), ".".join(filter(None, (name, one.name)))
-            own = target and target != path  # `from . import x` in a package: x is no name of its own
+            own = target and target != path  # `from . import x` in a package: x is a module, not a name in it
             if target and own and (self._module(target).knows(one.name) or not self._path(name)):
                 yield from self._named(target, (one.name, *words), depth + 1)
                 return
@@ -135,7 +137,8 @@ class CalledCode:
                 yield _Place(target, "")
 
     def _of_self(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The method of a class, or else of its bases, that `self.name` names in an object of `me`."""
+        """The method that `self.name` refers to in an object of `me`: that of the class, else of its
+        bases."""
         path, inside = owner
         if self._module(path).nodes_of(f"{inside}.{name}"):
             yield _Place(path, f"{inside}.{name}", me)
@@ -143,7 +146,7 @@ class CalledCode:
             yield from self._of_bases(owner, name, me, depth)
 
     def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The same of the bases alone, for `super().name`."""
+        """The same for `super().name`: bases only."""
         path, inside = owner
         for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):
@@ -161,7 +164,7 @@ class CalledCode:
 
 
 def _injected(data: bytes) -> Callable[[ast.expr], bool]:
-    """Whether a node of a mutated file was injected: an inserted line, the new value in a changed one."""
+    """A predicate for injected nodes of a mutated file: inserted lines, and new values in changed lines."""
     tags = {number: tag for number, line in enumerate(data.splitlines(), 1) if (tag := tag_of(line))}
     changed = [(line, first, end) for _, line, first, end in changed_parts(data)]
 

@@ -1,8 +1,7 @@
-"""What there is to review: the mutants of a library or campaign, grouped by location and template.
+"""The groups to review: the mutants of a library or campaign by location and template.
 
-A group is the same whichever of its mutants are selected, and whatever triggers them: its id follows from
-what it is about, and what a decision is bound to (`Material`) from its diff with holes, the target's code and
-the templates.
+A group does not depend on which of its mutants are selected, or on triggers. Its id follows from its subject;
+decisions are bound to its diff with holes, the target's code and the templates (`Material`).
 """
 
 from collections import Counter
@@ -36,15 +35,14 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ only in values and triggers, or those that an operator makes of a function. `what`
-    is one line: the location and the template.
+    """Mutants that differ only in values and triggers, or an operator's mutants of a function. `what` is one
+    line: location and template.
 
-    `shapes` are its diffs with holes: more than one if a template writes different lines for different
-    numbers. Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None
-    without a campaign. `trigger` and `hold` name the kinds there are, with `or` between.
-
-    `values` is what each parameter may be by the specs; `seen` is all that a decision is bound to, as text;
-    `made_from` are the spec files and the templates, with their YAML.
+    `shapes` are its diffs with holes, several if a template writes different lines for different numbers.
+    Their members are `faults`, by id. `runs` is the number of its experiments in a campaign, None without
+    one. `trigger` and `hold` list the kinds, joined by `or`.
+    `values` is the range of each parameter in the specs. `seen` is the text that a decision is bound to.
+    `made_from` are the spec files and templates, with their YAML.
     """
 
     id: str
@@ -66,7 +64,7 @@ class Group:
 
     @property
     def diff(self) -> str:
-        """Its diffs with holes, for reading."""
+        """Its diffs with holes, for display."""
         return "".join(shape.diff for shape in self.shapes)
 
     @property
@@ -79,14 +77,14 @@ _Member = tuple[Fault, Trigger]
 
 
 def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
-    """The groups of every mutant that the plan runs, its canary included; the probe's comes last."""
+    """The groups of all mutants that the plan runs, canary included; the probe's group is last."""
     manifest = workspace.manifest(plan.campaign.target)
     members = [(e.fault, e.trigger) for e in (*plan.experiments, plan.canary)]
     runs = Counter(groups.group_label(e.fault) for e in plan.experiments)
     files = [one.file for one in plan.campaign.faults if one.file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
-    ]  # a run's copy of a campaign leads nowhere
+    ]  # a run's copy of a campaign has no targets for its links
     specs = (*workspace.specs(), *named)
     return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 
@@ -99,11 +97,11 @@ def of_library(
     reading: str | None = None,
     seed: int = 0,
 ) -> tuple[Group, ...]:
-    """The groups of the library's faults; the probe's comes last.
+    """The groups of the library's faults; the probe's group is last.
 
-    Each fault is built under every context of the tables and at a random time, as campaigns do that leave
-    open how long a fault stays; without `reading`, in every reading of the library. `specs` are spec files or
-    globs over specs (none: all); MutatorError for one that matches nothing.
+    Each fault is built under every context of the tables and at a random time, as in campaigns that do not
+    set the hold. Without `reading`, all readings are included. `specs` are spec files or globs (none: all);
+    MutatorError if one matches nothing.
     """
     models = workspace.fault_models()
     tables = map(workspace.context_table, workspace.context_tables)
@@ -121,7 +119,7 @@ def of_library(
 
 
 def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
-    """The wanted specs: all of them, files, or those whose names match a glob."""
+    """The wanted specs: all, given files, or those whose names match a glob."""
     library = workspace.specs()
     if not wanted:
         yield from library
@@ -131,7 +129,7 @@ def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
 
 
 class _Catalogue:
-    """Makes the groups of one target and its templates; `specs` say what may be drawn."""
+    """Builds the groups of one target; `specs` define which values can be drawn."""
 
     def __init__(self, models: FaultModels, manifest: TargetManifest, specs: Sequence[FaultSpec]) -> None:
         self.models = models
@@ -200,7 +198,7 @@ class _Catalogue:
         return (*specs, *(path for one in found for path in (one.template_path, one.source.path)))
 
     def _material(self, faults: Sequence[Fault], patches: Sequence[str]) -> Material:
-        """What a decision about mutants is bound to: a fault and its patch of each shape."""
+        """The texts that a decision about mutants is bound to: a fault and its patch for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
             mutant = build(self.manifest, self.models, fault, always())
@@ -215,7 +213,7 @@ class _Catalogue:
         )
 
     def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
-        """What all the mutants of an operator in a function follow from, whichever were drawn."""
+        """The texts that all mutants of an operator in a function follow from, whichever were drawn."""
         at, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))
@@ -227,7 +225,7 @@ class _Catalogue:
         )
 
     def _probe(self, runs: Mapping[str, int] | None) -> Group:
-        """What every mutant has: the probe, its import, and the statement that observes."""
+        """The code in every mutant: the probe, its import, and the observing statement."""
         location = self.manifest.observation.location
         what = f"the probe, observing at {groups.location_label(location)}"
         patch = build(self.manifest, self.models, None, always()).patch

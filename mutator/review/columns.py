@@ -1,4 +1,4 @@
-"""What filters over groups of mutants may ask; a module of its own, since help texts need nothing else."""
+"""The columns that filters over groups can use; a separate module because help texts need nothing else."""
 
 COLUMNS = (
     "group",

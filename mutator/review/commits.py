@@ -1,4 +1,4 @@
-"""What git knows for a review: the library's commit, who is at work, and who changed a group last."""
+"""Git data for reviews: the library's commit, the user's name, and who last changed a group."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,37 +14,38 @@ _FORMAT = "--format=%H%x00%aN <%aE>%x00%(trailers:key=Co-authored-by,valueonly,s
 
 @dataclass(frozen=True, slots=True)
 class _Commit:
-    """A commit, its author as a `.mailmap` has it, and its co-authors as its message names them."""
+    """A commit with its author (as in `.mailmap`) and the co-authors that its message names."""
 
     id: str
-    author: str  # `Jane Doe <jane@x.org>`, as the others
+    author: str  # `Jane Doe <jane@x.org>`; co-authors too
     others: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
-        """Whether somebody who signs so has written it: `Jane Doe`, `jane@x.org`, `Jane Doe <jane@x.org>`."""
+        """Whether this reviewer wrote it: `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`."""
         return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
 
 
 def _names(person: str) -> set[str]:
-    """What somebody is known by: name, address, both."""
+    """A person's identities: name, address, both."""
     name, _, rest = person.partition("<")
     return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 
 
 def user_name(workspace: Workspace) -> str | None:
-    """git's `user.name` for the library; None without one, or without git."""
+    """Git's `user.name` for the library; None if it is not set or git is missing."""
     return (git(workspace.library, "config", "user.name") or "").strip() or None
 
 
 def library_commit(workspace: Workspace) -> str | None:
-    """The library's commit, with `-dirty` where more than its reviews was changed since; None outside git."""
+    """The library's commit, with `-dirty` if anything but its reviews changed since; None outside git."""
     head = git(workspace.library, "rev-parse", "HEAD")
     changes = git(workspace.library, "status", "--porcelain", "--", ".", ":(exclude)reviews")
     return None if head is None or changes is None else head.strip() + "-dirty" * bool(changes.strip())
 
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
-    """MutatorError where somebody approves a group whose last change is theirs, or cannot be told."""
+    """MutatorError if a reviewer approves a group that they changed last, or if its last author is
+    unknown."""
     known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
         if group.made_from not in known:
@@ -60,13 +61,13 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
 
 
 def _last_changes(group: Group) -> dict[Path, _Commit]:
-    """The last commit, in each clone, that changed what the group is made from."""
+    """The last commit in each clone that changed the group's sources."""
     clones: dict[Path, list[Path]] = {}
     for path in group.made_from:
         top = git(path.parent, "rev-parse", "--show-toplevel")
         if top is None:
             raise _refusal(
-                f"nobody can tell who changed group {group.id} last: no git clone", path, "keep it in git"
+                f"cannot determine who last changed group {group.id}: no git clone", path, "put it under git"
             )
         clones.setdefault(Path(top.strip()), []).append(path)
     return {top: _last_change(group, top, paths) for top, paths in clones.items()}
@@ -79,7 +80,7 @@ def _last_change(group: Group, top: Path, paths: Sequence[Path]) -> _Commit:
     if changes is None or changes.strip() or not told.strip():
         first = (changes or "").strip().partition("\n")[0].split(maxsplit=1)[-1:]
         raise _refusal(
-            f"nobody can tell who changed group {group.id} last: not committed",
+            f"cannot determine who last changed group {group.id}: not committed",
             Path(top, *first),
             "commit first",
         )
@@ -91,6 +92,6 @@ def _refusal(got: str, where: Path, remedy: str) -> MutatorError:
     return MutatorError(
         got,
         where=where,
-        expected="another reviewer than the author of the last change (`four_eyes` of this library)",
+        expected="a reviewer other than the author of the last change (`four_eyes` of this library)",
         remedy=remedy,
     )

@@ -1,8 +1,8 @@
-"""Decisions, remarks and flags about groups of mutants: who said what, whether it holds, and how it is kept.
+"""Decisions, remarks and flags on groups of mutants: their validity and storage.
 
-A decision holds for what the reviewer saw: the group's diff, the target's functions, the templates, the code
-that the injected lines call, the range of each value. When one of these is another now, the group is
-`changed` and needs a new decision.
+A decision is bound to what the reviewer saw: the group's diff, the target's functions, the templates, the
+code that injected lines call, and the range of each value. If one of these changes, the group is `changed`
+and needs a new decision.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -24,16 +24,16 @@ from mutator.workspace import Workspace
 
 
 class State(StrEnum):
-    """The state of a group's review, in the order in which groups are listed."""
+    """The state of a group's review, in list order."""
 
-    NEW = "new"  # nobody has decided
+    NEW = "new"  # no decision
     CHANGED = "changed"  # since the decision
     REJECTED = "rejected"
     APPROVED = "approved"
 
 
 class Kind(StrEnum):
-    """What a reviewer does about a group."""
+    """An action of a reviewer on a group."""
 
     APPROVE = "approve"
     REJECT = "reject"
@@ -48,7 +48,7 @@ _VERDICTS = {Kind.APPROVE: Verdict.APPROVED, Kind.REJECT: Verdict.REJECTED}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """What `by` does about a group as it is now. A text given with it is left as a remark."""
+    """An action of `by` on a group in its current state. Its text is stored as a remark."""
 
     group: Group
     kind: Kind
@@ -57,9 +57,9 @@ class Change:
 
 
 class Conflict(CheckFailed):
-    """Somebody else has said something about these groups since the caller looked. Nothing was written.
+    """Somebody else changed the review of these groups since the caller looked. Nothing was written.
 
-    `groups` are their ids, `review` is what is kept now.
+    `groups` are their ids, `review` is the current review.
     """
 
     groups: tuple[str, ...] = ()
@@ -68,9 +68,9 @@ class Conflict(CheckFailed):
 
 @dataclass(frozen=True, kw_only=True)
 class Review:
-    """What was said of one target's groups, by group; `path` is the file, which need not exist.
+    """The reviews of one target's groups, by group; `path` is the file, which may not exist.
 
-    With `four_eyes` a group is not approved by the author of its last change.
+    With `four_eyes`, the author of a group's last change cannot approve it.
     """
 
     path: Path
@@ -79,27 +79,27 @@ class Review:
     four_eyes: bool = False
 
     def decision(self, group: str) -> Decision | None:
-        """The decision about a group, by id; None for a new one."""
+        """The decision about a group, by id; None if there is none."""
         entry = self.entries.get(group)
         return entry.decision if entry else None
 
     def remarks(self, group: str) -> tuple[Remark, ...]:
-        """What was remarked on it, the oldest first."""
+        """The group's remarks, oldest first."""
         entry = self.entries.get(group)
         return entry.remarks if entry else ()
 
     def flag(self, group: str) -> Flag | None:
-        """Who wants it to be looked at again, if anybody does."""
+        """The group's flag, if any."""
         entry = self.entries.get(group)
         return entry.flag if entry else None
 
     def revision(self, group: str) -> str:
-        """Digest of all that was said of it; empty while nothing was."""
+        """Digest of the group's review; empty if there is none."""
         entry = self.entries.get(group)
         return entry.revision if entry else ""
 
     def changed(self, group: Group) -> list[str]:
-        """What of a group has changed since the decision, in words; empty: it holds, or there is none."""
+        """The parts of a group that changed since the decision, as text; empty if it is valid or missing."""
         decision = self.decision(group.id)
         return decision.changed(group.bound, group.values) if decision else []
 
@@ -111,9 +111,9 @@ class Review:
         return State.CHANGED if self.changed(group) else State(decision.verdict.value)
 
     def changes(self, group: Group) -> str:
-        """What was seen when a group was decided against what it is now, as a unified diff.
+        """A unified diff from what the reviewer saw to the current state.
 
-        Empty while the decision holds, and where what was seen was not kept.
+        Empty if the decision is valid or what was seen was not stored.
         """
         decision = self.decision(group.id)
         if decision is None or not self.changed(group):
@@ -121,16 +121,16 @@ class Review:
         return seen_texts.changes(self.seen_path(group.id), decision.bound, group.seen)
 
     def seen_path(self, group: str) -> Path:
-        """Where what was seen of a group is kept."""
+        """The file with what was seen of a group."""
         return self.path.parent / "seen" / self.target / f"{group}.txt"
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
-        """The groups in the order of the list: new and changed ones first."""
+        """The groups in list order: new and changed ones first."""
         order = list(State)
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
     def describe(self, group: Group) -> str:
-        """Who decided about the group, and what has changed since; empty for a new one."""
+        """Who decided about the group, and changes since; empty without a decision."""
         decision = self.decision(group.id)
         if decision is None:
             return ""
@@ -141,12 +141,12 @@ class Review:
 
 
 def load_review(workspace: Workspace, target: str) -> Review:
-    """What was said of a target's groups; nothing without a file. MutatorError at the line of a mistake, and
-    for a link: an error would tell what stands in the file it leads to, and a change would replace it."""
+    """Load the reviews of a target's groups; empty without a file. MutatorError with the line of a mistake.
+    Links are refused: errors would reveal the linked file's content, and a change would replace the link."""
     path = workspace.library / "reviews" / f"{target}.yaml"
     if path.is_symlink():
         raise MutatorError(
-            "a link", where=path, expected="a file of its own", remedy="put the file in its place"
+            "a link", where=path, expected="a regular file", remedy="replace the link with the file"
         )
     if not path.exists():
         return Review(path=path, target=target, entries={})
@@ -155,13 +155,13 @@ def load_review(workspace: Workspace, target: str) -> Review:
 
 
 def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: Mapping[str, str]) -> Review:
-    """Make all of the changes, or none; what is kept then.
+    """Apply all changes or none, and return the stored review.
 
-    `seen` are the revisions of the groups that the caller has looked at (`Review.revision`; a group that is
-    missing there had nothing said of it). Only one caller at a time gets in here, whichever process it is in.
-    Conflict when somebody else has said something about one of the groups since; MutatorError for an
-    unusable name or text, for an approval that `four_eyes` forbids, and in the library that ships with
-    mutator, which stays as it is.
+    `seen` are the revisions of the groups that the caller saw (`Review.revision`; missing groups had no
+    review). A lock serializes callers across processes.
+    Conflict if somebody else has changed the review of one of the groups since; MutatorError for an unusable
+    name or text, for an approval that `four_eyes` forbids, and for the library shipped with mutator, which is
+    read-only.
     """
     made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
     for change in made:
@@ -178,16 +178,16 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
 
 
 def _text_of(kind: Kind) -> str:
-    """The argument that has the text of a change."""
+    """The argument with a change's text."""
     return "text" if kind is Kind.REMARK else "remark"
 
 
 def _check(change: Change) -> None:
-    """MutatorError for a change by nobody, and for a remark that says nothing."""
+    """MutatorError if the change lacks a name or its text."""
     if not change.by:
-        raise MutatorError("no name", argument="by", expected="who has reviewed", remedy="give a name")
+        raise MutatorError("no name", argument="by", expected="the reviewer's name", remedy="give a name")
     if change.kind is Kind.REMARK and not change.text:
-        raise MutatorError("no text", argument="text", expected="what is remarked", remedy="write something")
+        raise MutatorError("no text", argument="text", expected="a remark", remedy="write a remark")
 
 
 def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping[str, str]) -> None:
@@ -197,10 +197,10 @@ def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping
         return
     told = [f"  {one.id}  {_last_word(review, one)}" for one in unseen]
     conflict = Conflict(
-        "\n".join(["somebody else has said something meanwhile:", *told]),
+        "\n".join(["somebody else has reviewed these groups in the meantime:", *told]),
         where=review.path,
-        expected="groups that are as you saw them",
-        remedy="look at them again, then decide; nothing was written",
+        expected="groups unchanged since you saw them",
+        remedy="look at them again, then decide (nothing was written)",
     )
     conflict.groups, conflict.review = tuple(one.id for one in unseen), review
     raise conflict
@@ -222,7 +222,7 @@ def _last_word(review: Review, group: Group) -> str:
 
 
 def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) -> Review:
-    """The review with the changes, once it is on the disk; texts of what was seen go first."""
+    """Store the changes and return the review; texts of what was seen are written first."""
     at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
     entries = dict(review.entries)
     for change in changes:
@@ -240,7 +240,7 @@ def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) ->
 
 
 def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry:
-    """What is said of a group once a change is made."""
+    """An entry with a change applied."""
     group, kind = change.group, change.kind
     if change.text:
         entry = replace(entry, remarks=(*entry.remarks, Remark(by=change.by, at=at, text=change.text)))
@@ -265,10 +265,10 @@ def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry
 
 
 def _line(text: str, argument: str) -> str:
-    """Text as one line; MutatorError for characters that YAML cannot hold."""
+    """The text as one line; MutatorError for characters that YAML cannot store."""
     line = " ".join(text.split())
     if not line.isprintable():
         raise MutatorError(
-            f"{line!r}", argument=argument, expected="plain text", remedy="leave out what is not"
+            f"{line!r}", argument=argument, expected="plain text", remedy="remove other characters"
         )
     return line

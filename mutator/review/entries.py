@@ -1,4 +1,4 @@
-"""What reviewers said of a group of mutants: a decision, remarks, a flag. Plain records, without files."""
+"""The review of a group of mutants as plain records: a decision, remarks, a flag."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from mutator._common.hashing import content_id
 
-# Parameter -> its least and greatest number, then the values that are not finite numbers (`nan`), as words.
+# Parameter -> least and greatest number, then values that are not finite numbers (`nan`), as text.
 Values = Mapping[str, tuple[float | str, ...]]
 
 _WORDS = {
@@ -18,7 +18,7 @@ _WORDS = {
 
 
 class Verdict(StrEnum):
-    """What a reviewer decided."""
+    """A reviewer's decision."""
 
     APPROVED = "approved"
     REJECTED = "rejected"
@@ -26,15 +26,15 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bound:
-    """Digests of what a decision is about; when one of them changes, the decision no longer holds."""
+    """Digests of a decision's subject. If one changes, the decision is no longer valid."""
 
-    diff: str  # of the hunks with injected lines, without their values and line numbers
-    function: str  # of the target's functions that are changed, without injected lines
-    template: str  # of the templates that the injected lines were made from
-    calls: str | None = None  # of the target's code that the injected lines call; None: was not kept
+    diff: str  # of hunks with injected lines, without values and line numbers
+    function: str  # of the changed target functions, without injected lines
+    template: str  # of the templates of the injected lines
+    calls: str | None = None  # of the target code that the injected lines call; None: not stored
 
     def changed(self, now: "Bound") -> list[str]:
-        """What has changed, in words."""
+        """The changed parts, as text."""
         differs = {name: getattr(self, name) != getattr(now, name) for name in _WORDS}
         differs["calls"] &= self.calls is not None
         return [word for name, word in _WORDS.items() if differs[name]]
@@ -42,10 +42,10 @@ class Bound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Decision:
-    """What `by` decided about a group, and what the group was then.
+    """The decision of `by` about a group, and the group's state at that time.
 
-    `at` is the time (UTC, ISO 8601), `commit` that of the library, `tool` the version of mutator; they, the
-    values and the digest of what is called are None for a decision from a file that did not keep them.
+    `at` is the time (UTC, ISO 8601), `commit` the library's, `tool` the version of mutator. They, `values`
+    and the digest of called code are None in decisions from older files.
     """
 
     group: str
@@ -59,19 +59,19 @@ class Decision:
     values: Values | None = None
 
     def changed(self, bound: Bound, values: Values) -> list[str]:
-        """What of the group has changed since, in words; empty: the decision holds."""
+        """The parts of the group that changed since, as text; empty: the decision is valid."""
         beyond = _beyond(self.values, values) if self.values is not None else ""
         return self.bound.changed(bound) + ([f"values ({beyond})"] if beyond else [])
 
     @property
     def words(self) -> str:
-        """Who decided what, and on which day: `approved by Jane Doe on 2026-11-24`."""
+        """`approved by Jane Doe on 2026-11-24`."""
         return f"{self.verdict} by {self.by}" + (f" on {self.at[:10]}" if self.at else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """A line that somebody left on a group; `at` as in a decision."""
+    """A line of text on a group; `at` as in a decision."""
 
     by: str
     at: str | None
@@ -80,7 +80,7 @@ class Remark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flag:
-    """Somebody's mark to look at a group again."""
+    """A mark to look at a group again."""
 
     by: str
     at: str
@@ -88,7 +88,7 @@ class Flag:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
-    """All that was said of a group: its block in the file."""
+    """The review of a group: its block in the file."""
 
     group: str
     what: str
@@ -98,22 +98,22 @@ class Entry:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether nothing of it is left."""
+        """Whether the entry is empty."""
         return not (self.decision or self.remarks or self.flag)
 
     @property
     def revision(self) -> str:
-        """Digest of all of it: another one as soon as anybody has said anything more."""
+        """Digest of the entry; it changes with every change of the review."""
         return content_id(asdict(self))
 
 
 def values_in_words(values: Values) -> str:
-    """The ranges for a reader: `by: -40 to 40; seed: 3`."""
+    """The ranges as text: `by: -40 to 40; seed: 3`."""
     return "; ".join(f"{name}: {_range(value)}" for name, value in values.items())
 
 
 def _beyond(approved: Values, now: Values) -> str:
-    """The values that are not within the approved ones, in words; empty if all are."""
+    """The values outside the approved ranges, as text; empty if there are none."""
     wider = [name for name in now if not _within(now[name], approved.get(name, ()))]
     told = (f"{name}: {_range(now[name])}; approved {_range(approved.get(name, ()))}" for name in wider)
     return "; ".join(told)

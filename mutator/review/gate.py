@@ -1,4 +1,4 @@
-"""`--require-reviewed`: a campaign runs only approved mutants, and its run folder says who approved them."""
+"""`--require-reviewed`: a campaign runs only approved mutants, and its run folder records the approvals."""
 
 import shlex
 from collections import Counter
@@ -23,7 +23,7 @@ _MOST_IDS = 10  # in one printed command
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     """The decisions that allow the plan to run (canary and probe included), for `write_approvals`.
 
-    CheckFailed unless every group is approved as it is now; it lists the others and says how to review them.
+    CheckFailed unless every group has a valid approval; the error lists the others and how to review them.
     """
     manifest = workspace.manifest(plan.campaign.target)
     groups = of_plan(workspace, plan)
@@ -36,12 +36,12 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
 
 
 def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
-    """Write to the run folder what was approved, by whom, and the digests of what they saw."""
+    """Write the approvals to the run folder: reviewers and the digests of what they saw."""
     digests.rewrite(run, FILE, json_bytes(approvals))
 
 
 def approval_summary(run: Path) -> str:
-    """Who approved the mutants of a run, in words; empty for a run without `--require-reviewed`."""
+    """Who approved a run's mutants, as text; empty for a run without `--require-reviewed`."""
     if not (run / FILE).exists():
         return ""
     groups = read_json(run / FILE, SCHEMA)["groups"]
@@ -71,13 +71,13 @@ def _refusal(workspace: Workspace, plan: Plan, review: Review, refused: list[Gro
     return CheckFailed(
         "\n".join([f"{many} not approved:", *lines]),
         where=review.path,
-        expected="an approval of each, as it is now",
-        remedy=f"review what is missing: `mutator review walk {wanted} --by NAME`{at_once}",
+        expected="a valid approval of each group",
+        remedy=f"review the rest: `mutator review walk {wanted} --by NAME`{at_once}",
     )
 
 
 def reason(review: Review, group: Group) -> str:
-    """Why a group may not run: `missing`, what has `changed`, or by whom it was `rejected`."""
+    """Why a group cannot run: `missing`, what has `changed`, or who `rejected` it."""
     state, decision = review.state(group), review.decision(group.id)
     if decision is None:
         return "missing"
@@ -87,12 +87,12 @@ def reason(review: Review, group: Group) -> str:
 
 
 def share(group: Group) -> str:
-    """The part of a campaign that a group is: a number of experiments, or the canary alone."""
+    """A group's part of a campaign: a number of experiments, or only the canary."""
     return counted(group.runs, "experiment") if group.runs else "the canary"
 
 
 def _campaign(workspace: Workspace, plan: Plan) -> str:
-    """The campaign as a command names it: by name if the library has this text under it, else by file."""
+    """The campaign as commands name it: by name if the library has this text under it, else by file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source

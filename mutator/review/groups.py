@@ -1,9 +1,8 @@
-"""Patches that differ only in values, shown once: a diff with holes, and a table of what fills them.
+"""Groups patches that differ only in values: a diff with holes, and a table of the values in them.
 
-Two mutants of one shape differ only in the numbers, truth values and ids of their injected lines, and, in
-the probe, in its ids and the lines that define the trigger. These values are removed from each patch; patches
-with the same rest have the same shape. Values that are equal in all members are put back, so only the others
-remain holes.
+Mutants of one shape differ only in numbers, truth values and ids of their injected lines and, in the probe,
+in its ids and the lines that define the trigger. Removing these values from patches of one shape leaves equal
+text. Values that are equal in all members are put back; the others remain holes.
 """
 
 import re
@@ -19,10 +18,10 @@ from mutator.mutants.readable_diffs import adds_file, file_patches
 from mutator.operators.names import operator_of
 from mutator.triggers.conditions import TIME, names_in
 
-Span = tuple[int, int, str]  # of a value in a patch: begin, end, name (empty: not known yet)
+Span = tuple[int, int, str]  # of a value in a patch: begin, end, name (empty: not yet known)
 
 HOLE = "\0"  # never in Python source
-_WORD = r"\w.\\\x80-\U0010ffff"  # beside a number: it continues, or belongs to a name
+_WORD = r"\w.\\\x80-\U0010ffff"  # next to a number: it continues, or is part of a name
 _NUMBER = (  # with its sign, and with that of a sum: `- 3.0`
     rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD}])"
     r"|float\('-?(?:nan|inf)'\))|(?<![\w.])(?:True|False)(?!\w)"
@@ -32,28 +31,28 @@ _VALUE = re.compile(rf"(?P<id>{INJECTION_ID})|{_NUMBER}")
 
 @dataclass(frozen=True, kw_only=True)
 class Shape:
-    """Patches that differ only in values. A member's patch is `parts` with its values between them.
+    """Patches that differ only in values. A member's patch is `parts` with its values in between.
 
-    Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole may be in several places.
-    `values[m][h]` fills hole `h` in the patch of `members[m]`. `id` depends on `name` and on the text without
-    any value, so it is the same whichever members there are.
+    Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole may be in several places. `values[m][h]`
+    fills hole `h` in the patch of `members[m]`. `id` depends only on `name` and the text without values, not
+    on the members.
     """
 
     id: str
     name: str
     parts: tuple[str, ...]
     places: tuple[int, ...]
-    holes: tuple[str, ...]  # their names, all different
+    holes: tuple[str, ...]  # distinct names
     members: tuple[str, ...]
     values: tuple[tuple[str, ...], ...]
 
     @cached_property
     def diff(self) -> str:
-        """The patch for reading, with holes like `⟨by⟩`."""
+        """The patch for display, with holes like `⟨by⟩`."""
         return self._with([f"⟨{name}⟩" for name in self.holes])
 
     def patch(self, member: int) -> str:
-        """The patch of a member, as it was given."""
+        """The original patch of a member."""
         return self._with(self.values[member])
 
     def _with(self, values: Iterable[str]) -> str:
@@ -64,7 +63,7 @@ class Shape:
     def with_named_holes(self, parameters: Iterable[Mapping[str, Value]]) -> "Shape":
         """The shape with each numbered hole named after the parameter that it holds in every member.
 
-        `parameters` are those of each member, in the order of the members.
+        `parameters` has those of each member, in member order.
         """
         each = list(parameters)
         names: list[str] = []
@@ -80,8 +79,8 @@ class Shape:
 def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
     """The shapes of patches given as (key, name, patch), in the order of their first members.
 
-    Keys are the members' names. Patches with different `name`s never share a shape: the name says what else
-    its members have in common (see `group_label`), or nothing.
+    Keys are the members' names. Patches with different `name`s never share a shape: the name is what else its
+    members have in common (see `group_label`), or empty.
     """
     found: dict[tuple[str, str], _ShapeBuilder] = {}
     for key, name, patch in patches:
@@ -96,15 +95,15 @@ def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
 
 
 def without_values(patch: str) -> str:
-    """The patch without any value: equal for all patches of a shape."""
+    """The patch without values: equal for all patches of a shape."""
     return _rest(patch, list(_spans(patch)))
 
 
 def group_label(fault: Fault) -> str:
-    """Where and what, in words without values; only mutants with one label can share a shape.
+    """Location and template without values; only mutants with equal labels can share a shape.
 
-    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap)`. The mutants of an operator share
-    one in each function: `pkg/sensor.py Sensor.measure: operator constant`.
+    `pkg/sensor.py Sensor.measure after_assign gap: offset(by, target=gap)`. An operator's mutants share one
+    label in each function: `pkg/sensor.py Sensor.measure: operator constant`.
     """
     if operator := operator_of(fault):
         location = fault.injections[0].location
@@ -113,7 +112,7 @@ def group_label(fault: Fault) -> str:
 
 
 def location_label(location: FaultLocation) -> str:
-    """A location in words."""
+    """A location as text."""
     anchor = location.anchor
     number = f"#{anchor.nth}" if anchor.nth is not None else ""
     which = f"which {anchor.which}" if anchor.which else ""
@@ -122,7 +121,7 @@ def location_label(location: FaultLocation) -> str:
 
 
 def injection_label(injection: Injection) -> str:
-    """Location, model and parameters, without numbers; names and truth values may decide what is injected."""
+    """Location, model and parameters without numbers; names and truth values may decide what is injected."""
     given = (
         f"{name}={value}" if value is None or isinstance(value, str | bool) else name
         for name, value in injection.params
@@ -133,25 +132,25 @@ def injection_label(injection: Injection) -> str:
 
 
 def _instance(injection: Injection) -> str:
-    """Which instances and executions it is limited to, without numbers."""
+    """The limits on instances and executions, without numbers."""
     where = f" where {re.sub(_NUMBER, '#', injection.where)}" if injection.where else ""
     return where + "".join(f", {name}" for name in ("call", "every") if getattr(injection, name) is not None)
 
 
 def trigger_kind(trigger: Trigger) -> str:
-    """`always`, `time` (a condition on the time alone) or `state` (anything else, like a context)."""
+    """`always`, `time` (the condition uses only the time) or `state` (anything else, such as a context)."""
     if trigger.condition == "True":
         return "always"
     return "time" if names_in(trigger.condition) == (TIME,) else "state"
 
 
 def hold_of(fault: Fault, trigger: Trigger) -> Hold:
-    """How long the fault stays: its own `hold` overrides the trigger's."""
+    """How long the fault stays active: its own `hold` overrides the trigger's."""
     return fault.hold or trigger.hold
 
 
 def parameter_values(fault: Fault) -> dict[str, Value]:
-    """The parameters of its injections by name: `by`; with several injections also `1.by`, `2.by`."""
+    """The parameters of a fault's injections by name: `by`; with several injections also `1.by`, `2.by`."""
     given = [dict(injection.params) for injection in fault.injections]
     common = {
         name: value
@@ -164,14 +163,15 @@ def parameter_values(fault: Fault) -> dict[str, Value]:
 
 @dataclass(frozen=True, slots=True)
 class _ShapeBuilder:
-    """Collects the members of a shape; `labels` are the names of its values."""
+    """Collects a shape's members; `labels` are the names of its values."""
 
     labels: tuple[str, ...]
     members: list[str] = field(default_factory=list)
     values: list[list[str]] = field(default_factory=list)
 
     def shape(self, name: str, rest: str) -> Shape:
-        """Values that are equal in all members become text; values that equal each other share a hole."""
+        """Build the shape: values equal in all members become text, and values equal to each other share a
+        hole."""
         pieces = rest.split(HOLE) if self.labels else [rest]
         parts, places = [pieces[0]], []
         columns: dict[tuple[str, ...], int] = {}
@@ -197,7 +197,7 @@ class _ShapeBuilder:
 
 
 def _unused_name(label: str, taken: list[str]) -> str:
-    """The label, with a number if it is taken; just a number without a label."""
+    """The label, numbered if it is taken; only a number if the label is empty."""
     if not label:
         return str(1 + sum(name.isdigit() for name in taken))
     same = sum(name.partition("_")[0] == label for name in taken)
@@ -205,8 +205,8 @@ def _unused_name(label: str, taken: list[str]) -> str:
 
 
 def _spans(patch: str) -> Iterator[Span]:
-    """Where the values are, from the top of the patch to its end."""
-    if HOLE in patch:  # no Python source: such a patch has no holes
+    """The positions of values, from top to bottom."""
+    if HOLE in patch:  # not Python source: no holes
         return
     begin = 0
     for section in file_patches(patch):
@@ -232,7 +232,7 @@ def _rest(patch: str, spans: list[Span]) -> str:
 
 
 def _shows(text: str, value: Value) -> bool:
-    """Whether the text in a patch is this parameter's value, whatever its sign."""
+    """Whether the text in a patch is this parameter's value, ignoring the sign."""
     if isinstance(value, bool) or value is None or isinstance(value, str):
         return text == repr(value)
     number = text.lstrip("+- ").removeprefix("float('").removesuffix("')")

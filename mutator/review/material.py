@@ -1,4 +1,4 @@
-"""What a decision is bound to, as text and as digests: diff, target functions, templates, called code."""
+"""What a decision is bound to, as text and digests: diff, target functions, templates, called code."""
 
 import ast
 import re
@@ -20,7 +20,7 @@ _SHOWN_HOLE = "⟨⟩"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """The texts; `diff` is one for each shape of the diff, or one for each change that an operator makes."""
+    """The texts; `diff` has one for each shape of the diff, or one for each change that an operator makes."""
 
     diff: Sequence[str] | Sequence[Sequence[str]]
     functions: Mapping[str, str]
@@ -39,7 +39,7 @@ class Material:
 
     @property
     def sections(self) -> dict[str, str]:
-        """The texts for a reader."""
+        """The texts for display."""
         changes = (one if isinstance(one, str) else " -> ".join(one) + "\n" for one in self.diff)
         return {
             "diff": "".join(changes).replace(HOLE, _SHOWN_HOLE),
@@ -50,7 +50,7 @@ class Material:
 
 
 def diffs_of(patches: Iterable[str]) -> list[str]:
-    """Patches without values and line numbers, each once, in an order that does not depend on values."""
+    """Distinct patches without values and line numbers, in an order that does not depend on values."""
     texts = sorted({without_values(patch) for patch in patches})
     return list(dict.fromkeys(_HUNK_HEAD.sub("@@", text) for text in texts))
 
@@ -66,7 +66,7 @@ def functions_of(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[s
 
 
 def fault_hunks(patch: str) -> str:
-    """The hunks that hold lines of a fault, without those that every mutant has."""
+    """The hunks with lines of a fault, without those that every mutant has."""
     kept = []
     for section in file_patches(patch):
         if not adds_file(section):
@@ -77,7 +77,7 @@ def fault_hunks(patch: str) -> str:
 
 
 def _named(texts: Mapping[str, str | Sequence[str]]) -> str:
-    """Texts one below the other, each under its name."""
+    """The texts one below the other, each under its name."""
     each = ((name, text if isinstance(text, str) else "\n".join(text)) for name, text in texts.items())
     return "\n".join(f"-- {name}\n{text.rstrip()}\n" for name, text in each)
 

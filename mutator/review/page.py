@@ -1,6 +1,6 @@
-"""The review page: every group with its state, diff and values, in one self-contained file.
+"""The review page: every group with state, diff and values in one self-contained file.
 
-A server shows the same page; there, what a reviewer says is kept as it is said (`served`).
+A server shows the same page and saves reviewers' actions at once (`served`).
 """
 
 import shlex
@@ -22,7 +22,7 @@ from mutator.review.readable_groups import condition_lines, value_table
 from mutator.web import asset, embedded, plainly_embedded
 
 STYLES = ("base.css", "review.css")
-SCRIPTS = (  # each uses those before it
+SCRIPTS = (  # in load order: each uses earlier ones
     "dom.js",
     "packed.js",
     "diff.js",
@@ -38,12 +38,12 @@ SCRIPTS = (  # each uses those before it
 
 
 def write_page(out: Path, review: Review, groups: Sequence[Group], options: Sequence[str]) -> None:
-    """Write the page of `groups`; the commands on it have these `options`, which select the groups."""
+    """Write the page of `groups`; its commands include `options`, which select the groups."""
     try:
         write_atomic(out, page_html(review, groups, options).encode())
     except OSError as err:
         raise MutatorError(
-            f"cannot be written ({err.strerror})", where=out, remedy="name another file"
+            f"cannot be written ({err.strerror})", where=out, remedy="choose another file"
         ) from None
 
 
@@ -53,8 +53,8 @@ def page_html(
     options: Sequence[str],
     served: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page of `groups`. `served` is what a page needs that a server shows (target, reviewer, where to
-    send decisions, runs); None for a file."""
+    """The page of `groups`. `served` has the data that a served page needs (target, reviewer, address for
+    decisions, runs); None for a file."""
     data = {
         "target": review.target,
         "states": [state.value for state in State],
@@ -66,7 +66,7 @@ def page_html(
 
 
 def render_page(data: dict[str, Any]) -> str:
-    """The page as HTML; the same groups and decisions give the same text."""
+    """The page as HTML; deterministic."""
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
@@ -82,9 +82,9 @@ def render_page(data: dict[str, Any]) -> str:
 
 
 def state_of(review: Review, group: Group) -> dict[str, Any]:
-    """What reviewers have said of a group, as the page shows it and a server sends it.
+    """The review of a group, as shown on the page and sent by a server.
 
-    `digest` says which mutants that is: a page made of others must not decide about these.
+    `digest` identifies the mutants: a page with other mutants must not decide about these.
     """
     decision, flag = review.decision(group.id), review.flag(group.id)
     return {
@@ -107,8 +107,8 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
 
 
 def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
-    """The groups, each with the number of its kind: those of a state with one template in one function, which
-    call the same code. They stand next to each other."""
+    """The groups with stack numbers, in stack order. A stack has the groups of one state, template and
+    function that call the same code."""
     kinds: dict[tuple[object, ...], int] = {}
     numbered = []
     for group in groups:

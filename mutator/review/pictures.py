@@ -1,8 +1,8 @@
-"""What an image effect does to a picture: before it, and after it at up to three levels.
+"""Shows what an image effect does: an image before it, and after it at up to three levels.
 
-The target is run until it comes to the place of the injected lines. There these very lines are executed,
-with the values of several mutants, on the picture that the target has at that moment. So pictures show what a
-run would see, and need no word in the manifest. What was drawn is cached by all that it follows from.
+Runs the target up to the place of the injected lines and executes these lines there on its current image,
+with the values of several mutants. So the images show what a run would see, without support in the manifest.
+Results are cached by all their inputs.
 """
 
 import base64
@@ -41,17 +41,17 @@ from mutator.workspace import Workspace
 
 MODEL = "image_effect"
 LEVELS = ("least", "middle", "most")
-MOST = 9  # values of a group that are drawn, of which three are shown
-CLEAR = 0.5  # correlation of amount and change from which on the amount decides what is more severe
-QUALITY = 85  # of the JPEG files
+MOST = 9  # values of a group that are drawn; three are shown
+CLEAR = 0.5  # minimum correlation of amount and change for ranking severity by amount
+QUALITY = 85  # of JPEG files
 LIMITS = Limits(cpu_s=60, wall_s=120)
 _SCHEMA = "pictures/1"
-_drawing = Lock()  # a page asks for all the pictures of a group at once: the first request draws them
+_drawing = Lock()  # a page requests all images of a group at once: the first request draws them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """A picture after the effect: which of LEVELS, the fault's value in words, the JPEG file."""
+    """An image after the effect: its name in LEVELS, the fault's value as text, the JPEG file."""
 
     name: str
     label: str
@@ -60,8 +60,8 @@ class Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pictures:
-    """A group's pictures as JPEG files. Of a group with fewer than three different values there are fewer
-    levels: with one it is `most`, with two `least` and `most`."""
+    """A group's images as JPEG files. With one distinct value there is only the level `most`, with two
+    `least` and `most`."""
 
     before: bytes
     levels: tuple[Level, ...]
@@ -72,24 +72,24 @@ class Pictures:
 
 
 def has_pictures(group: Group) -> bool:
-    """Whether there are pictures of a group: all its image effects change the same variable in one place."""
+    """Whether a group has images: all its image effects change the same variable in one place."""
     return MODEL in group.models and all(_place(fault) for fault in group.faults)
 
 
 def of_group(
     workspace: Workspace, manifest: TargetManifest, group: Group, level: str
 ) -> tuple[bytes, bytes] | None:
-    """The picture before and after the effect at one of LEVELS, as JPEG files; None where there are none."""
+    """The image before and after the effect at one of LEVELS, as JPEG files; None if there are none."""
     found = of_groups(workspace, manifest, [group]).get(group.id)
     wanted = found.level(level) if found else None
     return (found.before, wanted.after) if found and wanted else None
 
 
 def of_groups(workspace: Workspace, manifest: TargetManifest, groups: Iterable[Group]) -> dict[str, Pictures]:
-    """The pictures of all groups that have any, by group, drawn unless they are cached.
+    """The images of all groups that have any, by group; drawn unless cached.
 
-    Groups of one place are drawn in one process. MutatorError for a target that does not come to the place,
-    and for an effect that fails there.
+    Groups of one place are drawn in one process. MutatorError if the target does not reach the place, or if
+    an effect fails there.
     """
     models, scenario = workspace.fault_models(), _scenario(workspace)
     wanted = {
@@ -105,7 +105,7 @@ def of_groups(workspace: Workspace, manifest: TargetManifest, groups: Iterable[G
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Wanted:
-    """The faults of a group of which pictures are drawn, each with its injected lines."""
+    """The faults of a group to draw, each with its injected lines."""
 
     key: str
     place: tuple[FaultLocation, str]
@@ -117,7 +117,7 @@ class _Wanted:
         faults = _chosen(group.faults)
         lines = tuple(_lines(models, fault) for fault in faults)
         place = _place(faults[0])
-        assert place is not None  # of a group that has pictures
+        assert place is not None  # the group has images
         entry = manifest.arguments(
             scenario=Path("scenario"), seed=0, out=Path("out"), changes=faults[0].changes
         )
@@ -130,13 +130,13 @@ class _Wanted:
 
 
 def _scenario(workspace: Workspace) -> Path:
-    """The library's first scenario: which road is seen does not matter."""
+    """The library's first scenario: any road will do."""
     found = next(iter(workspace.scenarios.values()), None)
     if found is None:
         raise MutatorError(
-            "no scenario to draw pictures in",
+            "no scenario to draw images in",
             where=workspace.library / "scenarios",
-            remedy="write one, as docs/how-to/add-a-scenario.md says",
+            remedy="add one (see docs/how-to/add-a-scenario.md)",
         )
     return found
 
@@ -146,7 +146,8 @@ def _effects(fault: Fault) -> tuple[Injection, ...]:
 
 
 def _place(fault: Fault) -> tuple[FaultLocation, str] | None:
-    """Where its image effects are, and the variable with the picture; None if that is not one place."""
+    """The place of a fault's image effects, and the variable with the image; None if there are several
+    places."""
     places = {(one.location, str(dict(one.params)["target"])) for one in _effects(fault)}
     return places.pop() if len(places) == 1 else None
 
@@ -158,7 +159,7 @@ def _lines(models: FaultModels, fault: Fault) -> tuple[str, ...]:
 
 
 def _label(fault: Fault) -> str:
-    """Its value in words: with the unit that the spec has, else as an amount."""
+    """The fault's value as text, with the spec's unit or as an amount."""
     if fault.value is not None:
         plain = fault.unit in ("", "-", "1")
         return f"amount {fault.value}" if plain else f"{fault.value} {fault.unit}"
@@ -172,7 +173,7 @@ def _amounts(fault: Fault) -> tuple[float, ...]:
 
 
 def _chosen(faults: Sequence[Fault]) -> tuple[Fault, ...]:
-    """At most MOST faults, a different amount each, evenly from the least to the largest."""
+    """At most MOST faults with distinct amounts, evenly spread from least to largest."""
     by_amount: dict[tuple[float, ...], Fault] = {}
     for fault in faults:
         by_amount.setdefault(_amounts(fault), fault)
@@ -185,7 +186,7 @@ def _chosen(faults: Sequence[Fault]) -> tuple[Fault, ...]:
 def _drawn_anew(
     manifest: TargetManifest, models: FaultModels, scenario: Path, wanted: Mapping[str, _Wanted]
 ) -> dict[str, Pictures]:
-    """The pictures of groups, which are cached: one run of the target for all groups of a place."""
+    """Draw and cache the images of groups: one run of the target for all groups of a place."""
     check_requirements(manifest)
     places: dict[tuple[object, ...], list[str]] = {}
     for name, one in wanted.items():
@@ -208,7 +209,7 @@ def _drawn_anew(
 def _run(
     engine: ReferenceEngine, models: FaultModels, scenario: Path, groups: Sequence[_Wanted], folder: Path
 ) -> list[np.ndarray]:
-    """The picture before, then those after each fault of each group."""
+    """The image before, then those after each fault of each group."""
     manifest, (location, picture) = engine.manifest, groups[0].place
     first = groups[0].faults[0]
     mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always())
@@ -225,10 +226,10 @@ def _run(
     if not file.is_file():
         ended = execution.status is Status.OK
         raise MutatorError(
-            f"no picture of {location.path} {location.function}: "
-            + ("the run never came there" if ended else execution.detail),
+            f"no image of {location.path} {location.function}: "
+            + ("the run never got there" if ended else execution.detail),
             where=scenario,
-            expected="a run that comes to the image effect",
+            expected="a run that reaches the image effect",
             remedy="see `mutator check --drive`",
         )
     with np.load(no_pipe(file), allow_pickle=False) as found:
@@ -236,7 +237,7 @@ def _run(
 
 
 def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarray]) -> Pictures:
-    """The least, a middle and the most severe of faults that are sorted by amount."""
+    """The least, middle and most severe of faults sorted by amount."""
     changes = [float(np.sqrt(np.mean(np.square(one.astype(float) - before)))) for one in after]
     order = _by_severity(changes)
     names = {1: LEVELS[2:], 2: LEVELS[::2]}.get(len(order), LEVELS)
@@ -249,9 +250,9 @@ def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarr
 
 
 def _by_severity(changes: Sequence[float]) -> list[int]:
-    """Places in `changes`, the least severe first. A larger amount counts as more severe, or as less, where
-    the picture changes more with it, or less: chance may turn two neighbours round. Amounts to both sides of
-    no effect are in the order of their changes."""
+    """Indices into `changes`, least severe first. The order follows the amounts, in the direction in which
+    the image changes more, to ignore chance differences of neighbours. Amounts on both sides of "no effect"
+    are ordered by change."""
     order = list(range(len(changes)))
     trend = correlation(order, changes) if len(set(changes)) > 1 else 1.0
     if abs(trend) < CLEAR:
@@ -271,7 +272,7 @@ def _recalled(key: str) -> Pictures | None:
         data: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
         before, levels = data["before"], data["levels"]
         if data["sum"] == digest([key, before, levels]):
-            os.utime(path)  # used now
+            os.utime(path)  # mark as recently used
             return Pictures(
                 before=base64.b64decode(before),
                 levels=tuple(

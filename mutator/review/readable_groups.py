@@ -1,4 +1,4 @@
-"""Groups for readers, on the terminal and the page: a table of their values, their triggers in words."""
+"""Groups for display in the terminal and on the page: a table of values, and triggers as text."""
 
 import re
 from collections.abc import Sequence
@@ -9,11 +9,11 @@ from mutator.review.entries import values_in_words
 from mutator.review.groups import Shape
 
 _TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
-_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # ids mean nothing to a reader
+_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # ids mean nothing to readers
 
 
 def value_table(group: Group) -> tuple[list[str], list[list[str]]]:
-    """Heads and rows: what fills the holes, but for ids, a row for each fault."""
+    """Headings and rows: the values of the holes, except ids, with a row for each fault."""
     faults = {fault.id: fault for fault in group.faults}
     names = list(dict.fromkeys(name for shape in group.shapes for name in _shown_holes(shape)))
     rows = []
@@ -31,7 +31,7 @@ def _shown_holes(shape: Shape) -> list[str]:
 
 
 def ranges(group: Group) -> str:
-    """What the values may be by the specs, which is what an approval covers: `by: -40 to 40`."""
+    """The ranges of values in the specs, which an approval covers: `by: -40 to 40`."""
     return values_in_words(group.values)
 
 

@@ -1,6 +1,6 @@
-"""The file of a target's reviews: YAML for version control, one block for each group, sorted.
+"""Reads and writes the file of a target's reviews: YAML for version control, one sorted block for each group.
 
-Blocks of `review/1`, which had a group for each kind of trigger, are read as those of the groups of today.
+Blocks of `review/1`, which had a group for each kind of trigger, are converted.
 """
 
 import json
@@ -26,7 +26,7 @@ _HEAD = """\
 _WHEN = re.compile(r"; (?:always|time|state), (?:while|for|to_end)\Z")  # at the end of `what` in review/1
 _DIGEST = r"^[0-9a-f]{16}$"
 _TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"
-_DIFFERS = "0" * 16  # of parts in which old decisions about one group differ: one of them no longer holds
+_DIFFERS = "0" * 16  # for parts in which merged old decisions differ: the decision is no longer valid
 _NEEDED = ("by", "diff", "function", "template")
 
 
@@ -45,7 +45,7 @@ class _BlockModel(StrictModel):
     group: str = Field(pattern=r"^[0-9a-f]{12}$")
     what: str
     decision: Literal["approved", "rejected"] | None = None
-    by: str | None = Field(None, pattern=r"\S")  # somebody must have looked
+    by: str | None = Field(None, pattern=r"\S")  # not empty
     at: str | None = Field(None, pattern=_TIME)
     commit: str | None = Field(None, pattern=r"^[0-9a-f]{40,64}(-dirty)?$")
     tool: str | None = None
@@ -66,27 +66,28 @@ class _FileModel(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """What the file says: entries by group, and whether who changed a group may not approve it."""
+    """The file's content: entries by group, and whether the author of a change is barred from approving
+    it."""
 
     entries: Mapping[str, Entry]
     four_eyes: bool = False
 
 
 def load(path: Path, target: str) -> Content:
-    """What an existing file says of `target`; MutatorError at the line of a mistake."""
+    """Read an existing file for `target`; MutatorError with the line of a mistake."""
     model, source = read(path, _FileModel, SCHEMA, older={_FIRST: _from_first})
     if model.target != target:
         raise source.error(
-            ("target",), f"target '{model.target}'", expected=f"'{target}', as the file is named"
+            ("target",), f"target '{model.target}'", expected=f"'{target}', like the file name"
         )
     entries: dict[str, Entry] = {}
     for i, block in enumerate(model.decisions):
         if block.group in entries:
             raise source.error(
                 ("decisions", i, "group"),
-                f"group '{block.group}' stands here a second time",
-                expected="one block for a group",
-                remedy="keep the one that holds",
+                f"group '{block.group}' appears twice",
+                expected="one block for each group",
+                remedy="keep the valid one",
             )
         entries[block.group] = _entry(block, source, i)
     if source.data["schema"] == _FIRST:
@@ -95,7 +96,7 @@ def load(path: Path, target: str) -> Content:
 
 
 def write(path: Path, target: str, content: Content) -> None:
-    """Write the file, whole or not at all; sorted, so that the work of two people can be merged."""
+    """Write the file atomically, sorted so that parallel work can be merged."""
     blocks = [_block(content.entries[name]) for name in sorted(content.entries)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
     text = f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
@@ -111,14 +112,14 @@ def _entry(block: _BlockModel, source: Source, i: int) -> Entry:
                 ("decisions", i, extra[0]),
                 f"'{extra[0]}' without a decision",
                 expected="`decision: approved` or `rejected` with it",
-                remedy="add the decision, or remove what was kept for it",
+                remedy="add the decision, or remove its fields",
             )
     elif missing := [name for name in _NEEDED if given[name] is None]:
         raise source.error(
             ("decisions", i),
             f"a decision without `{missing[0]}`",
             expected=f"{', '.join(f'`{name}`' for name in _NEEDED)} with it",
-            remedy="decide again by `mutator review`: digests cannot be invented",
+            remedy="decide again with `mutator review`, which computes the digests",
         )
     return Entry(
         group=block.group,
@@ -173,15 +174,15 @@ def _given(remark: Remark) -> dict[str, str]:
 
 
 def _json(value: Any) -> str:
-    """A value on one line that is YAML, too."""
+    """A value on one line, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)
 
 
-# Files of before: a group for each kind of trigger, a remark with the decision
+# Older files: a group for each kind of trigger, a remark with the decision
 
 
 def _from_first(source: Source) -> Source:
-    """The content of a `review/1` file with its blocks as today's; what is wrong in it stays where it is."""
+    """Convert the blocks of a `review/1` file; invalid parts are left alone."""
     blocks = source.data.get("decisions")
     if not isinstance(blocks, list):
         return source
@@ -198,7 +199,7 @@ def _new_block(block: dict[str, Any]) -> dict[str, Any]:
 
 
 def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
-    """One entry of those about one change: each kind of trigger was a group of its own."""
+    """Merge entries about one change: each kind of trigger was a separate group."""
     found: dict[tuple[str, str], list[Entry]] = {}
     for entry in entries:
         what = _WHEN.sub("", entry.what)
@@ -209,7 +210,7 @@ def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 
 
 def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
-    """Rejected if one part was, else approved; by all who have approved one."""
+    """Merge: rejected if one part was, else approved; by everyone who approved a part."""
     decisions = [entry.decision for entry in parts if entry.decision]
     remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
     counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions

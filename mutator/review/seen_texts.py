@@ -1,6 +1,6 @@
-"""What a reviewer saw when a group was decided, kept as plain text, and how it differs from now.
+"""What a reviewer saw when deciding on a group, stored as plain text, and how it differs from now.
 
-A text begins with the digests it stands for, so one that does not belong to the decision explains nothing.
+Each text begins with its digests, so that a text for another decision is ignored.
 """
 
 import re
@@ -16,22 +16,22 @@ _HUNK = re.compile(r"@@ -\S+ \+(\d+)\S* @@")
 
 
 def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
-    """What is kept of a group: its digests, its values, then each section under its name."""
+    """The stored text of a group: its digests, its values, then each section under its name."""
     parts = {"values": values_in_words(values), **sections}
     named = (f"== {name} ==\n{text}" + "\n" * (not text.endswith("\n")) for name, text in parts.items())
     return f"{_head(bound)}\n" + "\n".join(named)
 
 
 def keep(path: Path, text: str) -> None:
-    """Write what was seen, in the place of what was seen before."""
+    """Write what was seen, replacing earlier text."""
     make_folder(path.parent)
     write_atomic(path, text.encode("utf-8", "surrogateescape"))
 
 
 def changes(path: Path, bound: Bound, text: str) -> str:
-    """What was seen when `bound` was decided about against `text`, that of now, as a unified diff.
+    """A unified diff from what was seen when `bound` was decided to `text`, the current text.
 
-    Empty where nothing was kept, or not what this decision is about.
+    Empty if nothing was stored for this decision.
     """
     try:
         before = no_pipe(path).read_bytes().decode("utf-8", "surrogateescape")
@@ -44,14 +44,14 @@ def changes(path: Path, bound: Bound, text: str) -> str:
 
 
 def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
-    """The diff with what each hunk is part of behind its `@@`: `calls: car/lens.py Light`."""
+    """The diff with each hunk's section after its `@@`: `calls: car/lens.py Light`."""
     for line in diff:
         hunk = _HUNK.match(line)
         yield f"{hunk[0]} {_section(new[: int(hunk[1]) - 1 + _AROUND])}\n" if hunk else line
 
 
 def _section(lines: Iterable[str]) -> str:
-    """The section, and the part of it, that these lines end in."""
+    """The section and part in which these lines end."""
     section = part = ""
     for line in lines:
         if line.startswith("== "):

@@ -1,4 +1,4 @@
-"""The names in a Python source: what a module defines and imports, and which names a piece of it uses."""
+"""The names in Python source: what a module defines and imports, and which names code uses."""
 
 import ast
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -14,7 +14,7 @@ _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 @dataclass(frozen=True, slots=True)
 class Import:
-    """`from module import name`, or, without a name, `import module`; `level`: dots before the module."""
+    """`from module import name`, or without a name `import module`; `level`: dots before the module."""
 
     module: str
     name: str | None = None
@@ -30,10 +30,9 @@ class Import:
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """A name that is no local variable, with the attributes after it: `("effects", "Rain")`.
+    """A name that is not a local variable, with its attributes: `("effects", "Rain")`.
 
-    `imported` is what it stands for where the function imports it itself; `owner` is the class of a `self` or
-    a `super()`.
+    `imported` is its import inside the function, if any; `owner` is the class of a `self` or `super()`.
     """
 
     words: tuple[str, ...]
@@ -43,22 +42,22 @@ class Use:
 
 @dataclass(frozen=True)
 class Module:
-    """What a module defines, by qualified name (classes, functions, methods, constants), and imports."""
+    """A module's definitions (classes, functions, methods, constants) by qualified name, and its imports."""
 
     tree: ast.Module
     defined: Mapping[str, Sequence[ast.stmt]]
     imports: Mapping[str, Sequence[Import]]
 
     def nodes_of(self, name: str) -> Sequence[ast.stmt]:
-        """The statements that define a name: several where it is set again."""
+        """The statements that define a name; several if it is set again."""
         return self.defined.get(name, ())
 
     def knows(self, name: str) -> bool:
-        """Whether a name is defined or imported here."""
+        """Whether the module defines or imports a name."""
         return name in self.defined or name in self.imports
 
     def function(self, name: str) -> ast.stmt | None:
-        """The function of that qualified name, the last one of several."""
+        """The function with that qualified name; the last if there are several."""
         found = self.nodes_of(name)
         return found[-1] if found else None
 
@@ -82,7 +81,7 @@ class Module:
 
 
 def read_module(path: str, data: bytes, root: Path) -> Module:
-    """The names of a file of a tree; of one that is no Python, none."""
+    """The names of a file of a tree; empty if it is not Python."""
     try:
         tree = ast.parse(data)
     except (SyntaxError, ValueError, RecursionError):
@@ -97,28 +96,27 @@ def read_module(path: str, data: bytes, root: Path) -> Module:
 
 
 def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
-    """The names that `node` uses from outside of its functions, those that are `wanted`. `owner` is the class
-    that it is a method of."""
+    """The external names that `node` uses, if `wanted`. `owner` is its class if it is a method."""
     yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
 
 
 def uses_beside(function: ast.stmt | None, owner: str, node: ast.AST) -> Iterator[Use]:
-    """The names that `node` uses where it stands in a function (of the class `owner`, if of one)."""
+    """The external names that `node` uses inside a function (a method, if `owner` is a class)."""
     scope = _Scope(owner=owner)
     yield from _uses(node, scope.inside(function) if isinstance(function, _SCOPES) else scope, lambda _: True)
 
 
 @dataclass(frozen=True, slots=True)
 class _Scope:
-    """What names mean within a function: variables of its own, imports of its own, and `self`."""
+    """What names mean within a function: local variables, local imports, and `self`."""
 
     local: frozenset[str] = frozenset()
     imports: tuple[tuple[str, Import], ...] = ()
-    owner: str = ""  # the class that a method belongs to
-    me: str = ""  # what the method calls its object
+    owner: str = ""  # class of the method
+    me: str = ""  # the method's name for its object
 
     def inside(self, node: _Function) -> "_Scope":
-        """The scope of a function that is defined in this one."""
+        """The scope of a nested function."""
         names, imports = _bound(node)
         method = bool(self.owner) and not self.local and not isinstance(node, ast.Lambda)
         arguments = [*node.args.posonlyargs, *node.args.args]
@@ -130,7 +128,7 @@ class _Scope:
         )
 
     def use(self, words: tuple[str, ...]) -> Use | None:
-        """What a name with attributes means here; None for a variable."""
+        """What a name with attributes refers to; None for a variable."""
         for name, one in reversed(self.imports):
             if name == words[0]:
                 return Use(words, imported=one)
@@ -151,7 +149,7 @@ def _uses(node: ast.AST, scope: _Scope, wanted: _Wanted) -> Iterator[Use]:
 
 
 def _parts(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.AST, _Scope]]:
-    """The parts of a node, each with the scope that it is in; no annotations, which call nothing."""
+    """The parts of a node with their scopes, without annotations."""
     if isinstance(node, ast.ClassDef):
         inner = replace(scope, owner=f"{scope.owner}.{node.name}".strip("."), me="")
         yield from ((one, scope) for one in (*node.bases, *node.keywords, *node.decorator_list))
@@ -169,7 +167,7 @@ def _parts(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.AST, _Scope]]:
 
 
 def _called_children(node: ast.AST) -> Iterator[ast.AST]:
-    """All parts but annotations, which call nothing."""
+    """All parts except annotations."""
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns"):
             continue
@@ -179,7 +177,7 @@ def _called_children(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _dotted(node: ast.AST) -> tuple[str, ...]:
-    """`a.b.c` as its words; nothing for an attribute of something else than a name."""
+    """`a.b.c` as a tuple of names; empty if the base is not a name."""
     words: list[str] = []
     while isinstance(node, ast.Attribute):
         words.append(node.attr)
@@ -192,7 +190,7 @@ def _is_super(node: ast.expr) -> bool:
 
 
 def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
-    """The names that a function binds itself, and its imports."""
+    """The names that a function binds, and its imports."""
     arguments = node.args
     every = [
         *arguments.posonlyargs,
@@ -218,14 +216,14 @@ def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
         elif isinstance(one, ast.ExceptHandler | ast.MatchAs | ast.MatchStar) and one.name:
             names.add(one.name)
         if isinstance(one, ast.comprehension):
-            waiting += (one.iter, *one.ifs)  # its variables are its own
+            waiting += (one.iter, *one.ifs)  # its variables are local to it
         elif not isinstance(one, (*_SCOPES, ast.ClassDef)):
             waiting += ast.iter_child_nodes(one)
     return frozenset(names - outside - {name for name, _ in imports}), imports
 
 
 def _definitions(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, ast.stmt]]:
-    """Name and statement of all that a module, or a class of it, defines, in blocks like `if`, too."""
+    """Name and statement of every definition in a module or class, including blocks like `if`."""
     for node in body:
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
             yield inside + node.name, node
@@ -240,7 +238,7 @@ def _definitions(body: Sequence[ast.stmt], inside: str) -> Iterator[tuple[str, a
 
 
 def _imports(body: Sequence[ast.stmt]) -> Iterator[tuple[str, Import]]:
-    """Known name and import of each import statement outside of functions and classes."""
+    """Bound name and import for each import statement outside functions and classes."""
     for node in body:
         if isinstance(node, ast.Import):
             for alias in node.names:

@@ -1,4 +1,4 @@
-"""What became of a group's mutants in a run: how many ended how, a typical experiment and the worst one."""
+"""A group's results in a run: counts by outcome, a typical experiment and the worst one."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from mutator.store.run_folder import RunFolder
 if TYPE_CHECKING:
     import pandas as pd
 
-_reading = Lock()  # a page asks for many groups of a run at once: the table is read once
+_reading = Lock()  # a page requests many groups of a run at once: read the table once
 _PLAIN = {
     Outcome.NOT_ACTIVATED.value: "not activated: the injected lines never ran while the trigger held",
     Outcome.MASKED.value: "masked: no actuator differed from the golden run",
@@ -29,7 +29,7 @@ _PLAIN = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """An experiment: its id, what it was (fault, drive), how it ended, and its verdict in words."""
+    """An experiment: its id, label (fault, run), outcome or status, and verdict as text."""
 
     id: str
     label: str
@@ -39,8 +39,8 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Typical:
-    """What became of a group in a run: how many experiments it has, and how many ended how. The typical one
-    is the median, by rank, of those with the most frequent ending; the worst has the first rank of all."""
+    """A group's results in a run: the number of experiments, and counts by outcome. The typical one is the
+    median, by rank, of those with the most frequent outcome; the worst has the first rank."""
 
     experiments: int
     outcomes: Mapping[str, int]
@@ -49,20 +49,20 @@ class Typical:
 
 
 def of_group(run: RunFolder, group: Group) -> Typical | None:
-    """What became of the group in a run, by its results table as it was last built; None if that has no
-    experiment of it. MutatorError for a run without a table."""
+    """The group's results in a run, from its current results table; None if the table has no experiment of
+    the group. MutatorError if the run has no table."""
     table = Results.of_run(run.path)
     try:
         written = table.path.stat().st_mtime_ns
     except OSError:
-        written = 0  # which reading tells
+        written = 0  # reading reports the error
     with _reading:
         return _of_run(run.path, written).get(group.what)
 
 
 @lru_cache(maxsize=8)
 def _of_run(path: Path, written: int) -> dict[str, Typical]:
-    """That of each group, by what it injects; `written` is when the results were."""
+    """The results of each group by label; `written` is the time of the results."""
     import numpy as np
 
     texts = Results.of_run(path).texts()
@@ -70,7 +70,7 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
     labels = {name: group_label(fault) for name, fault in plan_file.read_faults(path).items()}
     known = [labels.get(name, "") for name in texts["fault_id"]]
     rows: dict[str, list[int]] = {}
-    for row in np.argsort(places(texts)).tolist():  # the worst first
+    for row in np.argsort(places(texts)).tolist():  # worst first
         rows.setdefault(known[row], []).append(row)
     ended = endings(texts).tolist()
     return {label: _typical(texts, ended, own, about) for label, own in rows.items() if label}
@@ -79,7 +79,7 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 def _typical(
     texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
 ) -> Typical:
-    """Of `rows`, the worst first; a tie of two endings is for the worse one."""
+    """The result for `rows`, worst first; the worse of two equally frequent outcomes wins."""
     by_ending: dict[str, list[int]] = {}
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)
@@ -102,15 +102,15 @@ def _case(texts: "pd.DataFrame", number: int, about: Mapping[str, str]) -> Case:
 
 
 def verdict_of(row: Row, about: Mapping[str, str]) -> str:
-    """How an experiment ended, in words; `about` says what the hazards are."""
+    """An experiment's result as text; `about` explains the hazards."""
     if row.ending in _PLAIN:
         return _PLAIN[row.ending]
     if row.ending == Outcome.SDC.value:
-        return f"sdc: an actuator differed from the golden run from {row.t_manifest:.2f} s on; no hazard came"
+        return f"sdc: an actuator differed from the golden run from {row.t_manifest:.2f} s, without a hazard"
     if row.ending != Outcome.HAZARD.value:
         return f"{row.ending.replace('_', ' ')}: {row.detail}"
     name, time = row.hazards[0]
     meaning = f" ({about[name]})" if about.get(name) else ""
-    after = f", {time - row.t_activation:.2f} s after the activation" if row.t_activation is not None else ""
+    after = f", {time - row.t_activation:.2f} s after activation" if row.t_activation is not None else ""
     said = f"alert {row.alerts[0]} at {row.t_alert:.2f} s" if row.alerts else "no alert"
     return f"hazard {name}{meaning} at {time:.2f} s{after}; {said}"

@@ -1,4 +1,4 @@
-"""What the parameters of a group may be: by the draws of its specs, whichever values a seed gives."""
+"""The ranges of a group's parameters, from the draws of its specs, independent of the seed."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -15,10 +15,10 @@ _Value = float | str
 
 
 def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: FaultModels) -> Values:
-    """The range of each parameter of `faults`: all that was drawn, and all that their specs can draw.
+    """The range of each parameter of `faults`: all drawn values and all that their specs can draw.
 
-    `specs` are by name; of a fault whose spec is not there only its own values count. With several injections
-    a parameter is `1.by`, `2.by`. Texts and truth values are what a group is about, so they are no values.
+    `specs` are by name; a fault without its spec contributes only its own values. With several injections a
+    parameter is `1.by`, `2.by`. Texts and truth values define the group, so they are not included.
     """
     found: dict[str, set[_Value]] = {}
     known: set[tuple[str, str]] = set()
@@ -34,12 +34,12 @@ def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: F
 
 
 def _ends(fault: Fault, spec: FaultSpec | None, models: FaultModels) -> Iterator[tuple[Injection, ...]]:
-    """The injections with the least and with the greatest value that the fault's spec can draw."""
+    """The injections with the least and the greatest value that the fault's spec can draw."""
     name = fault.spec.rpartition("/")[2]
     for variant in spec or ():
         if variant.name == name and variant.draw and spec:
             for value in _bounds(variant):
-                with suppress(MutatorError):  # nothing that is out of range is ever drawn
+                with suppress(MutatorError):  # values out of range are never drawn
                     yield tuple(
                         resolve(one, models.get(one.model), spec.source, draw=variant.draw, value=value)
                         for one in variant.injections(fault.reading)

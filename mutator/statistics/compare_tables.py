@@ -1,4 +1,4 @@
-"""The comparison of guided with random triggers as tables."""
+"""Tables that compare guided with random triggers."""
 
 import pandas as pd
 
@@ -29,10 +29,10 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
         name="guided_against_random",
         title="Guided against random: hazards",
         note="Fault types with faults of both methods. Odds ratio: Mantel-Haenszel over fault types, above 1 "
-        "if guided faults are the more hazardous ones; p: that it is 1; p equal: that it is the same in all "
-        "types. Both p take runs as independent, so they are rather too small. Difference of rates (of 1): "
-        "guided less random, its interval resampled by fault (location and value), for which single runs are "
-        "needed; there is none where all faults say the same.",
+        "if guided faults are more hazardous; p: that it is 1; p equal: that it is the same in all "
+        "types. Both p assume independent runs, so they are too small. Difference of rates (of 1): "
+        "guided minus random, with an interval resampled by fault (location and value), which needs single "
+        "runs; none if all faults agree.",
         heads=(
             *("hazards of", "from", "guided", "random", "fault types"),
             *("odds ratio", "odds ratio, low", "odds ratio, high", "p", "p equal"),
@@ -43,14 +43,14 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
-    if source != OURS:  # single runs are needed, which are not published
+    if source != OURS:  # needs single runs, which are not published
         return (None,) * 4
     found = contrasts.resampled(frame, whole)
     return (found.difference, found.low, found.high, found.clusters)
 
 
 def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """Fisher's exact test of each fault type, adjusted over all of them."""
+    """Fisher's exact test for each fault type, adjusted over all types."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -71,7 +71,7 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def pairs_sheet(frame: pd.DataFrame) -> Sheet:
-    """Exact McNemar on matched pairs, of all and of each fault type, adjusted over the types."""
+    """Exact McNemar test on matched pairs, for all and by fault type, adjusted over the types."""
     paired = contrasts.pairs(frame)
     lines: list[tuple[Cell, ...]] = []
     for which, some in (
@@ -90,8 +90,8 @@ def pairs_sheet(frame: pd.DataFrame) -> Sheet:
     return Sheet(
         name="matched_pairs",
         title="Guided and random runs of the same fault, in pairs",
-        note="A pair has the same fault and value, scenario and context row. Hazards in both, in one or in "
-        "neither; p: McNemar's exact test, rather too small because it takes pairs of one fault as "
+        note="Pairs have the same fault and value, scenario and context row. Hazards in both, in one or in "
+        "neither; p: McNemar's exact test, too small because it assumes that pairs of one fault are "
         "independent; p, Holm: adjusted over fault types.",
         heads=("pairs", "fault type", "N", "both", "guided only", "random only", "neither", "p", "p, Holm"),
         lines=tuple(lines),

@@ -1,7 +1,7 @@
 """Guided against random triggers: stratified by fault type, on matched pairs, and resampled by fault.
 
-A run is nested in its fault (the same value at the same location is tried in each context and scenario), so
-plain tests take runs for more independent than they are; `resampled` draws whole faults anew instead.
+Runs are nested in faults (the same value at the same location is tried in each context and scenario), so
+plain tests overestimate independence; `resampled` draws whole faults instead.
 """
 
 import math
@@ -25,7 +25,7 @@ _PAIR = ["fault_id", "scenario", "row", "seed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stratum:
-    """One fault type: hazards and the faults they are counted of, by method."""
+    """One fault type: hazards and faults by method."""
 
     kind: str
     guided_hazards: int
@@ -35,7 +35,7 @@ class Stratum:
 
     @property
     def table(self) -> list[list[int]]:
-        """[hazard, none] of guided, then of random."""
+        """[hazard, none] for guided, then random."""
         return [
             [self.guided_hazards, self.guided - self.guided_hazards],
             [self.random_hazards, self.random - self.random_hazards],
@@ -44,7 +44,7 @@ class Stratum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """Mantel-Haenszel over fault types. Above 1: hazards are likelier when guided; NaN: not defined.
+    """Mantel-Haenszel estimate over fault types. Above 1: guided faults are more hazardous; NaN: not defined.
 
     `p` tests that the common odds ratio is 1, `p_equal` that it is the same in all types.
     """
@@ -55,12 +55,12 @@ class Pooled:
     risk_ratio: float
     p: float
     p_equal: float
-    strata: int  # those with runs of both methods
+    strata: int  # with runs of both methods
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """Hazard rate when guided less that when random, with its bootstrap interval over `clusters` faults."""
+    """Hazard rate of guided minus random, with its bootstrap interval over `clusters` faults."""
 
     difference: float
     low: float
@@ -69,7 +69,7 @@ class Difference:
 
 
 def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Stratum, ...]:
-    """The fault types that have faults of both methods, from counts by (method, fault type)."""
+    """The fault types with faults of both methods, from counts by (method, fault type)."""
     made = []
     for kind in dict.fromkeys(kind for _, kind in counts):
         guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
@@ -87,7 +87,7 @@ def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Strat
 
 
 def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
-    """The odds of a hazard, guided against random, held constant over fault types (statsmodels)."""
+    """The odds of a hazard, guided against random, stratified by fault type (statsmodels)."""
     from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
 
     telling = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
@@ -111,15 +111,15 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
 
 
 def fisher(stratum: Stratum) -> float:
-    """p of Fisher's exact test of one fault type (scipy)."""
+    """p of Fisher's exact test for one fault type (scipy)."""
     from scipy.stats import fisher_exact  # type: ignore[import-untyped]
 
     return float(fisher_exact(stratum.table).pvalue)
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """The p-values of several tests, adjusted by Holm's method (Scandinavian Journal of Statistics 6, 1979):
-    the k-th smallest of n, times n - k + 1, never below a smaller one's, at most 1; nan stays nan."""
+    """p-values adjusted by Holm's method (Scandinavian Journal of Statistics 6, 1979): the k-th smallest of n
+    times n - k + 1, monotone, at most 1; nan stays nan."""
     known = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
     adjusted, largest = [math.nan] * len(p_values), 0.0
     for k, (p, place) in enumerate(known):
@@ -130,7 +130,7 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """Each guided run with its random partner: same fault, scenario, context row and seed.
 
-    Columns end in `_guided` and `_random`; runs without a partner (unfinished or failed) are left out.
+    Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
     """
     columns = [*_PAIR, "kind", "is_activated", "is_hazard"]
     guided, random = (frame.loc[frame["method"] == how, columns] for how in (GUIDED, RANDOM))
@@ -140,13 +140,13 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def mcnemar(paired: pd.DataFrame) -> Matched:
-    """Whether a hazard came in the guided run (the first), the random one (the second), both or neither."""
+    """Hazards in the guided (first) and random (second) run of each pair."""
     return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    """The difference of hazard rates, guided less random; the interval is that of `resampled_interval` over
-    faults, that is over (location, value), with all their runs in all contexts and scenarios."""
+    """The difference of hazard rates, guided minus random, with the `resampled_interval` over faults
+    (location, value), each with all its runs."""
     data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
     seen = float(_rate_difference(*data))
     low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)
@@ -168,7 +168,7 @@ def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
 def _rate_difference(
     guided_hazards: Any, random_hazards: Any, guided: Any, random: Any, axis: int = -1
 ) -> Any:
-    """Hazards by runs of each method, summed over faults along `axis`; NaN where a method has no run."""
+    """The difference of hazards per run, summed over faults along `axis`; NaN if a method has no run."""
     totals = [np.sum(x, axis=axis) for x in (guided_hazards, guided, random_hazards, random)]
     with np.errstate(invalid="ignore"):
         return totals[0] / totals[1] - totals[2] / totals[3]

@@ -1,8 +1,8 @@
 """The results of a run as a pandas frame, a row per usable experiment.
 
-Beside the columns of results.csv it has `kind` (`sensor/bias`), `row` (the context row whose trigger or whose
-random partner it is), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
-is_alert`. Times are s of simulation, NaN: did not happen.
+In addition to the columns of results.csv it has `kind` (`sensor/bias`), `row` (the context row of the trigger
+or of its random partner), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
+is_alert`. Times are simulated seconds, NaN: did not happen.
 """
 
 from pathlib import Path
@@ -14,19 +14,19 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import UNUSABLE
 
 _TIMES = ("t_activation", "t_manifest", "t_alert")
-_RANDOM = "random/"  # what a random partner's trigger is named: random/C1
+_RANDOM = "random/"  # prefix of a random partner's trigger: random/C1
 
 
 def load(results: Path) -> pd.DataFrame:
-    """The usable experiments of a results.csv, in its order; MutatorError when it is not one.
+    """The usable experiments of a results.csv, in order; MutatorError if it is invalid.
 
-    Harness errors and mutants that could not be made are left out; a crash or timeout counts as injected.
+    Harness errors and invalid mutants are left out; crashes and timeouts count as injected.
     """
     return prepare(Results(results).texts())
 
 
 def prepare(frame: pd.DataFrame) -> pd.DataFrame:
-    """Rows of text as read from results.csv, typed and with the derived columns."""
+    """Text rows from results.csv, typed and with derived columns."""
     unusable = frame["status"].isin([str(status) for status in UNUSABLE])
     if unusable.any():
         frame = frame[~unusable]
@@ -62,13 +62,13 @@ _SHARED = (
 
 
 def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """The frame with what most statistics ask of it, times, flags and names, and the columns `more`: choosing
-    rows of all columns of a million takes seconds."""
+    """The frame with only the columns that most statistics need (times, flags, names) and the columns `more`:
+    selecting rows with all columns takes seconds for a million."""
     flags = [hazard.lower() for hazard in hazard_names(frame)]
     wanted = {*_SHARED, *flags, *more}
     return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
-    """Hazards that the table has a flag and a time for, sorted: `NEAR`, with columns `near` and `t_near`."""
+    """Hazards with a flag and a time in the table, sorted: `NEAR`, with columns `near` and `t_near`."""
     return tuple(sorted(hazards_in(frame.columns)))

@@ -1,7 +1,7 @@
-"""Medians with intervals from the bootstrap: whole faults are drawn anew, with all that their runs say.
+"""Medians with bootstrap intervals that resample whole faults with all their runs.
 
-Each draw takes as many faults as there are, some of them several times; the interval has the middle 95 % of
-the medians of the draws. Seeded, so the same results give the same interval.
+Each draw takes as many faults as there are, with repetition; the interval has the middle 95 % of the draws'
+medians. Seeded, so it is deterministic.
 """
 
 import math
@@ -15,22 +15,22 @@ from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 999
 _SEED = 1
-_CELLS = 500_000  # of one batch of draws: bounds the memory
-_BLOCK = 256  # values at least
+_CELLS = 500_000  # of one batch of draws: limits memory
+_BLOCK = 256  # values, at least
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of `values`, none of them NaN; `cluster` says whose each is.
+    """The interval of the median of `values` (without NaN); `cluster` has the cluster of each.
 
-    NaN for fewer than two clusters, and where all values are the same: that no other was seen does not mean
-    that there is none.
+    NaN for fewer than two clusters, and if all values are equal: other values may exist that were not
+    observed.
     """
     return _interval([values.to_numpy(dtype=float)], cluster)
 
 
 def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The median of pairs the second time less that the first; a draw of the interval keeps the pairs
-    together. NaN of none, and intervals as of `median_interval`."""
+    """The median of the second values minus that of the first; draws keep pairs together. NaN without pairs,
+    and intervals as in `median_interval`."""
     before, after = first.to_numpy(dtype=float), second.to_numpy(dtype=float)
     if not before.size:
         return Difference(difference=math.nan, low=math.nan, high=math.nan)
@@ -39,7 +39,7 @@ def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -
 
 
 def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the first sample's median, less the second's if there is one."""
+    """The interval of the first sample's median, minus the second's if there is one."""
     codes, names = pd.factorize(cluster)
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
@@ -56,14 +56,13 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 
 
 def _block_of(clusters: int, runs: int) -> int:
-    """How many values a block has: the more runs and clusters, the more, as a product for each block and
-    cluster takes about a fiftieth of the look at a value of the block that has the median."""
+    """The values per block: grows with runs and clusters, because a product for each block and cluster takes
+    about a fiftieth of the work on one value in the block with the median."""
     return max(_BLOCK, math.isqrt(clusters * runs // 50))
 
 
 def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
-    """How often each cluster is drawn: (draws, clusters), in batches; each draw takes so many `others`
-    cells."""
+    """How often each cluster is drawn: (draws, clusters), in batches; each draw takes `others` more cells."""
     rng = np.random.default_rng(_SEED)
     batch = max(1, _CELLS // max(clusters, others))
     for begin in range(0, RESAMPLES, batch):
@@ -72,8 +71,8 @@ def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
 
 
 class _Sorted:
-    """Values in their order, with the number of each cluster's in every block of them: a median of a draw is
-    looked for block by block, then in a block."""
+    """Sorted values, with the number of each cluster's values in every block: a draw's median is searched by
+    block, then within a block."""
 
     def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int, block: int) -> None:
         self._block = block
@@ -84,15 +83,15 @@ class _Sorted:
         self._of = np.bincount(cells, minlength=blocks * clusters).reshape(blocks, clusters).astype(float)
 
     def medians(self, counts: np.ndarray) -> np.ndarray:
-        """The median of each draw, which has each cluster so many times: (draws, clusters)."""
-        until = np.cumsum(counts @ self._of.T, axis=1)  # whole numbers, exact in floats
+        """The median of each draw; `counts` has how often it has each cluster: (draws, clusters)."""
+        until = np.cumsum(counts @ self._of.T, axis=1)  # integers, exact in floats
         whole = until[:, -1:].astype(np.int64)
         lower, upper = (self._at(place, until, counts) for place in ((whole - 1) // 2, whole // 2))
         medians: np.ndarray = (lower + upper) / 2
         return medians
 
     def _at(self, place: np.ndarray, until: np.ndarray, counts: np.ndarray) -> np.ndarray:
-        """The value at a place of each draw's values."""
+        """The value at an index of each draw's values."""
         block = (until <= place).sum(axis=1)
         before = np.take_along_axis(until, np.maximum(block - 1, 0)[:, None], axis=1)[:, 0]
         at = np.minimum(block[:, None] * self._block + np.arange(self._block), self._values.size - 1)

@@ -1,4 +1,4 @@
-"""How bad runs were, and how fast: metrics, classes of severity and times to the hazard as tables."""
+"""Tables of how bad and how fast runs were: metrics, severity classes and times to hazard."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -13,14 +13,12 @@ from mutator.targets.severity import CLASSES
 
 HIGHER = "higher"
 TOTAL = "total"
-_INTERVAL = (
-    "Medians have 95 % intervals, resampled by fault (location and value); none where all runs say the same."
-)
+_INTERVAL = "Medians have 95 % intervals, resampled by fault (location and value); none if all runs agree."
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
-    """Of each metric (name, unit, meaning, which way is worse) the spread over the activated faults, by fault
-    type; without lines where no run has a value."""
+    """For each metric (name, unit, meaning, worse direction), its spread over activated faults by fault type;
+    no lines without values."""
     lines: list[tuple[Cell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
@@ -32,8 +30,8 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
     return Sheet(
         name="metrics",
         title="Metrics by fault type",
-        note="Over the N runs with an activated fault that have a value, up to the end of the drive. "
-        f"{_INTERVAL} A quarter of the runs is at the worse quartile or beyond.",
+        note="Over the N runs with an activated fault and a value, up to the end of the drive. "
+        f"{_INTERVAL} A quarter of the runs is at least as bad as the worse quartile.",
         heads=(
             *("fault type", "metric", "unit", "worse", "N"),
             *("median", "median, low", "median, high", "worse quartile", "worst"),
@@ -43,8 +41,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
 
 
 def severity_sheet(frame: pd.DataFrame) -> Sheet:
-    """How many of the activated faults of each type ended in a contact of which class; without lines where
-    results have no classes."""
+    """Activated faults by type and severity class of the contact; no lines if results have no classes."""
     lines: list[tuple[Cell, ...]] = []
     known = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], known]
@@ -55,7 +52,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
     return Sheet(
         name="severity",
         title="Severity by fault type",
-        note="Of the activated faults, those whose drive ended in a contact, and in one of which class. 95 % "
+        note="Activated faults whose drive ended in a contact, in total and by class. 95 % "
         "Wilson intervals; in brackets count/whole. Hazards without a contact have no class.",
         heads=("fault type", "contact", *CLASSES),
         lines=tuple(lines),
@@ -63,7 +60,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """How long it took to the first hazard, by fault type; `alerts` if the target has some."""
+    """Times to the first hazard by fault type; `alerts` if the target has some."""
     came = slim(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
     starts |= {"alert": "t_alert"} if alerts else {}
@@ -78,8 +75,8 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
         name="fault_tolerant_times",
         title="From fault to hazard by fault type",
         note="s from activation (the fault-tolerant time), from the first difference of an actuator, and "
-        "from the first alert to the first hazard, in the N runs in which they came in this order. What "
-        f"detects the fault and reacts has no more than the shortest. {_INTERVAL}",
+        "from the first alert to the first hazard, in the N runs with this order of events. Fault "
+        f"detection and reaction must fit into the shortest. {_INTERVAL}",
         heads=(
             *("fault type", "time", "N", "shortest, s", "lower quartile, s"),
             *("median, s", "median, low, s", "median, high, s"),
@@ -89,14 +86,14 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 
 def _groups(frame: pd.DataFrame, values: pd.Series) -> Iterator[tuple[str, pd.Series, pd.Series]]:
-    """Fault type, values and whose they are, of the runs that have one."""
+    """Fault type, values and their faults, for runs with a value."""
     known = values.dropna()
     for kind, group in _by_kind(frame.loc[known.index, ["kind", "fault_id"]]):
         yield kind, known[group.index], group["fault_id"]
 
 
 def _by_kind(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """By fault type, and all of them together where there are several."""
+    """Groups by fault type, and all together if there are several."""
     kinds = [(str(kind), group) for kind, group in frame.groupby("kind")]
     yield from kinds
     if len(kinds) > 1:

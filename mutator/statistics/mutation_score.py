@@ -1,8 +1,7 @@
-"""The mutation score of a closed loop: what the mutants of operators change in the drives.
+"""The mutation score of a closed loop: what operators' mutants change in the drives.
 
-A mutant counts once, however many drives it is put to: it changes something if any of its drives does. Shares
-are of the mutants that were activated; the others are told apart. Experiments whose harness failed, or whose
-mutant could not be made, are in no count (`frame.load` has left them out).
+A mutant counts once: it changes something if any of its drives does. Shares are of activated mutants; others
+are listed separately. Harness errors and invalid mutants are not counted (`frame.load` removes them).
 """
 
 import math
@@ -27,26 +26,26 @@ _EFFECTS = ("actuator changed", "new alert", "hazard", "crash or timeout")
 _ALERT, _ACTIVE = _EFFECTS[1], "active"
 _HEADS = ("of", "counted", "fault", "number", "not activated", *_EFFECTS, "no effect")
 _NOTE = (
-    "What the mutants of operators do to the closed loop. *Permanent* mutants are active in the whole "
-    "drive, *transient* ones while their trigger holds. Shares are of the *activated* ones; a mutant counts "
-    "once, if any of its drives shows it. Intervals are 95 % Wilson intervals; where drives are counted, "
-    "whole mutants are drawn anew (bootstrap). *New alert*: one of a name that the fault-free run of the "
-    "scenario does not raise. A drive that crashed or timed out is not judged: it counts there and in the "
-    "whole, and in no other share. *No effect*: none of the four; mutants that are equivalent to the "
-    "original are among these."
+    "What operators' mutants do to the closed loop. *Permanent* mutants are active in the whole "
+    "drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant counts "
+    "once, if any of its drives shows the effect. Intervals are 95 % Wilson intervals; for counts of drives, "
+    "whole mutants are resampled (bootstrap). *New alert*: an alert that the scenario's fault-free run "
+    "does not raise. A drive that crashed or timed out is not judged: it counts only there and in the "
+    "total. *No effect*: none of the four, which includes mutants that are equivalent to the "
+    "original."
 )
-_SEVERAL = " These are counted together as they were drawn, without weights."
-_UNKNOWN_ALERTS = " The fault-free runs cannot be read here, so no alert is compared with theirs."
+_SEVERAL = " They are counted together as drawn, without weights."
+_UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compared with theirs."
 
 
 def drives_of(
     frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
 ) -> pd.DataFrame:
-    """A row for each usable experiment of an operator's mutant, by what the score counts.
+    """A row for each usable experiment of an operator's mutant, with what the score counts.
 
-    `mutant` (its fault's id), `operator`, `function` (`path::name`), `fault` (permanent or transient), then a
-    flag for `active` and each effect. A drive that crashed or timed out was active. Without `golden_alerts`
-    there is no flag of alerts.
+    `mutant` (its fault's id), `operator`, `function` (`path::name`), `fault` (permanent or transient), then
+    flags for `active` and each effect. A crashed or timed-out drive was active. Without `golden_alerts` there
+    is no alert flag.
     """
     found = frame[frame["module"] == OPERATORS]
     broken = found["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
@@ -71,7 +70,7 @@ def drives_of(
 
 
 def function_of(fault: Fault) -> str:
-    """Where a fault is injected first: `path::function`."""
+    """A fault's first place of injection: `path::function`."""
     place = fault.injections[0].location
     return f"{place.path}::{place.function}"
 
@@ -92,14 +91,13 @@ def score_sheet(
     golden_alerts: GoldenAlerts | None,
     told: Sequence[str] = (),
 ) -> Sheet:
-    """The score in total, by operator and by function, permanent faults beside transient ones; no lines where
-    no operator's mutant has a result. `faults` are those of the plan, `golden_alerts` the names of the alerts
-    that the golden runs raise (None: they are not known), `told` how many mutants there were to choose from
-    and what was left out."""
+    """The score in total, by operator and by function, for permanent and transient faults; no lines if no
+    operator's mutant has a result. `faults` are those of the plan, `golden_alerts` the alerts that golden
+    runs raise (None: not known), `told` the available mutants and exclusions."""
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
-    without = f" {missing} of {len(planned)} mutants have no result and are in no count." if missing else ""
+    without = f" {missing} of {len(planned)} mutants have no result and are not counted." if missing else ""
     chosen = f" Chosen: {'; '.join(f'`{text}`' for text in told)}." if told else ""
     chosen += _SEVERAL if len(told) > 1 and any(" draw" in text for text in told) else ""
     return Sheet(
@@ -112,7 +110,7 @@ def score_sheet(
 
 
 def totals(sheet: Sheet) -> Table:
-    """The lines of the score that are of all mutants, in few columns."""
+    """The lines over all mutants, in few columns."""
     rows = [
         (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
         for name, counted, lasting, *cells in sheet.lines
@@ -153,7 +151,7 @@ def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
 
 
 def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[Cell, ...]:
-    """A line of the sheet; `flags` have a row for whatever is counted, by the mutant."""
+    """A line of the sheet; `flags` has a row for each counted item, by mutant."""
     active = flags[flags[_ACTIVE]]
     known = [effect for effect in _EFFECTS if effect in active]
     cells = [_share(active[effect]) if effect in active else None for effect in _EFFECTS]
@@ -162,7 +160,7 @@ def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[C
 
 
 def _share(flag: "pd.Series[bool]") -> Share:
-    """The share of a flag, its interval between mutants where some have several rows."""
+    """The share of a flag; its interval resamples mutants if some have several rows."""
     count, of = int(flag.sum()), len(flag)
     if flag.index.is_unique:
         return share(count, of)

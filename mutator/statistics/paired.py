@@ -1,7 +1,7 @@
-"""Statistics of pairs: one thing seen twice, under a first and a second condition.
+"""Statistics of pairs: the same thing under a first and a second condition.
 
-Runs of one fault are alike, so a test that takes each pair for itself finds too much: the intervals of
-`rate_difference` draw whole faults anew instead. Nothing here is a formula of our own (scipy, statsmodels).
+Runs of one fault are similar, so tests that treat pairs as independent find too much; `rate_difference`
+resamples whole faults instead. All formulas are from scipy and statsmodels.
 """
 
 import math
@@ -16,14 +16,14 @@ import pandas as pd
 from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 9999
-_SEED = 1  # of the resampling: the same results give the same interval
-_DIGITS = 9  # of a difference of times: floats apart, equal times are equal
+_SEED = 1  # of resampling, which is deterministic
+_DIGITS = 9  # of a time difference: absorbs rounding errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Matched:
-    """Pairs in which something came both times, only the first, only the second, or neither time, and the
-    exact McNemar p that it is as likely the first as the second time."""
+    """Pairs with the event both times, only first, only second, or neither, and the exact McNemar p that
+    first and second are equally likely."""
 
     both: int
     first_only: int
@@ -38,7 +38,7 @@ class Matched:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """A rate or time the second time less that the first, with its interval. NaN: not defined."""
+    """A rate or time, second minus first, with its interval. NaN: not defined."""
 
     difference: float
     low: float
@@ -47,8 +47,8 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
-    """Times of `n` pairs that have both, s: medians, and the median of the differences (second less first)
-    with its exact interval; `p` is Wilcoxon's that differences are as often and as far up as down."""
+    """Times of `n` complete pairs, s: medians, and the median difference (second minus first) with its exact
+    interval; `p` is Wilcoxon's, that differences are symmetric about 0."""
 
     n: int
     first: float
@@ -58,7 +58,7 @@ class Times:
 
 
 def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
-    """Two flags of each pair compared (statsmodels, exact)."""
+    """Compare two flags of each pair (statsmodels, exact)."""
     from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
         mcnemar as exact_mcnemar,
     )
@@ -76,7 +76,7 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
 
 
 def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The rate of a flag, second less first; its interval is that of `resampled_interval` over clusters."""
+    """The rate of a flag, second minus first, with the `resampled_interval` over clusters."""
     change = second.astype(int) - first.astype(int)
     sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
     low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean)
@@ -85,18 +85,17 @@ def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> 
 
 
 def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., Any]) -> tuple[float, float]:
-    """The percentile bootstrap (scipy) of a statistic of clusters that are drawn anew.
+    """The percentile bootstrap (scipy) of a statistic over resampled clusters.
 
-    Each array has a number of each cluster. NaN where nothing can be said: of fewer than two clusters, where
-    the statistic is not defined of some draws, and where it is the same of all, for that clusters which are
-    all alike are seen does not mean that no other ones can be.
+    Each array has a number for each cluster. NaN if there are fewer than two clusters, if the statistic is
+    undefined for some draws, or if it is the same for all: other clusters may exist that were not observed.
     """
     from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
 
     if len(clusters[0]) < 2:
         return math.nan, math.nan
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # not defined of some draws: NaN says it
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # undefined for some draws: the result is NaN
         interval = bootstrap(
             clusters,
             statistic,
@@ -117,8 +116,8 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 
 
 def times(first: pd.Series, second: pd.Series) -> Times:
-    """Times of the pairs that have both compared: medians, their difference (scipy: exact interval from the
-    order statistics), Wilcoxon's signed-rank test (scipy; NaN where no time differs)."""
+    """Times of complete pairs compared: medians, their difference (scipy: exact interval from order
+    statistics), Wilcoxon's signed-rank test (scipy; NaN if no time differs)."""
     from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()
@@ -140,7 +139,7 @@ def times(first: pd.Series, second: pd.Series) -> Times:
 
 
 def wilcoxon(first: pd.Series, second: pd.Series) -> float:
-    """p of Wilcoxon's signed-rank test (scipy) of pairs without a NaN; NaN where no pair differs."""
+    """p of Wilcoxon's signed-rank test (scipy) on pairs without NaN; NaN if no pair differs."""
     from scipy.stats import wilcoxon as signed_rank
 
     change = (second - first).round(_DIGITS)

@@ -1,4 +1,4 @@
-"""A count of a whole, with its interval."""
+"""A share with its interval."""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """`count` of `of`, with the interval of the rate (NaN where there is none: nothing was counted, say)."""
+    """`count` of `of`, with the interval of the rate (NaN if there is none, for example without data)."""
 
     count: int
     of: int
@@ -21,7 +21,7 @@ class Share:
         return self.count / self.of if self.of else math.nan
 
     def __str__(self) -> str:
-        """`35.8 % (1316/3678; 34.2 to 37.3)`; `- (0/0)` of nothing."""
+        """`35.8 % (1316/3678; 34.2 to 37.3)`; `- (0/0)` if empty."""
         if not self.of:
             return "- (0/0)"
         if math.isnan(self.low):
@@ -37,5 +37,5 @@ def share(count: int, of: int) -> Share:
     if not of:
         return Share(count=count, of=of, low=math.nan, high=math.nan)
     low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
-    # rounded: the last bits differ between machines, and 0 of n begins at 0, not at 2e-18
+    # rounded: last bits differ between machines, and 0 of n must begin at 0, not 2e-18
     return Share(count=count, of=of, low=round(float(low), _DIGITS), high=round(float(high), _DIGITS))

@@ -1,4 +1,4 @@
-"""A table ready to be written: as CSV with a column for each number, and as Markdown to be read."""
+"""A table that can be written as CSV, with a column for each number, and as Markdown."""
 
 import csv
 import io
@@ -17,14 +17,14 @@ _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
 
 
 class P(float):
-    """A p-value: read as no smaller than its approximation is good for."""
+    """A p-value, displayed no smaller than its approximation supports."""
 
     def __str__(self) -> str:
         return "< 0.0001" if self < 0.0001 else f"{float(self):.4f}"
 
 
 class Rate(float):
-    """A share alone, of 1: read in %."""
+    """A share alone, displayed in %."""
 
     def __str__(self) -> str:
         return "-" if math.isnan(self) else f"{100 * float(self):.1f} %"
@@ -35,7 +35,8 @@ Cell = Share | float | int | str | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """One table. `name` is its file's, `note` says what is counted; every line has a cell for each head."""
+    """One table. `name` is the file name, `note` says what is counted; each line has a cell for each
+    heading."""
 
     name: str
     title: str
@@ -44,7 +45,7 @@ class Sheet:
     lines: tuple[tuple[Cell, ...], ...]
 
     def table(self) -> Table:
-        """The cells as texts to be read."""
+        """The cells as display text."""
         return Table(heads=self.heads, rows=[[text_of(cell) for cell in line] for line in self.lines])
 
     def markdown(self) -> str:
@@ -52,7 +53,8 @@ class Sheet:
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
     def csv(self) -> str:
-        """A share becomes five columns: count, of, rate and both ends of its interval (all of 1, not %)."""
+        """The table as CSV; a share becomes five columns: count, of, rate and both ends of its interval
+        (fractions)."""
         columns, lines = self._unfolded(_number)
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
@@ -61,14 +63,14 @@ class Sheet:
         return out.getvalue()
 
     def frame(self) -> "pd.DataFrame":
-        """The same columns as a pandas frame, numbers in full."""
+        """The same columns as a pandas frame, with full precision."""
         import pandas as pd
 
         columns, lines = self._unfolded(float)
         return pd.DataFrame(lines, columns=columns)
 
     def _unfolded(self, number: Callable[[float], object]) -> tuple[list[str], list[list[object]]]:
-        """Columns and lines with each share in five of them."""
+        """Columns and lines with each share split into five."""
         wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
         columns = [
             name
@@ -94,7 +96,7 @@ def _number(value: float) -> str:
 
 
 def text_of(cell: Cell) -> str:
-    """A cell as it is read."""
+    """A cell's display text."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
     return str(cell) if isinstance(cell, P | Rate) or not isinstance(cell, float) else f"{cell:.3g}"

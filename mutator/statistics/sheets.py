@@ -1,4 +1,4 @@
-"""The tables of a run: chosen by what its results can tell."""
+"""The statistical tables of a run, chosen by its results."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from mutator.statistics.sheet import Sheet
 from mutator.statistics.tallies import by_kind, by_scenario
 from mutator.statistics.times import Alerts
 
-_DRIVER_S = 1.8  # a driver's reaction to a warning that is seen, where nothing published says another
+_DRIVER_S = 1.8  # a driver's reaction to a visible warning, if no publication gives one
 
 
 def run_sheets(
@@ -21,11 +21,11 @@ def run_sheets(
     alerts: Alerts | None,
     ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
-    """The tables of a frame; none if they would say no more than counts: one method, nothing published.
+    """The tables of a frame; none if they would only repeat counts: one method, nothing published.
 
-    `alerts` of each run with a hazard (None: the target has none) are needed to say which came before it,
-    `ends` (s of simulation at which a run of each scenario ends) for censored times; tables that lack what
-    they need are left out.
+    `alerts` of each run with a hazard (None: the target has none) decide which came first; `ends` (end of a
+    run of each scenario, simulated s) are needed for censored times. Tables without their inputs are left
+    out.
     """
     frame = slim(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):

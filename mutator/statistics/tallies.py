@@ -1,4 +1,4 @@
-"""Counts of one group of experiments: of a run, or as published."""
+"""Counts of one group of experiments, from a run or a publication."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -11,7 +11,7 @@ import pandas as pd
 class Tally:
     """How many of a group's faults were injected, activated and so on; None: not known.
 
-    Alerts and hazards are counted from activation on. `hazards_no_alerts`: no alert in the whole run.
+    Alerts and hazards count from activation. `hazards_no_alerts`: no alert in the whole run.
     """
 
     injected: int
@@ -38,7 +38,7 @@ def tally(frame: pd.DataFrame) -> Tally:
 
 
 def total(tallies: Iterable[Tally]) -> Tally:
-    """The sum of groups; a count that one of them lacks is not known of all."""
+    """The sum of groups; a count is unknown if one group lacks it."""
     all_of_them = list(tallies)
     sums: dict[str, Any] = {}
     for field in fields(Tally):

@@ -1,4 +1,4 @@
-"""Times, alerts and the order of hazards as tables."""
+"""Tables of times, alerts and the order of hazards."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import astuple
@@ -10,13 +10,13 @@ from mutator.statistics.published import Published
 from mutator.statistics.sheet import Cell, Sheet
 
 _ALERT_NOTE = (
-    " Alert to hazard: where the alert came first; what did not happen before the end of the run is left out "
-    "here, see alert to hazard, censored."
+    " Alert to hazard: only if the alert came first. Events after the end of the run are missing "
+    "here; see alert to hazard, censored."
 )
 
 
 def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """How fast faults get through, by method and scenario; `alerts` if the target has some."""
+    """How fast faults propagate, by method and scenario; `alerts` if the target has some."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
@@ -25,7 +25,7 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
     return Sheet(
         name="propagation",
         title="Propagation times by scenario",
-        note="s from one event to the other, in the N runs that had both. Manifest: first difference of an "
+        note="s between events, in the N runs with both. Manifest: first difference of an "
         "actuator output from the fault-free run."
         + (_ALERT_NOTE if alerts else "")
         + (f" {published.times_note}" if published else ""),
@@ -44,7 +44,7 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
 
 
 def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
-    """Kaplan-Meier of alert to hazard, by method and scenario."""
+    """Kaplan-Meier estimates of alert to hazard, by method and scenario."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         found = times.reaction(group, ends, driver_s)
@@ -56,11 +56,11 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
         name="alert_to_hazard",
         title="From alert to hazard, censored",
         note="Runs whose first alert came before any hazard; without a hazard, censored at their end. "
-        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` where not reached; where the curve is one "
-        "half for a while, the middle of that. The last "
-        f"columns: share of alerts that no hazard follows within {late}, the driver's reaction time "
-        f"(Kaplan-Meier), and of hazards after an alert those that came more than {late} after it. Alerts "
-        "that came with the first hazard or after it are counted apart.",
+        "Median: Kaplan-Meier with its 95 % interval, `-` or `inf` if not reached; if the curve is flat at "
+        "one half, the middle. The last "
+        f"columns: share of alerts without a hazard within {late}, the driver's reaction time "
+        f"(Kaplan-Meier), and share of hazards after an alert that came more than {late} later. Alerts "
+        "with or after the first hazard are counted separately.",
         heads=(
             *("method", "scenario", "alerts first", "then hazard", "censored", "alert not before hazard"),
             *("median, s", "median, low, s", "median, high, s"),
@@ -79,29 +79,29 @@ def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
     return Sheet(
         name="alerts_before_hazards",
         title="Alerts before hazards",
-        note="Of the runs with a hazard, those in which an alert came before it, with 95 % Wilson intervals. "
-        "A run with several alerts is in several lines; `any` and `none` are of all alerts.",
+        note="Runs with a hazard in which an alert came first, with 95 % Wilson intervals. "
+        "A run with several alerts is in several lines; `any` and `none` cover all alerts.",
         heads=("method", "hazard", "alert", "came before it"),
         lines=tuple(lines),
     )
 
 
 def orders_sheet(frame: pd.DataFrame) -> Sheet:
-    """Which hazards came in one run, in order."""
+    """The hazards of each run, in order."""
     lines: list[tuple[Cell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [(str(method), str(module), order, n) for order, n in times.hazard_orders(group).items()]
     return Sheet(
         name="hazard_orders",
         title="Hazards that came together",
-        note="Runs with at least one hazard, by their hazards in the order in which they first came.",
+        note="Runs with at least one hazard, by their hazards in order of first occurrence.",
         heads=("method", "module", "hazards", "N"),
         lines=tuple(lines),
     )
 
 
 def _groups(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """By method and scenario, after each method's scenarios all of them."""
+    """Groups by method and scenario, each method's total after its scenarios."""
     for method, of_method in frame.groupby("method"):
         for scenario, group in of_method.groupby("scenario"):
             yield str(method), str(scenario), group

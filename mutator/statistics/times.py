@@ -1,7 +1,7 @@
-"""How long faults take: from activation to effects, from the first alert to the first hazard.
+"""Propagation times: from activation to effects, and from the first alert to the first hazard.
 
-The alert-to-hazard time is censored: where no hazard followed an alert, one might have come after the end of
-the run. Kaplan-Meier uses these runs up to their end; a mean of the others alone would be too short.
+Alert-to-hazard times are censored: a hazard might have followed after the end of the run. Kaplan-Meier uses
+these runs up to their end; a mean over the others would be too short.
 """
 
 import math
@@ -18,12 +18,12 @@ from mutator.statistics.frame import hazard_names
 from mutator.statistics.shares import CONFIDENCE, Share, share
 
 Alerts = Mapping[str, tuple[tuple[str, float], ...]]
-_EQUAL = 1e-9  # shares closer than this are the same: a curve is a product of fractions
+_EQUAL = 1e-9  # shares closer than this are equal: a curve is a product of fractions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Of `n` times in s: mean and quartiles (NaN of none)."""
+    """Mean and quartiles of `n` times in s (NaN if there are none)."""
 
     n: int
     mean: float
@@ -34,16 +34,17 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reaction:
-    """What is left of the drive after the first alert. Times in s; NaN: not reached or not defined.
+    """The drive after the first alert. Times in s; NaN: not reached or not defined.
 
-    `at_risk` runs had an alert before any hazard; a hazard then came in `events` of them, the others are
-    censored at their end. `median` is where the Kaplan-Meier curve crosses one half. Where it is exactly one
-    half for a while, the median is the middle of that while, as R's `survfit` and SAS have it: without
-    censoring it is then the ordinary median. A curve that stays at one half to its end has the beginning.
-    `median_low` to `median_high` are the times at which the curve's interval (log-log transformed) holds one
-    half (Brookmeyer and Crowley 1982); an infinite end is not reached.
-    `survival` is the Kaplan-Meier share of alerts that no hazard follows within the driver's reaction time;
-    `in_time` the share of hazards after an alert that came later than that.
+    `at_risk` runs had an alert before any hazard; `events` of them then had a hazard, the others are censored
+    at their end.
+    `median` is where the Kaplan-Meier curve crosses one half. If the curve is flat at one half, it is the
+    middle of that section, as in R's `survfit` and SAS: without censoring, this is the ordinary median. If
+    the section reaches the end, it is its beginning.
+    `median_low` to `median_high` are the times at which the curve's interval (log-log transformed) contains
+    one half (Brookmeyer and Crowley 1982); an infinite end is not reached.
+    `survival` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
+    `in_time` is the share of hazards after an alert that came later than that.
     """
 
     at_risk: int
@@ -53,11 +54,11 @@ class Reaction:
     median_high: float
     survival: float
     in_time: Share
-    too_late: int  # alerts that came after the first hazard, in no other number
+    too_late: int  # alerts after the first hazard, in no other number
 
 
 def spread(times: pd.Series) -> Spread:
-    """Mean and quartiles of the times that there are."""
+    """Mean and quartiles of the times, without missing ones."""
     known = times.dropna()
     if known.empty:
         return Spread(n=0, mean=math.nan, lower=math.nan, median=math.nan, upper=math.nan)
@@ -66,8 +67,8 @@ def spread(times: pd.Series) -> Spread:
 
 
 def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
-    """Times from activation to the first difference of an actuator, alert and hazard; and from the first
-    alert to the first hazard where the alert came first."""
+    """Times from activation to the first actuator difference, alert and hazard; and from the first alert to
+    the first hazard if the alert came first."""
     start = frame["t_activation"]
     reaction = frame["t_hazard"] - frame["t_alert"]
     return {
@@ -79,10 +80,10 @@ def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
 
 
 def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
-    """Kaplan-Meier (statsmodels) over the runs with an alert before any hazard.
+    """Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
-    `ends`: when a run of each scenario ends, s of simulation. Runs that crashed or ran out of time are left
-    out: nobody knows when they would have ended.
+    `ends`: the end of a run of each scenario, simulated s. Crashed and timed-out runs are left out, because
+    their ends are unknown.
     """
     from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
 
@@ -90,7 +91,7 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
     first = alerted[~alerted["is_hazard"] | _warned(alerted)]
     status = first["is_hazard"].astype(int)
     times = first["t_hazard"].fillna(first["scenario"].map(ends)) - first["t_alert"]
-    # float noise apart, a hazard just at the driver's time is not later than it
+    # apart from rounding, a hazard exactly at the driver's time is not later
     late = times.round(6) > driver_s
     events = int(status.sum())
     found = {
@@ -119,7 +120,7 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
 
 
 def _median(curve: Any) -> float:
-    """Where a Kaplan-Meier curve crosses one half, as `Reaction` says; NaN: it does not."""
+    """Where a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN: nowhere."""
     (reached,) = np.nonzero(curve.surv_prob < 0.5 + _EQUAL)
     if not reached.size:
         return math.nan
@@ -130,19 +131,19 @@ def _median(curve: Any) -> float:
 
 def _median_interval(curve: Any) -> tuple[float, float]:
     """The interval of the median time; infinite or NaN: not reached."""
-    with np.errstate(all="ignore"):  # the curve's last point may be 0, of which there is no log
+    with np.errstate(all="ignore"):  # the curve's last point may be 0, whose log is undefined
         low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
-    # where the curve ends at 0 it has no interval, so it cannot end that of the median
+    # a curve that ends at 0 has no interval there, so it cannot end the median's
     is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _EQUAL
     return float(low), math.inf if is_open else float(high)
 
 
 def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
-    """By (hazard, alert): in how many of the runs with this hazard the alert came before it; `any` and
-    `none` of all alerts.
+    """By (hazard, alert): the share of runs with this hazard in which the alert came first; `any` and `none`
+    cover all alerts.
 
-    `alerts`: by experiment id, the name and first time of each alert of a run with a hazard, s. A run may
-    have several.
+    `alerts`: by experiment id, name and first time of each alert of a run with a hazard, s. A run may have
+    several.
     """
     shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
@@ -158,7 +159,7 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
-    """How many runs had which hazards, in the order in which they came: `A`, `A then B`, `A with B`."""
+    """The number of runs by hazards in order of occurrence: `A`, `A then B`, `A with B`."""
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]
     times = zip(*(rows[f"t_{name.lower()}"].tolist() for name in names), strict=True)
@@ -175,5 +176,5 @@ def _order(times: Mapping[str, float]) -> str:
 
 
 def _warned(frame: pd.DataFrame) -> pd.Series:
-    """Where an alert came before the first hazard; one that came with it warns of nothing."""
+    """Where an alert came before the first hazard; a simultaneous alert is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

@@ -1,4 +1,2 @@
-"""What must hold before results count: preflight, equivalence check, library check, doctor.
-
-Nothing here changes a result.
-"""
+"""The conditions for valid results: preflight, equivalence check, library check, doctor. Changes no
+result."""

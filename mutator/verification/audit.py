@@ -1,7 +1,7 @@
-"""An audit of a run folder: does all that it says follow from what it holds? Nothing of it is executed.
+"""Audits a run folder: does everything in it follow from its content? Nothing is executed.
 
-Digests and checksums first, then content: ids and plan, golden runs, sources, trees and patches, verdicts,
-proof, tables. Each step lists every difference that it finds.
+Digests and checksums come first, then content: ids and plan, golden runs, sources, trees and patches,
+verdicts, proof, tables. Each step lists all differences.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One thing that an audit looked at: what must hold, of how many things, and where it does not."""
+    """One step of an audit: what must hold, the number of items, and the differences."""
 
     what: str
     count: int
@@ -42,7 +42,7 @@ class Check:
 
     @classmethod
     def of(cls, what: str, count: int, problems: Problems) -> "Check":
-        """With all problems that are found; one that is raised is the last."""
+        """A check with all problems found; a raised one comes last."""
         found = []
         try:
             for problem in problems:
@@ -56,13 +56,13 @@ class Check:
             ValueError,
             AttributeError,
         ) as err:  # damage
-            found.append(MutatorError(f"{what}: cannot be looked at ({type(err).__name__}: {err})"))
+            found.append(MutatorError(f"{what}: cannot be checked ({type(err).__name__}: {err})"))
         return cls(what=what, count=count, differences=tuple(found))
 
 
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
-    """Look at all of a run folder. Without a `workspace`, and with other sources in it than those of the run,
-    trees and patches cannot be compared, and that is a difference, too."""
+    """Audit a complete run folder. Without a `workspace`, or with other sources than the run's, trees and
+    patches cannot be compared, which is also a difference."""
     head = folder.head
     here = Check.of("sources that are those of the run", len(head["sources"]), _sources(folder, workspace))
     manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
@@ -94,7 +94,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 
 
 def _files(folder: RunFolder) -> int:
-    """Files that are verified by digests."""
+    """The number of files with digests."""
     try:
         return len(digests.read(folder.path).names) if folder.verifiable else 0
     except MutatorError:
@@ -103,7 +103,9 @@ def _files(folder: RunFolder) -> int:
 
 def _content(folder: RunFolder) -> Problems:
     if not folder.verifiable:
-        yield MutatorError(not_verifiable(folder), where=folder.path / HEAD, expected="a run of this version")
+        yield MutatorError(
+            not_verifiable(folder), where=folder.path / HEAD, expected="a run made with this version"
+        )
     yield from folder.problems(anew=True)
     for path in filter(Path.is_file, folder.patches.files()):
         if read_blocks(path).damaged:
@@ -111,12 +113,12 @@ def _content(folder: RunFolder) -> Problems:
                 "damaged blocks",
                 where=path,
                 expected="patches as they were appended",
-                remedy=f"`mutator verify {folder.path} --repair` puts them aside",
+                remedy=f"`mutator verify {folder.path} --repair` sets them aside",
             )
 
 
 def _plan(folder: RunFolder) -> Problems:
-    """The ids follow from the plan's lines, the digest from the ids, run.json and plan.csv from all."""
+    """Ids follow from the plan's lines, the digest from the ids, run.json and plan.csv from all."""
     run, head = folder.path, folder.head
     yield from plan_file.problems(run)
     plan = load_plan(folder)
@@ -140,9 +142,9 @@ def _plan(folder: RunFolder) -> Problems:
 
 
 def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
-    """Every check has passed, and the golden runs are those that it was about."""
+    """Every check passed, and the golden runs are the ones checked."""
     path = folder.path / CHECKS
-    if not path.exists():  # they have not run yet
+    if not path.exists():  # not run yet
         return
     checks = read_json(path, CHECKS_SCHEMA)
     for result in checks["results"]:
@@ -157,13 +159,13 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
-    """Target, manifest, templates and scenarios are those that the run was planned with."""
+    """Target, manifest, templates and scenarios are those of the plan."""
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(
             "no library found",
             where=where,
-            expected="the sources of the run: trees and patches were not compared",
+            expected="the run's sources (trees and patches were not compared)",
         )
         return
     manifest = workspace.manifest(head["target"])
@@ -173,11 +175,11 @@ def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
             yield MutatorError(
                 f"{name} {known[:16]}",
                 where=where,
-                expected=f"{str(now.get(name))[:16]}, as it is here",
-                remedy="verify with the sources of the run: without them no tree or patch was compared",
+                expected=f"{str(now.get(name))[:16]}, the digest here",
+                remedy="verify with the run's sources (trees and patches were not compared)",
             )
     for path, known in head.get("target_files", {}).items():
         if (found := manifest.tree.digests.get(path)) != known:
             yield MutatorError(
-                f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, as it is here"
+                f"{path} {known[:16]}", where=where, expected=f"{str(found)[:16]}, the digest here"
             )

@@ -1,4 +1,4 @@
-"""What an audit finds out of records: do trees, patches and verdicts follow from what else is known?"""
+"""Audits records: do trees, patches and verdicts follow from the rest of the run?"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,20 +26,20 @@ _TINY = 1e-9  # s
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A record and where it is stored."""
+    """A record and its location."""
 
     path: Path
     line: int
     record: Record
 
     def difference(self, got: str, expected: str) -> MutatorError:
-        """Something that does not follow."""
+        """An inconsistency."""
         name = self.record.experiment_id
         return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
 
 
 def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
-    """The records of one kind that can be read, harness errors left out."""
+    """The readable records of one kind, without harness errors."""
     found = []
     for path in sorted(path for path in (folder.path / kind).glob("*.jsonl") if path.is_file()):
         segment = read_segment(path, checksums=folder.verifiable)
@@ -51,7 +51,7 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
                 KeyError,
                 TypeError,
                 ValueError,
-            ):  # a head, or damage that is told elsewhere
+            ):  # a head, or damage reported elsewhere
                 continue
             if record.status is not Status.HARNESS_ERROR:
                 found.append(Recorded(path, number, record))
@@ -61,8 +61,8 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
 def mutants(
     folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
-    """Trees and patches that are not those of the mutants, which are built for it; stored patches that are
-    missing, others, or nobody's."""
+    """Trees and patches that do not match mutants rebuilt for comparison; stored patches that are missing,
+    different, or belong to no experiment."""
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
@@ -91,7 +91,7 @@ def mutants(
 
 
 def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
-    """Digests of tree and patch of a mutant; empty for one that cannot be made."""
+    """Digests of tree and patch of a mutant; empty for one that cannot be built."""
     try:
         mutant = build(manifest, models, fault, trigger)
     except InvalidMutant:
@@ -102,7 +102,7 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
 def verdicts(
     head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    """Fields of records that contradict each other."""
+    """Contradictory fields of records."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
     for one in records:
         flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
@@ -111,11 +111,11 @@ def verdicts(
             yield one.difference(got, expected)
 
 
-Flaws = Iterator[tuple[str, str]]  # what was found, what would follow
+Flaws = Iterator[tuple[str, str]]  # found, expected
 
 
 def _flaws_of_end(record: Record) -> Flaws:
-    """Of a run that ended well."""
+    """Flaws of a run that finished normally."""
     activation = record.activation
     follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
     if record.outcome != follows:
@@ -132,7 +132,7 @@ def _flaws_of_end(record: Record) -> Flaws:
 
 
 def _flaws_of_bad_end(record: Record) -> Flaws:
-    """Of a run that has no outcome."""
+    """Flaws of a run without an outcome."""
     told = {
         "outcome": record.outcome,
         "t_manifest": record.t_manifest,
@@ -151,7 +151,7 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
 
 
 def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
-    """Hazards and channels are those of the target, and differences beyond the tolerance are manifested."""
+    """Hazards and channels must be the target's, and differences beyond the tolerance must be manifested."""
     strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
     if strangers:
         yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
@@ -167,8 +167,8 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
 
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
-    """What left golden are channels of the target, not after the drive; the first actuator of them says when
-    the fault manifested."""
+    """Channels that left golden must be the target's and not after the drive; the first actuator among them
+    gives the manifestation time."""
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY
@@ -185,7 +185,7 @@ def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:
-    """Whether events are as a record has them."""
+    """Whether events are in the form that records have."""
     if activation is None:
         return not events
     times = [time for _, time in events]
@@ -196,7 +196,7 @@ def _in_order(events: Events, activation: Activation | None) -> bool:
 def proof(
     folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
 ) -> Iterator[MutatorError]:
-    """Records of the proof that are others than the run's or not of its sample, and missing ones."""
+    """Records of the proof that differ from the run's or are not in its sample, and missing ones."""
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}

@@ -1,4 +1,4 @@
-"""What an audit finds out of series: are their files what was written? No result depends on them."""
+"""Audits series: are their files unchanged? No result depends on them."""
 
 from collections.abc import Iterator
 
@@ -10,8 +10,8 @@ from mutator.store.series_packing import segments
 
 
 def series(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """How many files of series there are, and what is wrong with them: one that is damaged, or missing
-    although others need it. A folder without any is whole."""
+    """The number of series files, and their problems: damaged files, and missing ones that others need. A
+    folder without series is valid."""
     there = SeriesFolder(folder.path)
     return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there)
 
@@ -23,7 +23,7 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
         try:
             read_kept(there.kept(name))
         except MutatorError as err:
-            yield _told(err, err.got, f"{making_again(run, name)} makes it anew")
+            yield _told(err, err.got, f"{making_again(run, name)} rebuilds it")
     for path in segments(run):
         if read_blocks(path).damaged:
             yield MutatorError(
@@ -32,7 +32,7 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
 
 
 def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
-    """What is wrong with the index and the chunks."""
+    """The problems of the index and the chunks."""
     run, path = folder.path, there.path / f"{INDEX}.js"
     try:
         index = there.index
@@ -40,7 +40,7 @@ def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
         yield err
         return
     if index is None:
-        if any(there.path.glob("*.js")) and not segments(run):  # else a kill came before it was written
+        if any(there.path.glob("*.js")) and not segments(run):  # else killed before the index was written
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=putting_aside(run))
         return
@@ -63,7 +63,7 @@ def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:
 
 
 def _users(index: Index, chunk: str) -> list[str]:
-    """The experiments that a chunk is needed for: it has their series, or that of their golden run."""
+    """The experiments that need a chunk for their series or their golden run's."""
     inside = {number for number, (name, _) in enumerate(index.places) if name == chunk}
     goldens = {key for key, number in index.goldens.items() if number in inside}
     return [

@@ -1,4 +1,4 @@
-"""Do the tables that are stored follow from plan, records and timings? They are made again to be compared."""
+"""Audits tables: rebuilds them from plan, records and timings, and compares."""
 
 from collections.abc import Iterator
 from itertools import zip_longest
@@ -11,11 +11,11 @@ from mutator.outcomes import results
 from mutator.outcomes.reader import same_parquet
 from mutator.store.run_folder import RunFolder
 
-_REMEDY = "`mutator report` makes it anew"
+_REMEDY = "`mutator report` rebuilds it"
 
 
 def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """How many tables are there, and where they differ. A missing one is made when it is needed."""
+    """The number of tables, and their differences. Missing tables are built when needed."""
     there = [name for name in results.TABLES if (folder.path / name).is_file()]
     return len(there), _differences(folder, there)
 
@@ -35,7 +35,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
 
 
 def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
-    """The lines that differ, each by its first cell that does."""
+    """The lines that differ, each with its first differing cell."""
     with _opened(path) as found, _opened(made) as wanted:
         for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
             if got is None or expected is None:

@@ -1,4 +1,4 @@
-"""The canary: a fault known to be harmful. All of its values are tried before it counts as harmless."""
+"""The canary: a fault known to be harmful. It counts as harmless only after all of its values were tried."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 
 def tries(workspace: Workspace, manifest: TargetManifest, canary: Experiment) -> Iterator[Experiment]:
-    """The canary, then the same with each other value of its variant, the largest first."""
+    """The canary, then the same fault with each other value of its variant, largest first."""
     yield canary
     models, known = workspace.fault_models(), canary.fault
     others: dict[str, Fault] = {}
@@ -43,16 +43,16 @@ def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) 
 def judge(
     experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
 ) -> tuple[str, str]:
-    """What is wrong with a canary (empty: nothing), and what is right: one is run after the other until one
-    does harm."""
+    """The problem of a canary (empty: none) and the success message. Runs the experiments until one does
+    harm."""
     harmless: list[str] = []
     for experiment in experiments:
         value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()
         try:
             result = run(experiment)
-            if result.problem:  # maybe something from outside ended it: what is said must not depend on that
+            if result.problem:  # perhaps an outside cause: the message must not depend on it
                 result = run(experiment)
-        except MutatorError as error:  # this value makes no mutant
+        except MutatorError as error:  # this value does not build a mutant
             result = CheckRun(problem=error.got)
         if not result.problem and hazard in dict(result.hazards):
             others = f" with {value}, and not with {', '.join(harmless)}" if harmless else ""

@@ -1,4 +1,4 @@
-"""Why a target is likely not deterministic: lines that were seen at work in a run, or found by reading."""
+"""Likely reasons why a target is not deterministic: lines observed in a run or found in the source."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,21 +13,21 @@ _MOST = 5
 _REMEDIES = {
     CLOCK: "count time in steps: `step * dt`",
     DRAW: "draw from `numpy.random.default_rng(seed)` with the run's seed",
-    THREAD: "do that work in the step itself",
-    PROCESS: "let nothing depend on an address or a process's number",
-    HASH: "let nothing depend on a hash; use `sorted(...)` where a set's order counts",
+    THREAD: "do the work within the step",
+    PROCESS: "do not depend on addresses or process ids",
+    HASH: "do not depend on hashes; use `sorted(...)` where a set's order matters",
 }
 _UNKNOWN = (
-    "nothing in the target's own lines was seen to read a clock, draw without a seed or start a thread; "
-    "look at what it reads (files, the network), and at state that its libraries keep"
+    "no line of the target was seen to read a clock, draw without a seed or start a thread; "
+    "check its inputs (files, the network) and the state of its libraries"
 )
 
 
 def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: bool) -> tuple[list[Place], str]:
-    """The lines that are likely to blame, the likeliest first, and what to do.
+    """The most suspicious lines, likeliest first, and remedies.
 
-    `by_hash` says that runs with one PYTHONHASHSEED agree, and with another do not: then a set's order or a
-    hash is to blame. `watched` is what a watched run noted.
+    `by_hash` says that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
+    or hashes. `watched` has the notes of a watched run.
     """
     noted = watched.get("noted", [])
     hashes = [one for one in noted if one["kind"] == HASH]
@@ -42,7 +42,7 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
 
 
 def sets(manifest: TargetManifest) -> list[Place]:
-    """Where files of the target go through a set in its order, those that may have faults first."""
+    """Where target files depend on the order of a set; files that may have faults first."""
     found = []
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):

@@ -1,4 +1,4 @@
-"""Where two runs that should be one first differ."""
+"""Finds where two supposedly identical runs first differ."""
 
 import json
 from pathlib import Path
@@ -13,8 +13,8 @@ from mutator.targets.manifest import TargetManifest
 
 
 def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
-    """Channel, step, time and both values, where the traces in two output folders differ first; else what of
-    the files differs; empty if nothing does."""
+    """Channel, step, time and both values of the first difference between the traces in two output folders,
+    else the difference of the files; empty if there is none."""
     for name in manifest.outputs:
         if no_pipe(one / name).read_bytes() != no_pipe(other / name).read_bytes():
             in_trace = name == manifest.trace_file
@@ -34,7 +34,7 @@ def _in_traces(manifest: TargetManifest, one: Path, other: Path) -> str:
     for name in (time, *(channel.name for channel in manifest.channels)):
         rows = min(len(first[name]), len(second[name]))
         a, b = first[name][:rows], second[name][:rows]
-        unlike = np.flatnonzero((a != b) & ((a == a) | (b == b)))  # NaN is like NaN
+        unlike = np.flatnonzero((a != b) & ((a == a) | (b == b)))  # NaN equals NaN
         if unlike.size:
             step = int(unlike[0])
             t = float(golden.times_of(first, name, time)[step])

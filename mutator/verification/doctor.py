@@ -1,4 +1,4 @@
-"""Can this machine run campaigns? One finding for each thing a campaign needs."""
+"""Checks whether this machine can run campaigns, with one finding for each requirement."""
 
 import fcntl
 import importlib.metadata
@@ -31,10 +31,10 @@ LITTLE_MEMORY = 1e9  # bytes: two controllers with their solvers, and the runner
 
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
-    """Look at interpreter, packages, machine, the folder here, child processes, library and target, which is
-    loaded to see whether it can be forked.
+    """Check interpreter, packages, machine, current folder, child processes, library and target. The target
+    is loaded to see whether it can be forked.
 
-    `workspace` may be the error that finding one gave: that is a finding too.
+    `workspace` may be the error from looking for it, which becomes a finding.
     """
     findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
     if isinstance(workspace, MutatorError):
@@ -53,7 +53,7 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Each package mutator itself requires (not its extras), present and of a version it may have."""
+    """Each package that mutator requires (not its extras), present in an allowed version."""
     for line in importlib.metadata.requires("mutator") or ():
         wanted = Requirement(line)
         if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
@@ -78,19 +78,19 @@ def _cores() -> Finding:
 def _memory() -> Finding:
     free = os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     level = Level.OK if free > LITTLE_MEMORY else Level.WARN
-    remedy = "" if level is Level.OK else "run fewer experiments side by side (-n 1)"
+    remedy = "" if level is Level.OK else "run fewer experiments in parallel (-n 1)"
     return Finding(name="memory", level=level, found=f"{free / 1e9:.1f} GB free", remedy=remedy)
 
 
 def _disk() -> Finding:
     free = shutil.disk_usage(Path.cwd()).free
     level = Level.OK if free > LITTLE_DISK else Level.WARN
-    remedy = "" if level is Level.OK else "make room, or set --out to a folder with more"
+    remedy = "" if level is Level.OK else "free some space, or set --out to another disk"
     return Finding(name="disk", level=level, found=f"{free / 1e9:.1f} GB free here", remedy=remedy)
 
 
 def _folder() -> Finding:
-    """A run folder must be writable, and its file system must know locks."""
+    """Run folders must be writable, on a file system with locks."""
     here = Path.cwd()
     try:
         with tempfile.TemporaryFile(dir=here) as file:
@@ -102,15 +102,17 @@ def _folder() -> Finding:
 
 
 def _child() -> Finding:
-    """An experiment is a fresh, isolated interpreter with limits: start one."""
+    """Start a fresh, isolated interpreter with limits, as experiments do."""
     command = [sys.executable, "-P", "-s", "-c", "import numpy; print(numpy.__version__)"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     except (OSError, subprocess.TimeoutExpired) as e:
-        return Finding(name="child process", level=Level.FAIL, found=str(e), remedy="see the message")
+        return Finding(
+            name="child process", level=Level.FAIL, found=str(e), remedy="fix the cause in the message"
+        )
     if done.returncode:
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
-        return Finding(name="child process", level=Level.FAIL, found=last, remedy="mend the installation")
+        return Finding(name="child process", level=Level.FAIL, found=last, remedy="repair the installation")
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
     memory = "" if limit == resource.RLIM_INFINITY else f", address space limited to {limit / 1e9:.1f} GB"
     return Finding(name="child process", level=Level.OK, found=f"starts and finds its packages{memory}")

@@ -1,4 +1,4 @@
-"""Draws that nothing uses: faults that differ in name only, and parameters that change nothing."""
+"""Finds unused draws: faults that differ only in name, and parameters without effect."""
 
 from collections.abc import Iterator
 
@@ -15,15 +15,15 @@ _NAME = "draws"
 
 
 def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
-    """What is drawn, or given to a fault model, and used by nothing."""
+    """Draws and fault-model parameters that nothing uses."""
     places = [*_of_specs(specs, models), *_of_models(models)]
     if not places:
-        return Finding(name=_NAME, level=Level.OK, found="all that is drawn is used")
+        return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
     return Finding(
         name=_NAME,
         level=Level.WARN,
-        found=f"{len(places)} that nothing uses",
-        remedy="use it in a parameter (`by_m: NAME`), or leave it out: its faults are all the same",
+        found=f"{len(places)} unused",
+        remedy="use it in a parameter (`by_m: NAME`), or remove it: its faults are all the same",
         places=tuple(places),
     )
 
@@ -49,15 +49,15 @@ def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
 
 
 def _of_models(models: FaultModels) -> Iterator[Place]:
-    """Parameters that a model takes and its template does not mention."""
+    """Parameters that a model's template does not mention."""
     environment = ImmutableSandboxedEnvironment()
     for model in models:
         try:
             used = find_undeclared_variables(environment.parse(model.template))
-        except TemplateError:  # told when it is rendered
+        except TemplateError:  # reported when it is rendered
             continue
         if model.kind is SnippetKind.VALUE:
-            used.add("target")  # what is changed at a statement; the template knows it as `original`
+            used.add("target")  # what is changed at a statement; the template calls it `original`
         for param in model.params:
             if param.name not in used:
                 what = f"parameter '{param.name}' of model {model.name}: its template does not use it"

@@ -1,8 +1,8 @@
-"""What driving a target tells before a campaign: `mutator check --drive`.
+"""Checks a target by running it: `mutator check --drive`.
 
-Each scenario is driven twice without a fault, with two hash seeds. The second time a probe counts at every
-statement that faults are put at, and calls that keep a target from being deterministic are noted. Where the
-two differ, further runs, without all that and with either hash seed, show what made the difference.
+Each scenario runs twice without a fault, with two hash seeds. In the second run a probe counts executions of
+every statement with faults, and calls that prevent determinism are noted. If the runs differ, further runs
+without the probe and with either hash seed show the cause.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,16 +36,16 @@ from mutator.verification.reach import Reach
 from mutator.workspace import Workspace
 
 _OTHER_HASH_SEED = 4242
-_BRIEF_S = 5.0  # a golden run that takes longer is not driven once more for the fast engines
-_MOST = 20  # places that a finding lists
+_BRIEF_S = 5.0  # slower golden runs are not repeated for the fast engines
+_MOST = 20  # places listed in a finding
 
 
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
-    """What golden runs of the scenarios tell; default: those of the library's campaigns, or all it has.
+    """The findings from golden runs of the scenarios (default: those of the library's campaigns, or all).
 
-    Whether the target is deterministic, and why it likely is not; what keeps it from being forked; statements
-    of faults that are never executed; triggers that never hold; canaries that do no harm. MutatorError for an
-    unknown scenario and for a mistake in the library, which `check_library` tells in full.
+    They cover: determinism and likely causes of its absence; obstacles to forking; statements with faults
+    that never run; triggers that never hold; harmless canaries. MutatorError for an unknown scenario or a
+    mistake in the library; `check_library` reports such mistakes in full.
     """
     with ScratchFolder("mutator-drive-") as scratch:
         return _Drive(workspace, target, scenarios, scratch).findings()
@@ -53,8 +53,8 @@ def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()
 
 @dataclass(frozen=True)
 class _Golden:
-    """What came of the runs of a scenario: the pristine target's, the counting mutant's with another hash
-    seed, and the pristine target's with that one, too (the counting one's, where that need not be asked)."""
+    """The runs of a scenario: the pristine target, the counting mutant with another hash seed, and the
+    pristine target with that seed (the counting run again if it is not needed)."""
 
     first: Execution
     watched: Execution
@@ -87,14 +87,14 @@ class _Drive:
         self.engine = ReferenceEngine(self.manifest, base, work, limits)
 
     def findings(self) -> list[Finding]:
-        """Everything, in the order in which it is worth reading."""
+        """All findings, most important first."""
         with ThreadPoolExecutor(usable_cores()) as pool:
             jobs = [job for name in self.scenarios for job in self._jobs(name)]
             runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
             goldens = {name: self._golden(name, runs) for name in self.scenarios}
             found = [self._determinism(name, golden) for name, golden in goldens.items()]
             if all(self._look(golden.first).problem for golden in goldens.values()):
-                return found  # of runs that fail nothing else can be said
+                return found  # failed runs allow no further findings
             found += self._clocks(goldens) if all(one.level is Level.OK for one in found) else []
             found.append(self._forking(goldens, well=found[0].level is Level.OK))
             for name, golden in goldens.items():
@@ -110,13 +110,13 @@ class _Drive:
         yield self._counting(scenario, self.setting)
 
     def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
-        """The runs of a scenario; the third is driven where the first two differ."""
+        """The runs of a scenario; the third runs only if the first two differ."""
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         one, other = self._look(first), self._look(watched)
         if one.problem or (one.digest == other.digest and not other.problem):
             return _Golden(first, watched, watched)
         again = replace(self._job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
-        if other.problem:  # of being watched, perhaps
+        if other.problem:  # perhaps caused by watching
             counting = self._counting(scenario, self.setting)
             watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
         return _Golden(first, watched, self._run(again))
@@ -146,7 +146,7 @@ class _Drive:
     # Determinism
 
     def _determinism(self, scenario: str, golden: _Golden) -> Finding:
-        """The runs are the same bytes and reach no hazard."""
+        """The runs must give the same bytes and reach no hazard."""
         name = f"golden {scenario}"
         first, watched, again = (self._look(one) for one in (golden.first, golden.watched, golden.again))
         problem = judge_golden(first, again)
@@ -154,13 +154,13 @@ class _Drive:
             found = f"the same bytes twice, in {golden.first.wall_s:.1f} s each"
             return Finding(name=name, level=Level.OK, found=found)
         if first.problem or again.problem or watched.problem or first.digest == again.digest:
-            remedy = "mend the target, the scenario or the manifest: no campaign starts"
+            remedy = "fix the target, the scenario or the manifest: no campaign can start"
             return Finding(name=name, level=Level.FAIL, found=problem, remedy=remedy)
         same = self._look(self._run(self._job("same", scenario, self.setting)))
         return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
 
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
-        """Where the runs first differ, and what is likely to blame."""
+        """Where the runs first differ, and the likely causes."""
         where = first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
         which = "with two hash seeds, and not with one, they" if by_hash else "they"
@@ -168,13 +168,13 @@ class _Drive:
         return Finding(
             name=name,
             level=Level.FAIL,
-            found=f"two runs are not the same: {which} first differ {where}{likely}",
+            found=f"two runs differ: {which} first differ {where}{likely}",
             places=tuple(places),
             remedy=remedy,
         )
 
     def _noted(self, golden: _Golden) -> dict[str, Any]:
-        """What the watched run noted, with the lines of the target's own files."""
+        """The notes of the watched run, with the target's own line numbers."""
         files = self.reach.counting.files
         noted = [
             one
@@ -185,11 +185,11 @@ class _Drive:
         return {**golden.watched.watched, "noted": noted}
 
     def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
-        """A deterministic target may read clocks: that is no more than a note."""
+        """A deterministic target may read clocks: this is only a note."""
         noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
         if not noted:
             return []
-        found = "are read, and nothing in trace or record shows it"
+        found = "are read, without effect on trace or record"
         return [
             Finding(name="clocks", level=Level.OK, found=found, places=tuple(dict.fromkeys(noted))[:_MOST])
         ]
@@ -197,8 +197,8 @@ class _Drive:
     # Fast engines
 
     def _forking(self, goldens: Mapping[str, _Golden], *, well: bool) -> Finding:
-        """Whether a golden run can be forked at its steps: tried with a brief one that is `well`; of others
-        only the threads are looked at."""
+        """Whether a golden run can be forked at its steps. Tries a fast one that is `well`; for others only
+        threads are checked."""
         scenario, golden = next(iter(goldens.items()))
         tried = well and golden.first.wall_s <= _BRIEF_S
         refusal = forkable.unfit(self.manifest)
@@ -206,11 +206,11 @@ class _Drive:
             refusal = self._refusal(scenario, golden) if tried else _threads(golden.watched)
         if refusal is None and not tried:
             why = (
-                f"as a golden run takes {golden.first.wall_s:.0f} s"
+                f"because a golden run takes {golden.first.wall_s:.0f} s"
                 if well
-                else "as its golden run is not well"
+                else "because its golden run fails"
             )
-            found = f"no thread is in the way; forking was not tried, {why}"
+            found = f"no threads prevent forking; forking was not tried, {why}"
             return Finding(name=fast_engines.NAME, level=Level.OK if well else Level.WARN, found=found)
         told = fast_engines.finding(refusal)
         if refusal is None or "thread" not in str(refusal):
@@ -235,7 +235,7 @@ class _Drive:
         self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
 
     def _reach_more(self) -> None:
-        """Drive with the changes that faults and campaigns make, as long as there is something to come to."""
+        """Run with the changes that faults and campaigns make, as long as something is left to reach."""
         own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
         for changes in own:
             for scenario in self.scenarios:
@@ -254,7 +254,7 @@ class _Drive:
     # Canaries
 
     def _canaries(self) -> list[tuple[str, Experiment, str]]:
-        """Campaign, canary and hazard; canaries that differ in their setting only are tried once."""
+        """Campaign, canary and hazard; canaries that differ only in their setting are tried once."""
         found: dict[object, tuple[str, Experiment, str]] = {}
         for campaign in sorted(self.campaigns, key=lambda one: len(_setting(self.workspace, one))):
             reading = _reading(self.workspace, campaign)
@@ -281,7 +281,7 @@ class _Drive:
 
 
 def _threads(watched: Execution) -> Refused | None:
-    """What the threads of a watched run are in the way of."""
+    """The obstacles from the threads of a watched run."""
     others = watched.watched.get("threads", [])
     return Refused(too_many(others), turned_off(others)) if others else None
 
@@ -291,11 +291,11 @@ def _reading(workspace: Workspace, campaign: Campaign) -> str:
 
 
 def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
-    """The changes that all runs of a campaign are made with."""
+    """The changes that apply to all runs of a campaign."""
     return campaign.setting_in(_reading(workspace, campaign))
 
 
 def _own_line(data: bytes, line: int) -> int:
-    """The line of the target's own file that is this one of a mutant's."""
+    """Map a line of a mutant's file to the target's own line."""
     tags = map(tag_of, data.splitlines()[: line - 1])
     return line - sum(tag is not None and tag.was is None for tag in tags)

@@ -1,9 +1,9 @@
-"""The proof of a campaign's engine: a sample of its experiments, run again on the reference engine.
+"""The equivalence check of a campaign's engine: a sample of its experiments, rerun on the reference engine.
 
-Every record of the sample must be the same, trace digest included; one that is not fails the campaign. The
-proof's runs are independent: they take nothing from what other runs left behind (`entry.independent` of the
-manifest), so that whatever runs share is proved with the engine. What they found is kept in `proof/` of the
-run folder, as records. Where no experiment was forked after all there is nothing to prove: the folder goes.
+Every record of the sample must be the same, trace digest included; a difference fails the campaign. The
+check's runs are independent: they use nothing from other runs (`entry.independent` of the manifest), so that
+sharing is checked together with the engine. `proof/` of the run folder has their records. If no experiment
+was forked, no check is needed and the folder is removed.
 """
 
 from collections import Counter
@@ -30,7 +30,7 @@ _SHARE = 100  # one experiment in so many
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """An experiment of the sample that is still to be run: its number among these, and its id."""
+    """An experiment of the sample that has not run yet: its number in the sample, and its id."""
 
     number: int
     id: str
@@ -38,7 +38,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """How far the proof of a run is: experiments in the sample, how many of them came out the same, and the
+    """The state of a run's equivalence check: experiments in the sample, those with the same result, and
     harness errors of its own runs (experiment id, detail)."""
 
     sampled: int
@@ -54,13 +54,13 @@ class Proof:
 
 
 def begin(run: Path) -> None:
-    """From now on the run has results that a proof is needed for."""
+    """Record that the run has results that need an equivalence check."""
     with raising_disk_full(run):
         (run / FOLDER).mkdir(exist_ok=True)
 
 
 def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
-    """One in a hundred, at least 20, with every fault type and every scenario among them."""
+    """One in a hundred, at least 20, covering every fault type and scenario."""
     count = max(_LEAST, -(-len(experiments) // _SHARE))
     chosen = list(pick(experiments, count, seed))
     seen = {mark for experiment in chosen for mark in _marks(experiment)}
@@ -72,8 +72,8 @@ def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ..
 
 
 def _sample_of(folder: RunFolder) -> set[str]:
-    """Ids of the sample of a whole plan. Of several seeds each has its own part, one in a hundred; those of
-    the first are chosen as those of a campaign with one seed."""
+    """Ids of a plan's sample. With several seeds each has its own part, one in a hundred; the first seed's
+    part is chosen as in a campaign with one seed."""
     return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
 
 
@@ -96,9 +96,9 @@ def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
 
 
 def needless(folder: RunFolder) -> str | None:
-    """Why no experiment was forked, in most cases' words; None where one was, or may yet be.
+    """The most frequent reason why no experiment was forked; None if one was or still may be.
 
-    Shards are proved each, as merged ones have a proof all or none.
+    Each shard is checked, because merged shards must all have a proof or none.
     """
     if folder.shard is not None:
         return None
@@ -106,7 +106,7 @@ def needless(folder: RunFolder) -> str | None:
     done = {one.experiment_id for one in endings(folder.records()) if one.counts}
     reasons = Counter[str]()
     for name in folder.share():
-        if name not in done:  # it is still to be run: what is told is of before
+        if name not in done:  # not run yet: the timing is from an earlier session
             return None
         line = told.get(name, {})
         if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
@@ -116,15 +116,14 @@ def needless(folder: RunFolder) -> str | None:
 
 
 def drop(folder: RunFolder) -> None:
-    """Leave no proof behind where none is needed; a few runs of it may have been driven before that was
-    known."""
+    """Remove an unneeded proof; some of its runs may be older than that knowledge."""
     gone = {name: None for name in digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
     with digests.rewriting(folder.path, gone):
         remove_folder(folder.path / FOLDER)
 
 
 def left(folder: RunFolder) -> tuple[Sample, ...]:
-    """What of the sample has no counting record in `proof/` yet; nothing where no proof is needed."""
+    """The part of the sample without a valid record in `proof/`; empty if no check is needed."""
     if not (folder.path / FOLDER).is_dir():
         return ()
     found = folder.records(FOLDER)
@@ -135,14 +134,14 @@ def left(folder: RunFolder) -> tuple[Sample, ...]:
 
 
 def sampled(folder: RunFolder) -> list[str]:
-    """Ids of the sample that are of this folder's share, in the plan's order."""
+    """Ids of the sample in this folder's share, in plan order."""
     wanted = _sample_of(folder)
     return [name for name in folder.share() if name in wanted]
 
 
 def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
-    """How far the proof is, None where none is needed; CheckFailed at a record that is another one on the
-    reference engine."""
+    """The state of the check, None if none is needed; CheckFailed if a record differs on the reference
+    engine."""
     if not (folder.path / FOLDER).is_dir():
         return None
     found = folder.records(FOLDER)
@@ -156,17 +155,17 @@ def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
             continue
         if record != truth:
             raise CheckFailed(
-                f"experiment {name} is another one on the reference engine: {difference(record, truth)}",
+                f"experiment {name} differs on the reference engine: {difference(record, truth)}",
                 where=folder.path,
                 expected="the same record from every engine",
-                remedy="do not trust this run: run it anew with --engine reference, and report this",
+                remedy="do not trust this run: rerun it with --engine reference, and report the problem",
             )
         same += 1
     return Proof(sampled=len(sampled(folder)), same=same, errors=tuple(sorted(errors)))
 
 
 def difference(record: Record, truth: Record) -> str:
-    """The first field in which a record differs from what it should be."""
+    """The first field in which a record differs from the expected one."""
     names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
     return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
 

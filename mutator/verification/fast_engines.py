@@ -1,4 +1,4 @@
-"""What keeps a target or its faults from the engines that fork, said before a campaign."""
+"""Reports before a campaign why a target or its faults cannot use the forking engines."""
 
 from dataclasses import replace
 
@@ -14,13 +14,13 @@ from mutator.verification.findings import Finding, Level
 from mutator.workspace import Workspace
 
 NAME = "fast engines"
-_WITHOUT = "campaigns run all the same, on the reference engine"
+_WITHOUT = "campaigns then run on the reference engine"
 _DRIVE = "`mutator check --drive` names the lines that start threads in Python"
 _LISTED = 3  # reasons
 
 
 def loading(manifest: TargetManifest) -> Finding:
-    """Whether the target can be forked once it is loaded, which is tried: its modules are imported."""
+    """Whether the target can be forked once loaded; tries it by importing its modules."""
     with ScratchFolder("mutator-check-") as scratch:
         base = prepare_base(manifest, scratch / "base")
         told = finding(not_loadable(manifest, base, scratch / "server"))
@@ -28,7 +28,7 @@ def loading(manifest: TargetManifest) -> Finding:
 
 
 def finding(refusal: Refused | None) -> Finding:
-    """What is told of a target that cannot be forked, or of one that can (None)."""
+    """The finding for a target that cannot be forked, or that can (None)."""
     if refusal is None:
         return Finding(name=NAME, level=Level.OK, found="runs can be forked")
     return Finding(
@@ -40,7 +40,7 @@ def finding(refusal: Refused | None) -> Finding:
 
 
 def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
-    """Which variants' mutants cannot be put into a loaded program."""
+    """The variants whose mutants cannot be put into a loaded program."""
     models = workspace.fault_models()
     faults = [f for spec in workspace.specs() for f in expand(spec, 0, models=models, manifest=manifest)]
     count = len({fault.spec for fault in faults})
@@ -61,6 +61,6 @@ def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
     return Finding(
         name="faults for fast engines",
         level=Level.WARN,
-        found=f"{left} of {counted(count, 'variant')} are left to the reference engine: {told}",
+        found=f"{left} of {counted(count, 'variant')} need the reference engine: {told}",
         remedy=_WITHOUT,
     )

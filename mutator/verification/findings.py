@@ -1,11 +1,11 @@
-"""Findings: what checks of a machine, a library or a target have to tell, good or bad."""
+"""Findings of checks on a machine, a library or a target, good or bad."""
 
 from dataclasses import dataclass
 from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How a finding bears on campaigns."""
+    """The effect of a finding on campaigns."""
 
     OK = "ok"
     WARN = "warning"
@@ -27,7 +27,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """One thing looked at: what was found and where, and what to do if it is not well."""
+    """The result of one check: what was found and where, and the remedy if there is a problem."""
 
     name: str
     level: Level

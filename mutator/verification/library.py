@@ -1,4 +1,4 @@
-"""Is everything in the library usable? What `mutator check` asks."""
+"""Checks that everything in the library is usable, for `mutator check`."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -33,13 +33,12 @@ T = TypeVar("T")
 
 
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
-    """Every problem of library, templates and target, in the order of the files; empty when all is well.
+    """Every problem of library, templates and target, in file order; empty if there is none.
 
-    Checks that nothing is left to fill in; that manifests, models, specs, hazards and context tables load;
-    that the models' examples hold; that every spec expands in every reading; that every anchor is found in
-    the target exactly once; that one mutant of every shape compiles and un-splices; that campaigns load and
-    the studies that they ask for find their data in order; and that a hazard analysis, if there is one, has
-    no gap.
+    Checks that no placeholder is left; that manifests, models, specs, hazards and context tables load; that
+    the models' examples hold; that every spec expands in every reading; that every anchor matches the target
+    exactly once; that one mutant of every shape compiles and un-splices; that campaigns load and their
+    studies find valid data; and that a hazard analysis, if any, has no gap.
     """
     found = _Found()
     found.problems += unfilled(workspace.library)
@@ -73,8 +72,8 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 def check_campaigns(
     workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
 ) -> list[MutatorError]:
-    """Problems of the library's campaigns, and those that the studies they ask for find in its data. What the
-    target does not observe is told of campaigns for it, if it is given."""
+    """Problems of the library's campaigns, and those that their studies find in its data. With a `manifest`,
+    also triggers that this target does not observe."""
     found, asked = _Found(), set[str]()
     for name in workspace.campaigns:
         campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
@@ -92,12 +91,12 @@ def check_campaigns(
 
 
 def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
-    """MutatorError for a trigger of a campaign's list that its target does not know."""
+    """MutatorError for a listed trigger of a campaign that its target does not know."""
     listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 
 def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
-    """A study's problem; at the campaign that asks for the study if it names no file."""
+    """A study's problem; located at the campaign that asks for the study if it names no file."""
     if problem.where:
         return problem
     return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
@@ -110,7 +109,7 @@ class _Found:
         self.problems: list[MutatorError] = []
 
     def tried(self, make: Callable[[], T]) -> T | None:
-        """What `make` returns; None, and a problem kept, when it fails."""
+        """Return the result of `make`; on failure store the problem and return None."""
         try:
             return make()
         except MutatorError as error:
@@ -136,7 +135,7 @@ def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -
 def _unbuildable(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
-    """Why a fault of a variant cannot be built, told at its first injection that is to blame, if one is."""
+    """Why a fault of a variant cannot be built, located at the first responsible injection, if any."""
     keys: Keys = (*variant.keys, fault.reading)
     try:
         for i, injection in enumerate(fault.injections):
@@ -152,7 +151,7 @@ def _unbuildable(
 
 
 def _where(error: MutatorError, manifest: TargetManifest) -> str:
-    """Where in the target an error is, as specs name its files: ` (pkg/sonar.py:28)`."""
+    """The place of an error in the target, as specs name its files: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
     path = manifest.tree.named(error.where)
@@ -188,7 +187,7 @@ def check_examples(models: FaultModels) -> Iterator[MutatorError]:
                 continue
             if after != example.after:
                 yield MutatorError(
-                    f"the example gives\n{after}",
+                    f"the example renders\n{after}",
                     where=model.source.path,
                     line=example.line,
                     expected=f"\n{example.after}",
@@ -197,7 +196,7 @@ def check_examples(models: FaultModels) -> Iterator[MutatorError]:
 
 
 def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
-    """The example's `before` with its injection spliced in (tag `example`); it must un-splice again."""
+    """The example's `before` with its injection spliced in (tag `example`); it must also un-splice."""
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)

@@ -1,4 +1,4 @@
-"""The checks before a campaign: golden twice, null mutant, canary, anchors. Without them none starts."""
+"""The checks that must pass before a campaign starts: golden twice, null mutant, canary, anchors."""
 
 import shutil
 from collections.abc import Iterator
@@ -41,10 +41,10 @@ from mutator.workspace import Workspace
 def run_checks(
     workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: Notify | None = None
 ) -> tuple[CheckResult, ...]:
-    """Run the checks unless they are known to pass for these very sources, in this folder or in another one
-    of this machine; results stay in checks.json.
+    """Run the checks, unless they have passed for these sources in this folder or in another on this machine;
+    results are stored in checks.json.
 
-    Also leaves the golden runs in the folder. CheckFailed (after all ran) when any fails.
+    Also leaves the golden runs in the folder. CheckFailed (after all ran) if any fails.
     """
     checks = _Checks(workspace, folder)
     known = checks.known()
@@ -58,16 +58,16 @@ def run_checks(
         raise CheckFailed(
             f"{len(failed)} of {len(results)} checks before the campaign failed: {text}",
             where=folder.path / FILE,
-            remedy="mend target, templates or canary; `mutator check --drive` tells more. The campaign does "
-            "not start before all pass",
+            remedy="fix target, templates or canary (`mutator check --drive` shows details); the campaign "
+            "starts only if all pass",
         )
     preflight_cache.store(preflight_cache.entry(checks.digest), folder.path, FILE, checks.kept)
     return results
 
 
 def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
-    """What to say of the plan's triggers that no golden run reaches; nothing unless the checks have just
-    driven the golden runs, or found them cached."""
+    """Remarks on the plan's triggers that no golden run reaches; empty unless the golden runs just ran or
+    were cached."""
     experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
@@ -75,14 +75,14 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
 
 
 def are_there(folder: RunFolder) -> bool:
-    """Whether a run folder holds results of checks and all golden runs."""
+    """Whether a run folder has check results and all golden runs."""
     places = (folder.golden(*one) for one in folder.goldens)
     goldens = (place / name for place in places for name in folder.head["golden_files"])
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
 
 
 def _kept(folder: RunFolder) -> Path:
-    """Where golden runs are until they are known to be the run's; what they observed stays there."""
+    """Where golden runs are kept until they are accepted; their observations stay there."""
     return folder.work / "kept"
 
 
@@ -112,8 +112,8 @@ class _Checks:
         self.digest = digest([*content, places])
 
     def known(self) -> tuple[CheckResult, ...] | None:
-        """Results of an earlier time, here or in another folder, if all passed and the golden runs are still
-        as they were; they are then here."""
+        """Earlier results from this or another folder, if all passed and the golden runs are unchanged;
+        copies them here."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
         copy = self.kept
@@ -125,7 +125,7 @@ class _Checks:
         except DiskFull:
             raise
         except (MutatorError, OSError, KeyError, TypeError, AttributeError):
-            return None  # none is there, or a damaged one
+            return None  # missing or damaged
         if results is not None:
             self._check_same_as_before(found["goldens"])
             self._install((copy / FILE).read_bytes())
@@ -142,7 +142,7 @@ class _Checks:
 
     def run(self, workers: int, notify: Notify) -> Iterator[CheckResult]:
         anchors = self._anchors()
-        if not anchors.passed:  # seconds saved, not minutes spent
+        if not anchors.passed:  # skip minutes of runs
             yield anchors
             return
         driver = CheckDriver(
@@ -165,7 +165,7 @@ class _Checks:
         yield from results
 
     def _install(self, checks: bytes) -> None:
-        """Make the kept golden runs and these results those of the run folder."""
+        """Install the kept golden runs and these results in the run folder."""
         run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
@@ -181,20 +181,20 @@ class _Checks:
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
-        """A run that has records must not go on with other golden runs (of another processor, say)."""
+        """A run with records must not continue with different golden runs (from another processor, say)."""
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
         known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
         other = [key for key in goldens if known[key] not in ("", goldens[key])]
         if other and any((run / "records").glob("*.jsonl")):
             raise CheckFailed(
-                f"the golden run {other[0]} is not the one this run began with",
+                f"the golden run {other[0]} differs from the one this run began with",
                 where=self.folder.path,
-                expected="a machine, Python and packages with which the target drives to the same bytes",
-                remedy="go back to those of before, which run.json has, or run into another folder",
+                expected="a machine, Python and packages that give the same bytes",
+                remedy="use those recorded in run.json, or run into another folder",
             )
 
     def _packages(self, runs: Runs) -> list[str]:
-        """What the golden runs loaded that is neither the target's nor the standard library's."""
+        """The packages that the golden runs loaded, without the target and the standard library."""
         loaded = {module for key in self.keys for module in runs[GOLDEN, key].modules}
         own = {path.split("/")[0].removesuffix(".py") for path in self.manifest.tree.files}
         return list(machine.packages_of(loaded - own))
@@ -210,7 +210,7 @@ class _Checks:
         yield from self._judge_same(runs)
 
     def _judge_same(self, runs: Runs) -> Iterator[CheckResult]:
-        """Scenarios that a change makes the same, as the manifest has it, drive to the same bytes."""
+        """Scenarios that a change makes equal, according to the manifest, must give the same bytes."""
         same: dict[GoldenRun, dict[str, CheckRun]] = {}
         for one in self.keys:
             if one.scenario in same_in(self.manifest, one.changes):
@@ -220,7 +220,8 @@ class _Checks:
             yield _result(f"same {name}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
-        """Each variant of the plan finds its statements (not compiling is a result, told later)."""
+        """Each variant of the plan must find its statements (failure to compile is a result, reported
+        later)."""
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:

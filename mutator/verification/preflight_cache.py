@@ -1,4 +1,4 @@
-"""Checks that passed on this machine, with their golden runs, for other run folders of the same sources."""
+"""Caches passed checks and their golden runs on this machine for other run folders with the same sources."""
 
 import platform
 import shutil
@@ -10,13 +10,13 @@ from mutator.verification.unreached import FOLDER
 
 
 def entry(key: str) -> Path:
-    """Where the checks with this digest are kept. Machines that share a home folder have separate entries:
-    the digest may not cover everything that changes last digits."""
+    """The place for checks with this digest. Machines with a shared home folder have separate entries,
+    because the digest may not cover everything that changes last digits."""
     return caches.of_checks() / digest([key, platform.node()])
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
-    """Keep a run folder's golden runs and check results (`file`) at `place`, with what is `observed`; an
+    """Store a run folder's golden runs and check results (`file`) at `place`, with what is `observed`; an
     unwritable cache is ignored."""
 
     def fill(made: Path) -> None:

@@ -1,4 +1,4 @@
-"""What must hold of the runs before a campaign."""
+"""The conditions on the runs before a campaign."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
-    """What a check needs to know of a run: how it ended, digests of all it wrote and of its trace alone,
-    hazards, alerts, trigger seen, top-level modules of others that it imported."""
+    """What checks need from a run: its problem, digests of all outputs and of its trace, hazards, alerts,
+    trigger seen, and third-party top-level modules imported."""
 
     problem: str
     digest: str = ""
@@ -31,10 +31,10 @@ class CheckRun:
 
 
 def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
-    """What a check needs to know of a run that is over."""
+    """What checks need from a finished run."""
     if execution.status is not Status.OK:
         log = execution.log.strip()
-        # what a run printed last says why it was killed; of an exception the message does
+        # the last printed line explains why a run was killed; an exception has a message
         last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
@@ -54,7 +54,7 @@ def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
 
 
 def digest_of(manifest: TargetManifest, out: Path) -> str:
-    """Digest of trace and record in an output folder; empty when they are not there."""
+    """Digest of trace and record in an output folder; empty if they are missing."""
     try:
         return digest([digest(no_pipe(out / name).read_bytes()) for name in manifest.outputs])
     except OSError:
@@ -62,7 +62,7 @@ def digest_of(manifest: TargetManifest, out: Path) -> str:
 
 
 def judge_golden(first: CheckRun, again: CheckRun) -> str:
-    """What is wrong with a pair of golden runs; empty if nothing."""
+    """The problem of a pair of golden runs; empty if there is none."""
     if first.problem or again.problem:
         return first.problem or again.problem
     if first.digest != again.digest:
@@ -74,7 +74,7 @@ def judge_golden(first: CheckRun, again: CheckRun) -> str:
 
 
 def judge_null(first: CheckRun, null: CheckRun) -> str:
-    """What is wrong with a null mutant beside its golden run; empty if nothing."""
+    """The problem of a null mutant compared with its golden run; empty if there is none."""
     if null.problem:
         return null.problem
     if null.digest != first.digest:
@@ -83,7 +83,8 @@ def judge_null(first: CheckRun, null: CheckRun) -> str:
 
 
 def judge_same(goldens: Mapping[str, CheckRun]) -> str:
-    """What is wrong with golden runs, by scenario, that the manifest says are one; empty if nothing."""
+    """The problem of golden runs, by scenario, that must be equal according to the manifest; empty if there
+    is none."""
     (first, reference), *others = goldens.items()
     for name, run in others:
         if run.problem or reference.problem:

@@ -30,7 +30,7 @@ Runs = dict[tuple[str, Any], CheckRun]  # by kind of run, and `GoldenRun`
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckDriver:
-    """Drives what the checks of a run folder judge. Golden runs, and what they observed, stay in `kept`."""
+    """Executes the runs that checks judge. Golden runs and their observations stay in `kept`."""
 
     workspace: Workspace
     folder: RunFolder
@@ -38,7 +38,7 @@ class CheckDriver:
     kept: Path
 
     def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
-        """Every run of every check, `workers` at a time, and what `canary.judge` says of the canary."""
+        """All runs of all checks, `workers` at a time, and the result of `canary.judge`."""
         work = self.folder.work / "checks"
         for scratch in (work, self.kept):
             remove_folder(scratch)
@@ -59,7 +59,7 @@ class CheckDriver:
             remove_folder(work)
 
     def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
-        """As `canary.judge`."""
+        """See `canary.judge`."""
 
         def run(experiment: Experiment) -> CheckRun:
             return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
@@ -80,7 +80,7 @@ class CheckDriver:
             jobs[NULL, key] = Job(name=f"n-{name}", files=null.files, mutant=null.id, observe=True, **common)
             jobs[GOLDEN, key] = Job(name=f"a-{name}", **common)
             jobs[AGAIN, key] = Job(name=f"b-{name}", hash_seed=_OTHER_HASH_SEED, **common)
-        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # the checks first
+        return dict(sorted(jobs.items(), key=lambda one: one[0][0] != NULL))  # null mutants last
 
     def _run(self, engine: ReferenceEngine, name: tuple[str, Any], job: Job) -> CheckRun:
         scratch = engine.work / job.name
@@ -101,7 +101,7 @@ class CheckDriver:
 
 
 def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
-    """Wait for what is under way, and tell how much of it is done."""
+    """Wait for pending runs and report progress."""
     pace = Pace(stage, len(futures))
     notify(pace.at(0))
     for done, future in enumerate(as_completed(futures), 1):

@@ -1,7 +1,7 @@
-"""What golden runs come to: statements that faults are put at, and triggers.
+"""Which statements with faults, and which triggers, golden runs reach.
 
-One mutant counts all statements at once: at each it has a call of the probe that does nothing but count. So
-a statement is executed here exactly where a fault would be active in it, were its trigger always on.
+One mutant counts all statements at once, with a probe call at each that only counts. So a statement is
+counted exactly when a fault in it would be active with its trigger always on.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,12 +22,12 @@ from mutator.verification.unreached import arming, holds
 from mutator.workspace import Workspace
 
 _COUNT = "count_only"
-_MOST = 20  # places that a finding lists
+_MOST = 20  # places listed in a finding
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A statement at which faults are injected: where, by which specs, with which changes of the scenario."""
+    """A statement with faults: its location, its place in a spec, and the scenario changes."""
 
     location: FaultLocation
     place: Place  # in the spec
@@ -43,7 +43,7 @@ class Awaited:
 
 
 class Reach:
-    """Statements and triggers of a library that no run has come to yet."""
+    """The statements and triggers of a library that no run has reached yet."""
 
     def __init__(self, workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]) -> None:
         self._manifest = manifest
@@ -63,7 +63,7 @@ class Reach:
         probe: Mapping[str, Any] | None,
         seen: Iterable[Sequence[float]],
     ) -> None:
-        """Strike out what a run of the counting mutant came to: its probe's report, and what it observed.
+        """Remove what a run of the counting mutant reached, from its probe's report and its observations.
 
         A statement counts only with the changes of its own fault.
         """
@@ -79,20 +79,20 @@ class Reach:
         self.untriggered = [one for one in self.untriggered if not holds(self._armings[one.trigger], rows)]
 
     def findings(self) -> list[Finding]:
-        """What no run came to, of all that were taken in."""
+        """What none of the runs reached."""
         return [
             self._finding(
                 "statement",
                 self._statements,
                 [one.place for one in self.unexecuted],
-                "a fault there is never active: anchor it elsewhere, or add a scenario that comes to it",
+                "a fault there is never active: anchor it elsewhere, or add a scenario that reaches it",
             ),
             self._finding(
                 "trigger",
                 self._triggers,
                 [one.place for one in self.untriggered],
-                "an experiment that waits for it is never active: add a scenario that reaches it, or leave "
-                "it out of the campaigns",
+                "its experiments are never active: add a scenario that reaches it, or remove "
+                "it from the campaigns",
             ),
         ]
 
@@ -124,7 +124,7 @@ def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Want
 def _counting(
     workspace: Workspace, manifest: TargetManifest, locations: Iterable[FaultLocation]
 ) -> tuple[Mutant, Mapping[str, FaultLocation]]:
-    """The mutant that counts at all these places, and which id stands for which."""
+    """The mutant that counts at all these places, and the location of each id."""
     models, once = workspace.fault_models(), list(dict.fromkeys(locations))
     injections = tuple(Injection(location=location, model=_COUNT) for location in once)
     fault = Fault(_COUNT, _COUNT, _COUNT, _COUNT, None, "", "", injections)
@@ -133,7 +133,7 @@ def _counting(
 
 
 def _with_count(models: FaultModels) -> FaultModels:
-    """The models, and one that counts and does nothing."""
+    """The models, plus one that only counts."""
     some = next(iter(models))
     count = FaultModel(
         name=_COUNT,
@@ -152,8 +152,8 @@ def _with_count(models: FaultModels) -> FaultModels:
 def _triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
 ) -> Iterator[Awaited]:
-    """The triggers that campaigns use, each as early as one of them arms it, and the latest of their random
-    times; without campaigns the rows of all tables."""
+    """The triggers that campaigns use, each armed as early as in any campaign, and the latest random times;
+    without campaigns the rows of all tables."""
     armed: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)

@@ -1,7 +1,7 @@
-"""Puts aside what is damaged of the series of a run folder, so that the rest can be read.
+"""Sets aside damaged series of a run folder, so that the rest can be read.
 
-A chunk of golden runs is made anew of these, where that gives the bytes that it had. The series of an
-experiment comes back when it is driven again.
+A chunk of golden runs is rebuilt from them if that gives the same bytes. An experiment's series returns when
+it is rerun.
 """
 
 import os
@@ -22,24 +22,24 @@ from mutator.workspace import Workspace
 def repair_series(
     folder: RunFolder, workspace: Workspace | None, put_aside: Callable[[str], None]
 ) -> Iterator[str]:
-    """Do that; what was done, a sentence each. `put_aside` copies the file of a name in the run folder.
-    Without a `workspace` no golden run can be read."""
+    """Set aside damaged series and yield a sentence for each action. `put_aside` copies a file of the run
+    folder. Golden runs can be read only with a `workspace`."""
     run, there = folder.path, SeriesFolder(folder.path)
     paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
     index = None
-    if there.path / f"{INDEX}.js" in paths:  # nothing says what is in the chunks
+    if there.path / f"{INDEX}.js" in paths:  # the chunks' content is unknown
         paths |= {*there.path.glob("*.js")}
     elif paths:
         index = there.index
     for path in sorted(paths):
         name = path.relative_to(run).as_posix()
-        found = "put aside" if os.path.lexists(path) else "is gone"
+        found = "set aside" if os.path.lexists(path) else "is gone"
         put_aside(name)
         if path.suffix == SUFFIX:
-            yield f"{name}: damaged blocks put aside; `mutator run` packs the others"
+            yield f"{name}: damaged blocks set aside; `mutator run` packs the others"
         elif index and (data := _golden_chunk(folder, workspace, index, path.stem)):
             write_script(path, data)
-            yield f"{name} made anew from the golden runs"
+            yield f"{name} rebuilt from the golden runs"
         else:
             path.unlink(missing_ok=True)
             yield f"{name} {found}: {making_again(run)} makes the series of an experiment"
@@ -48,7 +48,7 @@ def repair_series(
 
 
 def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
-    """The content of a chunk of golden runs, made anew; None where that is not possible any more."""
+    """The rebuilt content of a chunk of golden runs; None if that is no longer possible."""
     keys = {number: key for key, number in index.goldens.items()}
     numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:

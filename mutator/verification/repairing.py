@@ -1,7 +1,7 @@
-"""Puts aside what is damaged in a run folder, so that the same `run` fills the gap.
+"""Sets aside damaged parts of a run folder, so that the same `run` fills the gaps.
 
-Of a segment the intact lines stay. What nothing can make again (run.json, campaign.yaml, the plan) is left as
-it is: only a copy of the folder has it.
+Intact lines of a segment stay. Files that cannot be rebuilt (run.json, campaign.yaml, the plan) are not
+touched: only a copy of the folder has them.
 """
 
 import os
@@ -29,22 +29,22 @@ from mutator.verification.audited_records import recorded
 from mutator.verification.repaired_series import repair_series
 from mutator.workspace import Workspace
 
-ASIDE = "damaged"  # folder of what was put aside
+ASIDE = "damaged"  # folder of what was set aside
 SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
-_Change = tuple[str, bytes | None, str]  # a file, what it becomes (None: it goes), and that in words
+_Change = tuple[str, bytes | None, str]  # a file, its new content (None: removed), and a sentence
 
 
 def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
-    """Put damaged files, lines, patches and series of a run folder into `damaged/`; what was done, a sentence
-    each. With a `workspace` the series of golden runs are made anew.
+    """Move damaged files, lines, patches and series of a run folder to `damaged/`, and return a sentence for
+    each action. With a `workspace`, golden series are rebuilt.
 
-    MutatorError while a command works in the folder, for one of an earlier schema, and for a damaged plan.
+    MutatorError if a command works in the folder, if its schema is older, or if the plan is damaged.
     """
     if not folder.verifiable:
         raise MutatorError(
             f"{folder.head['schema']} has no checksums",
             where=folder.path,
-            expected="a run of this version",
+            expected="a run made with this version",
             remedy="take the damaged file from a copy of the run folder",
         )
     with owned(folder.path, patience_s=0.0), raising_disk_full(folder.path):
@@ -59,12 +59,12 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
             _carry_out(folder.path, changes, ledger)
         put_aside = partial(_put_aside, folder.path)
         series = [*repair_series(folder, workspace, put_aside)]
-    patches = [*blocks, *(f"patch of {one} put aside" for one in lost)]
+    patches = [*blocks, *(f"patch of {one} set aside" for one in lost)]
     return [*renewed, *(said for *_, said in changes), *patches, *series]
 
 
 def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
-    """A ledger of the files as they are, where the ledger itself is damaged."""
+    """A new ledger of the current files, if the ledger itself is damaged."""
     run = folder.path
     try:
         digests.read(run)
@@ -74,27 +74,27 @@ def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
         found = {path.relative_to(run).as_posix(): Digest.of_file(path) for path in paths}
         _put_aside(run, digests.FILE)
         digests.write(run, Ledger(files={name: one for name, one in found.items() if one}))
-        yield f"{digests.FILE} made anew of the files as they are: only a seal known before vouches for them"
+        yield f"{digests.FILE} rebuilt from the current files: only an earlier seal can confirm them"
 
 
 def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
-    """Files that can be made again, and those that do not belong here."""
+    """Files that can be rebuilt, and those that do not belong here."""
     run = folder.path
     for name, known in ledger.files.items():
         if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.of_file(run / name)):
             continue
         if name == CSV and known.is_of(Digest.of(data := plan_csv(load_plan(folder)))):
-            yield name, data, f"{name} made anew from the plan"
+            yield name, data, f"{name} rebuilt from the plan"
         else:
-            yield name, None, f"{name} put aside: `mutator run` makes it again"
+            yield name, None, f"{name} set aside: `mutator run` rebuilds it"
     if ledger.finished:
         for path in integrity.strangers(run, ledger):
             name = path.relative_to(run).as_posix()
-            yield name, None, f"{name} put aside: the finished run had no such file"
+            yield name, None, f"{name} set aside: the finished run had no such file"
 
 
 def _lost_patches(folder: RunFolder) -> list[str]:
-    """Experiments whose stored patch is not the one that their record names."""
+    """Experiments whose stored patch does not match their record."""
     lost = []
     for one in recorded(folder, "records"):
         try:
@@ -105,8 +105,8 @@ def _lost_patches(folder: RunFolder) -> list[str]:
 
 
 def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
-    """Put aside the files of these patches, and those with damaged blocks, of which it tells; the other
-    patches in them stay."""
+    """Set aside these patches' files and those with damaged blocks (which are reported); their other patches
+    stay."""
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
         old = patches.old_file(one)
@@ -123,14 +123,14 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
             continue
         _put_aside(run, name)
         if found.damaged:
-            said.append(f"{name}: damaged blocks put aside")
+            said.append(f"{name}: damaged blocks set aside")
         kept = ((one, patches.read(one)) for one in names if one not in lost)
         rewrite(path, [(one, data) for one, data in kept if data is not None])
     return said
 
 
 def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:
-    """Segments with lines that do not count: what stays of them."""
+    """Segments with invalid lines, and their remaining content."""
     run, planned = folder.path, folder.share()
     strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
     for kind, schema in SCHEMAS.items():
@@ -138,7 +138,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
         for path in sorted({*(run / kind).glob("*.jsonl")} - strangers):
             name = path.relative_to(run).as_posix()
             if not path.is_file():
-                yield name, None, f"{name} put aside: it is no file"
+                yield name, None, f"{name} set aside: it is not a file"
                 continue
             data = path.read_bytes()
             segment, known = read_segment(path, data), ledger.files.get(name)
@@ -147,7 +147,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
             gone = max(0, data.count(b"\n") - 1 - len(kept))
             if gone or segment.damaged or not _in_place(segment, schema, known, data):
                 head = {"schema": schema, "plan": folder.head["plan"]}
-                said = f"{name}: {counted(gone, 'line')} put aside, {len(kept)} kept"
+                said = f"{name}: {counted(gone, 'line')} set aside, {len(kept)} kept"
                 yield name, written(path, head, kept), said
     for name, known in ledger.files.items():
         if known.lines is not None and not os.path.lexists(run / name):
@@ -155,7 +155,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
 
 
 def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) -> bool:
-    """Whether a segment is where it was written, and what it was when it was closed."""
+    """Whether a segment is in its place and unchanged since it was closed."""
     try:
         segment.check_head(schema)
     except MutatorError:
@@ -164,10 +164,10 @@ def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) 
 
 
 def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
-    """The content of the lines after the head that are as they were written.
+    """The content of the intact lines after the head.
 
-    Where every checksum fits although the file is not the one that was closed, somebody has computed them
-    anew: only a file that was cut, or added to, has lines to be believed.
+    If all checksums match although the file differs from the one that was closed, the checksums were
+    recomputed: lines are trusted only in a file that was cut or extended.
     """
     numbers = list(segment.lines)
     whole = segment.damaged or known is None or known.is_of(Digest.of(data))
@@ -181,7 +181,7 @@ def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[s
 def _kept(
     lines: list[dict[str, Any]], planned: Collection[str], lost: Collection[str], done: set[str]
 ) -> Iterator[dict[str, Any]]:
-    """Lines of planned experiments, one final record of each; `done` is what the lines before them had."""
+    """Lines of planned experiments, one final record of each; `done` has those of earlier lines."""
     for line in lines:
         name = str(line.get("experiment_id"))
         final = line.get("status") not in (None, Status.HARNESS_ERROR.value)
@@ -192,7 +192,7 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to where it harms nobody, under a name that is free; move what is no file."""
+    """Copy a file to a free name in `damaged/`; move anything that is not a file."""
     if not os.path.lexists(run / name):
         return
     place = run / ASIDE / name
@@ -208,7 +208,7 @@ def _put_aside(run: Path, name: str) -> None:
 
 
 def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
-    """Make the changes. The run is finished no more, unless only plan.csv was made anew."""
+    """Apply the changes. The run is no longer finished, unless only plan.csv was rebuilt."""
     coming = {
         name: None
         if data is None

@@ -1,8 +1,9 @@
-"""The seal of a finished run: one digest of everything that counts, whoever computed it on how many machines.
+"""The seal of a finished run: one digest of its complete content, independent of who computed it on how many
+machines.
 
-It is a function of content alone: of the plan, the choices that made it and the sources, of the versions of
-mutator, Python and packages, of the checks and golden runs, and of each record with its patch. Costs, hosts,
-processors and the git commit are not in it, nor is how the work was cut into sessions, workers and shards.
+It covers the plan, the choices that made it, the sources, the versions of mutator, Python and packages, the
+checks and golden runs, and each record with its patch. It excludes costs, hosts, processors, the git commit,
+and the division into sessions, workers and shards.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,7 @@ from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "seal/1"
-# What run.json says of the results, and reports repeat.
+# The parts of run.json about results, which reports repeat.
 _HEAD = (
     *("plan", "campaign_digest", "study", "seed", "reading", "runs"),
     *("hazards", "compared", "sources", "target_files"),
@@ -26,8 +27,8 @@ _HEAD = (
 
 
 def seal_of(folder: RunFolder) -> str | None:
-    """The seal of a run folder, computed from what it holds: 64 hex digits. None for a run that is not
-    finished, or not verifiable."""
+    """The seal of a run folder, computed from its content: 64 hex digits. None if the run is not finished or
+    not verifiable."""
     if not folder.finished:
         return None
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
@@ -44,23 +45,23 @@ def seal_of(folder: RunFolder) -> str | None:
 
 
 def _choices(given: Mapping[str, Any]) -> dict[str, Any]:
-    """But for how the work was cut, and how much is kept to look at."""
+    """The choices, without the division of work and limits on kept data."""
     return {name: value for name, value in given.items() if name != "series_mb"} | {"shard": None}
 
 
 def seal_or_why_not(folder: RunFolder) -> str:
-    """The seal, or in a few words why there is none."""
+    """The seal, or a short reason why there is none."""
     none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
     return seal_of(folder) or f"none: {none}"
 
 
 def not_verifiable(folder: RunFolder) -> str:
-    """What is said of a run folder of an earlier schema."""
-    return f"not verifiable, as {folder.head['schema']} has no digests"
+    """The message for a run folder of an older schema."""
+    return f"not verifiable, because {folder.head['schema']} has no digests"
 
 
 def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
-    """Digest of the files called `names`, trace and record, of each golden run."""
+    """Digest of each golden run's files `names` (trace and record)."""
     found = {}
     for one in folder.goldens:
         place = folder.golden(*one)
@@ -70,12 +71,12 @@ def golden_digests(folder: RunFolder, names: Sequence[str]) -> dict[str, str]:
 
 
 def _versions(folder: RunFolder) -> list[str]:
-    """Each set of versions that computed anything, once, as canonical text."""
+    """The distinct sets of versions that computed anything, as canonical text."""
     return sorted({canonical([one.python, one.packages]) for one in folder.stretches})
 
 
 def _records(folder: RunFolder, kind: str) -> dict[str, str]:
-    """Digest of each record that counts, by experiment id: of its line, without the checksum."""
+    """Digest of each valid record, by experiment id: of its line, without the checksum."""
     found = {}
     for path in sorted((folder.path / kind).glob("*.jsonl")):
         segment = bare_segment(path, checksums=True)

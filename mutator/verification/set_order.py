@@ -1,7 +1,7 @@
-"""Where a source goes through a set in its order, which for texts follows PYTHONHASHSEED.
+"""Finds where source depends on the order of a set, which for strings follows PYTHONHASHSEED.
 
-Found by reading, so only where a set can be told from its place: a literal, a call of `set`, a name of the
-same function or an attribute of `self` that is given one.
+Works on source, so it finds only sets that are recognizable in place: literals, calls of `set`, and names of
+the same function or attributes of `self` assigned from one.
 """
 
 import ast
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 _MAKING = ("set", "frozenset")
 _KEEPING = ("union", "intersection", "difference", "symmetric_difference", "copy")
 _ORDERED = ("list", "tuple", "iter", "enumerate", "zip", "map", "filter", "sum", "reversed", "next")
-_UNORDERED = ("sorted", "min", "max", "any", "all", "len", *_MAKING)  # it does not matter in which order
+_UNORDERED = ("sorted", "min", "max", "any", "all", "len", *_MAKING)  # order does not matter
 _METHODS = (".join", ".extend", ".fromkeys")
 _SHORT = 60  # characters of an expression
 
@@ -26,7 +26,7 @@ class SetOrder:
 
 
 def places(source: bytes) -> list[SetOrder]:
-    """All such places of a file that is Python, in their order; none in one that is not."""
+    """All such places of a Python file, in order; empty if it is not Python."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):
@@ -36,7 +36,7 @@ def places(source: bytes) -> list[SetOrder]:
 
 
 class _Scope:
-    """A module, a class or a function, with the names in it that hold sets."""
+    """A module, class or function, with its names that hold sets."""
 
     def __init__(self, node: ast.AST, name: str, outer: frozenset[str]) -> None:
         self.name = name
@@ -44,7 +44,7 @@ class _Scope:
         self._own = list(_own(node))
         self._orderless = self._to_be_ordered()
         self.sets = outer
-        for _ in range(2):  # a name may hold what another one held
+        for _ in range(2):  # a name may hold what another held
             self.sets |= frozenset(self._assigned())
 
     def places(self) -> Iterator[SetOrder]:
@@ -57,7 +57,7 @@ class _Scope:
                 yield SetOrder(line=line, function=self.name, what=_text(used))
 
     def _assigned(self) -> Iterator[str]:
-        """Names, and attributes of `self`, that are given a set; of a class those of all its methods."""
+        """Names and attributes of `self` that are assigned a set; for a class those of all methods."""
         within = ast.walk(self._node) if isinstance(self._node, ast.ClassDef) else self._own
         for node in within:
             targets: list[ast.expr] = []
@@ -82,7 +82,7 @@ class _Scope:
         return isinstance(node, ast.Name | ast.Attribute) and ast.unparse(node) in self.sets
 
     def _in_order(self, node: ast.AST) -> Iterator[ast.expr]:
-        """The expressions that a node goes through in their order."""
+        """The expressions that a node iterates over in order."""
         if isinstance(node, ast.For | ast.AsyncFor):
             yield node.iter
         elif isinstance(node, ast.ListComp | ast.DictComp | ast.GeneratorExp):
@@ -98,13 +98,13 @@ class _Scope:
                 yield from node.args
 
     def _to_be_ordered(self) -> list[ast.expr]:
-        """What is handed to a function whose result does not depend on the order."""
+        """The arguments of functions whose result does not depend on the order."""
         calls = (one for one in self._own if isinstance(one, ast.Call) and _called(one.func) in _UNORDERED)
         return [argument for one in calls for argument in one.args]
 
 
 def _own(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a scope, but for those of scopes within it, of which there is the head."""
+    """The nodes of a scope without those of nested scopes, of which only the head is included."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
@@ -112,7 +112,7 @@ def _own(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _called(function: ast.expr) -> str:
-    """The name of a function, `.name` of a method."""
+    """The name of a function, `.name` for a method."""
     if isinstance(function, ast.Attribute):
         return f".{function.attr}"
     return function.id if isinstance(function, ast.Name) else ""

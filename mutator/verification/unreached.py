@@ -1,7 +1,7 @@
-"""Triggers that no golden run reaches.
+"""Finds triggers that no golden run reaches.
 
-Until it is active, a faulty run is the golden run: a trigger that never holds there never fires. What golden
-runs observe is kept by their null mutants, whose runs are the same.
+Until it is active, a faulty run equals the golden run: a trigger that never holds there never fires. Null
+mutants, whose runs are equal, record what golden runs observe.
 """
 
 from collections import Counter
@@ -23,27 +23,27 @@ from mutator.workspace import Workspace
 FOLDER = "observed"
 _NAMED = 4  # triggers that a warning names
 
-# a row for each observation: the time (s), and the values
+# a row for each observation: the time (s), then the values
 Observed: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
-Arming = tuple[float, Callable[..., bool]]  # when a trigger is armed (s), and its condition
+Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and its condition
 
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
-    """Keep what the golden run `key` observed in `folder`."""
+    """Store what the golden run `key` observed in `folder`."""
     path = folder / FOLDER / f"{key}.npy"
-    path.parent.mkdir(parents=True, exist_ok=True)  # scenarios may lie in folders
+    path.parent.mkdir(parents=True, exist_ok=True)  # scenarios may be in folders
     np.save(path, np.array(list(seen), dtype=float))
 
 
 def read_observed(folder: Path) -> dict[str, Observed]:
-    """What the golden runs observed, by their keys; without those that are not kept in `folder`."""
+    """The golden runs' observations by key; only those stored in `folder`."""
     base = folder / FOLDER
     found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
     return {name.removesuffix(".npy"): np.load(path) for name, path in found.items()}
 
 
 def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:
-    """When a trigger is armed, and its condition over what the target observes."""
+    """The arming time of a trigger, and its condition over the target's observations."""
     path = probe_path(manifest.package)
     built = build(manifest, workspace.fault_models(), None, trigger)
     return decision(compile(built.files[path], path, "exec"))
@@ -56,7 +56,8 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
 
 
 def _fits(trigger: Arming, observed: Observed) -> bool:
-    """Whether the condition is over what is observed: templates of before ask for derived values, too."""
+    """Whether the condition's arguments match the observations: older templates also ask for derived
+    values."""
     return len(signature(trigger[1]).parameters) == len(observed.T)
 
 
@@ -66,7 +67,7 @@ def remarks(
     experiments: Iterable[tuple[str, Experiment]],
     observed: Mapping[str, Observed],
 ) -> list[str]:
-    """What to say of experiments, each with the key of its golden run, whose triggers never hold."""
+    """Remarks on experiments, each with the key of its golden run, whose triggers never hold."""
     late, never = Counter[str](), Counter[str]()
     armings: dict[Trigger, Arming] = {}
     known: dict[tuple[str, Trigger], bool] = {}

@@ -42,7 +42,7 @@ def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> 
     """Before any table it is said that one run has fewer experiments by choice; once, and on the page too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
-    said = "The runs are unlike parts of a campaign: whole has all of it, part has --limit 6."
+    said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
     answer = cli("compare", *runs, "--out", "c")
     assert answer.code == 0, answer.err
     assert answer.out.startswith(said)
@@ -57,7 +57,7 @@ def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Whichever run has them: the terminal, the page and the Markdown say so beside their tables."""
-    note = "Not every alert is a fault's doing: fault-free runs raise fcw in A."
+    note = "Not every alert is caused by a fault: fault-free runs raise fcw in A."
     monkeypatch.setattr(mutator.Run, "alerts_note", lambda run: note if run.path.name == "after" else "")
     answer = cli("compare", *runs, "--out", "c")
     assert f"after: {note}" in " ".join(answer.out.split())
@@ -143,5 +143,5 @@ def test_a_gate_on_severity_needs_classes(cli: Cli, runs: tuple[Path, Path]) -> 
     """Of a target without severity nobody can say that a contact got worse: that is wrong input."""
     answer = cli("compare", *runs, "--fail-on", "severity:S2")
     assert answer.code == 2
-    assert "has no classes of severity" in answer.err
+    assert "has no severity classes" in answer.err
     assert "severity:S2" in cli("compare", *runs, "--fail-on", "severity:S9").err

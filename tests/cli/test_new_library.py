@@ -148,7 +148,7 @@ def test_check_lists_every_place_to_fill_in(
         assert sum(line.startswith(place) for line in lines) == 1, place
 
 
-EMPTY = "no Python but tests and the like"
+EMPTY = "no Python files except tests and the like"
 NOTHING: dict[str, tuple[dict[str, str], str]] = {
     "empty": ({}, EMPTY),
     "tests": ({"tests/test_pilot.py": CONTROLLER, "test_all.py": CONTROLLER}, EMPTY),
@@ -196,7 +196,7 @@ def test_marks_tell_all_that_their_comment_says(
     path = nowhere / "faults/fault_library/scenarios/first.yaml"
     path.write_text("# TODO(init): the speed\n# in m/s\nspeed: 3\n# another\n")
     monkeypatch.chdir(nowhere / "faults")
-    assert "first.yaml:1: not filled in: the speed in m/s; do so, and delete the comment" in cli("check").out
+    assert "first.yaml:1: not filled in: the speed in m/s; fill it in, and delete" in cli("check").out
 
 
 def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:

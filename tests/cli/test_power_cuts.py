@@ -118,7 +118,7 @@ def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest
     assert refused.code == 2 and f"no patch of {name}" in refused.err and "--repair" in refused.err
     assert cli("verify", "run").code == 1
     repaired = cli("verify", "run", "--repair")
-    assert f"repaired: patch of {name} put aside" in repaired.out
+    assert f"repaired: patch of {name} set aside" in repaired.out
     again = cli(*WORDS)
     assert again.code == 0, again.err
     assert "1 now" in again.out and f"seal: {seal}" in again.out

@@ -164,7 +164,7 @@ def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
     patches.write_bytes(data[:40] + b"?" + data[41:] + data)
     found = cli("verify", "run", "--repair")
     assert found.code == 1 and f"- patches/{patches.name}: damaged blocks; " in found.out
-    assert f"repaired: patches/{patches.name}: damaged blocks put aside" in found.out
+    assert f"repaired: patches/{patches.name}: damaged blocks set aside" in found.out
     assert cli("verify", "run", "--expect", sealed).code == 0
 
 
@@ -185,7 +185,7 @@ def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> No
         file.write("\n")
     found = cli("verify", "run", "--expect", sealed)
     assert found.code == 1
-    assert "without them no tree or patch was compared" in found.out and "toycar/driver.py" in found.out
+    assert "(trees and patches were not compared)" in found.out and "toycar/driver.py" in found.out
     assert "trees and patches" not in found.out.split("- ")[0]
 
 

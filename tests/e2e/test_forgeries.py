@@ -249,7 +249,7 @@ def cli(
 
 
 Cli = Callable[..., tuple[int, str]]
-EDITED = "results.csv: not what was made from plan and records; made anew"
+EDITED = "results.csv: does not match plan and records; rebuilt"
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:

@@ -119,7 +119,7 @@ def test_it_says_whether_it_can_be_verified(cli: Cli, place: Path) -> None:
         assert ("not verifiable" in out) == old
     assert cli("report", copy)[0] == 0
     told = (copy / "report" / "REPORT.md").read_text()
-    assert f"| seal | {'none: not verifiable, as run/1 has no digests' if old else run.seal} |" in told
+    assert f"| seal | {'none: not verifiable, because run/1 has no digests' if old else run.seal} |" in told
 
 
 def is_old(run: Path) -> bool:

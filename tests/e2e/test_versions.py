@@ -142,7 +142,7 @@ def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch:
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
-    assert code == 1 and "is not the one this run began with" in err
+    assert code == 1 and "differs from the one this run began with" in err
     assert contents(half) == before
 
 
@@ -177,7 +177,7 @@ def test_another_machine_drives_the_golden_runs_again(
     monkeypatch.setattr(machine, "cpu", lambda: "a third")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     before = contents(out)
-    with pytest.raises(CheckFailed, match=r"the golden run A.* is not the one this run began with"):
+    with pytest.raises(CheckFailed, match=r"the golden run A.* differs from the one this run began with"):
         run_campaign(toy, "small", out)
     assert contents(out) == before
 

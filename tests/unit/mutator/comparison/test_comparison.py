@@ -179,7 +179,7 @@ def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write
     assert len(findings(found, [Gate.HARNESS_ERROR])) == kinds.count("lane")
     rates = found.sheets[2]
     assert {line[1] for line in rates.lines} == {kinds.count("distance")}
-    assert "say nothing of their fault" in pages.summary(found)
+    assert "have no valid result in one run" in pages.summary(found)
 
 
 class Page(HTMLParser):
@@ -231,4 +231,4 @@ def test_a_page_of_many_changes_shows_the_first(
     rows = [line for line in text.splitlines() if '<span class="change' in line]
     assert len(rows) == len(found.changed) > 3
     assert "#changed:not([data-filtered]) tbody tr:nth-child(n + 4) { display: none; }" in text
-    assert f"At most 3 of the {len(rows)} are seen at once" in text
+    assert f"At most 3 of the {len(rows)} are shown at once" in text

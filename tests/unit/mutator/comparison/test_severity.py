@@ -134,10 +134,7 @@ def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
     found = compare(runs[0], runs[2])
     assert found.changed == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
-    assert (
-        found.remarks[-1]
-        == "The runs have different scales of severity; both are put into the classes of strict."
-    )
+    assert found.remarks[-1] == "The runs have different severity scales; both use the classes of strict."
     assert [fact.name for fact in found.facts if fact.differs] == ["scale of severity"]
 
 
@@ -147,5 +144,5 @@ def test_a_run_without_severity_changes_nothing(runs: tuple[Path, ...], order: t
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
     assert "Severity is not compared: without has none." in found.remarks
-    with pytest.raises(MutatorError, match="without has no classes of severity"):
+    with pytest.raises(MutatorError, match="without has no severity classes"):
         findings(found, [Gate.SEVERITY_S1])

@@ -300,7 +300,7 @@ def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
     """Times that go back, or are none, are no trace: hazards would be looked for in the wrong order."""
     np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
     manifest = write("hazards: {}\n")
-    with pytest.raises(MutatorError, match="times of time that go back or are none"):
+    with pytest.raises(MutatorError, match="times of time that decrease or are missing"):
         load_trace(manifest, tmp_path, manifest.channels)
 
 

@@ -138,12 +138,12 @@ def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
     assert "number 2 of the" in drawn(place, replace(BRAKE, look=second)).note
     none = drawn(place, replace(BRAKE, look=lambda pair: None))
     assert none.figure is None
-    assert "not to be seen in the first" in none.note
+    assert "that the query finds do not show it" in none.note
 
 
 def test_a_query_that_finds_nothing_is_said(place: Path) -> None:
     """The report says so; so it does of a target without the actuator."""
-    assert "no experiment of this run fits" in drawn(place, replace(BRAKE, query='module == "radar"')).note
+    assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 
 

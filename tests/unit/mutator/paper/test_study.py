@@ -70,14 +70,14 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
     assert "STUDY.md" not in written.markdown.read_text()
     assert "study.html" not in Page(written.page.read_text()).links
     assert not (run / "report" / "study.html").exists()
-    assert "these results decide nothing of it" in written.markdown.read_text()
+    assert "these results are not enough for it" in written.markdown.read_text()
 
 
 def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
     """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
     forms = study_forms(run)
     for text in forms:
-        assert "No figure: the traces it needs cannot be had" in text
+        assert "No figure: its traces are not available" in text
         assert "t_h1 > t_activation" in text
     assert "action_" not in forms[0]
     assert "<figure" not in (run / "report" / "study.html").read_text()

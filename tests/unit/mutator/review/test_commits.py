@@ -111,14 +111,14 @@ def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> Non
     """A change that is not committed, a file that never was, a library without git: the remedy says so."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
-    with pytest.raises(MutatorError, match=r"lane\.yaml: nobody can tell .* not committed.*commit first"):
+    with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):
         say(toycar, "Jane Doe")
     git(root, "rm", "-q", "--cached", LANE)
     git(root, "commit", "-qm", "less")
     with pytest.raises(MutatorError, match="not committed"):
         say(toycar, "Jane Doe")
     (root / ".git").rename(root / "git")
-    with pytest.raises(MutatorError, match=r"no git clone.*keep it in git"):
+    with pytest.raises(MutatorError, match=r"no git clone.*put it under git"):
         say(toycar, "Jane Doe")
     assert say(toycar, "Jane Doe", Kind.REJECT).decision(lane(toycar).id)
 

@@ -139,7 +139,7 @@ def test_chance_does_not_turn_neighbours_round() -> None:
     ("picture", "said"),
     [
         ("7.0", r"picture is float of shape \(\), and no grey or RGB picture of bytes"),
-        ("1 / 0", "no picture of toycar/sensing.py Sensor.sense: ZeroDivisionError"),
+        ("1 / 0", "no image of toycar/sensing.py Sensor.sense: ZeroDivisionError"),
     ],
 )
 def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None:
@@ -154,7 +154,7 @@ def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
     sensing.write_text(text.replace("def sense(self, world):\n", "def sense(self, world):\n        return\n"))
-    with pytest.raises(MutatorError, match="the run never came there"):
+    with pytest.raises(MutatorError, match="the run never got there"):
         drawn(workspace, next(g for g in groups_of(workspace) if g.faults))
 
 

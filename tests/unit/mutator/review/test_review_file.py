@@ -74,7 +74,7 @@ def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
         ("review/2", "review/3", 3, "newer version"),
         ("review/2", "[]", 3, "schema []"),
         ("decisions:", "decisions: [", 7, "YAML"),
-        ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "second time"),
+        ('"bbbbbbbbbbbb"', '"aaaaaaaaaaaa"', 23, "appears twice"),
         ('    decision: "approved"\n', "", 9, "'by' without a decision"),
         ('    by: "Jane Doe"\n', "", 7, "a decision without `by`"),
     ],

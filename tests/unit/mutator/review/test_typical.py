@@ -42,7 +42,7 @@ def test_counts_a_typical_and_the_worst_experiment(
     assert found.typical.id in set(lane) - bad.keys()
     assert found.worst.id in bad
     assert found.worst.label.startswith("sensor/lane/shifted ")
-    assert found.worst.verdict.endswith("after the activation; no alert")
+    assert found.worst.verdict.endswith("after activation; no alert")
 
 
 def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
@@ -103,11 +103,11 @@ def row(**given: Any) -> Row:
     [
         (
             {"outcome": Outcome.SDC},
-            "sdc: an actuator differed from the golden run from 2.50 s on; no hazard came",
+            "sdc: an actuator differed from the golden run from 2.50 s, without a hazard",
         ),
         (
             {"outcome": Outcome.HAZARD, "hazards": (("H1", 4.25),), "alerts": ("fcw",), "t_alert": 3.0},
-            "hazard H1 (a crash) at 4.25 s, 2.25 s after the activation; alert fcw at 3.00 s",
+            "hazard H1 (a crash) at 4.25 s, 2.25 s after activation; alert fcw at 3.00 s",
         ),
         (
             {"outcome": Outcome.HAZARD, "hazards": (("H9", 4.0),), "t_activation": None},

@@ -261,7 +261,7 @@ def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
     fast = driven(toy)["fast engines"]
-    assert (fast.level, "not tried, as its golden run is not well" in fast.found) == (Level.WARN, True)
+    assert (fast.level, "not tried, because its golden run fails" in fast.found) == (Level.WARN, True)
 
 
 def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:

@@ -169,7 +169,7 @@ def test_other_golden_runs_than_before_are_refused(
         return execution
 
     monkeypatch.setattr(ReferenceEngine, "execute", other)
-    with pytest.raises(CheckFailed, match="not the one this run began with"):
+    with pytest.raises(CheckFailed, match="differs from the one this run began with"):
         run_checks(toycar, folder)
     shutil.rmtree(folder.work)
     assert {path: path.read_bytes() for path in folder.path.rglob("*") if path.is_file()} == before

@@ -126,7 +126,7 @@ def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
     """The run is finished no more, so that it is made again."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
-    assert said == [f"{name} put aside: `mutator run` makes it again"]
+    assert said == [f"{name} set aside: `mutator run` rebuilds it"]
     assert not folder.finished and not (run / name).exists()
     assert (run / "damaged" / name).read_bytes() == b"other"
     (run / name).write_bytes(b"again")
@@ -139,7 +139,7 @@ def test_the_plan_for_people_is_made_anew(run: Path, made: Path) -> None:
     """plan.csv follows from the plan, so the run stays finished."""
     (run / "plan.csv").unlink()
     said, folder = repaired(run)
-    assert said == ["plan.csv made anew from the plan"] and folder.finished
+    assert said == ["plan.csv rebuilt from the plan"] and folder.finished
     assert (run / "plan.csv").read_bytes() == (made / "plan.csv").read_bytes()
 
 
@@ -165,9 +165,7 @@ def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None)
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
-    assert said == [
-        "digests.json made anew of the files as they are: only a seal known before vouches for them"
-    ]
+    assert said == ["digests.json rebuilt from the current files: only an earlier seal can confirm them"]
     assert len(folder.records()) == 24 and not folder.finished
 
 

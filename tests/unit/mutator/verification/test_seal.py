@@ -112,7 +112,7 @@ def test_what_is_not_finished_has_none(run: Path) -> None:
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
     edit(run / "run.json", '"run/3"', '"run/1"')
     folder = RunFolder.unverified(run)
-    assert seal_or_why_not(folder) == "none: not verifiable, as run/1 has no digests"
+    assert seal_or_why_not(folder) == "none: not verifiable, because run/1 has no digests"
 
 
 def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:

@@ -71,7 +71,7 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
     record = {"hazards": {"H1": None}, "alerts": [{"name": "steer_saturated", "t": 12.29}]}
     (golden / "record.json").write_text(json.dumps(record))
     panel = tables_panel(ReportedRun.open(run, HERE))
-    note = "Not every alert is a fault's doing: fault-free runs raise steer_saturated in S1."
+    note = "Not every alert is caused by a fault: fault-free runs raise steer_saturated in S1."
     assert panel.html.count(str(escape(note))) == panel.markdown.count(note) >= 6
     assert "| S1 | steer_saturated at 12.29 s | none | 1 to 1 |" in panel.markdown
     assert note in (run.path / "report" / "tables" / "summary_guided.md").read_text()
