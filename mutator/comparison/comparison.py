@@ -44,7 +44,7 @@ class Gate(StrEnum):
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
     NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
     HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, the first has one
-    UNMATCHED = "unmatched"  # a contact of at least this class, after a milder one or none
+    UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
     SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, where it was milder or none before
     SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, where it was milder or none before
     SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, where it was milder or none before
