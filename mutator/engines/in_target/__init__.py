@@ -1,5 +1,4 @@
-"""What runs inside a target's process.
+"""Scripts that run inside a target's process.
 
-These modules use the standard library and numpy only, and are started as scripts: nothing of the harness may
-change what a target does.
+They use only the standard library and numpy, since the harness must not change what a target does.
 """

@@ -1,10 +1,10 @@
 """A loaded target that forks: `python -P -s fork_server.py SOCKET START.marshal`. Standard library only.
 
-Every process of the server waits at a step boundary of a golden run (the first one before any run), answers
-on a socket of its own, and can be asked to fork: a child that goes on as a mutant, or another process that
-waits some steps further on. Messages are marshalled dicts, each after its length. A process has one thread,
-or does not fork. It ends when its socket is closed at the other end. All of them are guarded (see guard.py):
-they end when the socket of the first is closed, or when it is gone.
+Each process of the server waits at a step boundary of a golden run (the first one before any run), and
+answers on its own socket. On request it forks a child that continues as a mutant, or a process that waits
+some steps later. Messages are marshalled dicts, each after its length. A process forks only while it has one
+thread. It ends when the other end of its socket is closed. All are guarded (see guard.py), and end with the
+first one or its socket.
 """
 
 import array
@@ -39,7 +39,7 @@ def main(connection: int, start_file: str) -> int:
     try:
         serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
     finally:
-        os._exit(0)  # what the target wants done at the end is for its runs to do
+        os._exit(0)  # exit handlers of the target are for its runs
 
 
 def serve_first(connection: int, start: dict[str, Any]) -> None:
@@ -65,14 +65,14 @@ class Abandoned(Exception):
 
 
 class Process:
-    """One waiting process. `run` is the golden run it is in the middle of, at `step`; None before any."""
+    """One waiting process. `run` is its golden run, at `step`; None before any."""
 
     def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
         self.start = start
         self.connection = connection
         self.places = child.places(start["tree"])
         self.stamp = child.stamp(self.places)
-        self.outside: list[str] = []  # files of its packages that were imported from elsewhere
+        self.outside: list[str] = []  # files of its packages imported from elsewhere
         self.begin: Any = None
         self.run: Any = None
         self.step = 0
@@ -115,8 +115,10 @@ class Process:
         return data
 
     def branch(self, step: int, args: list[str] | None = None) -> None:
-        """Fork a process that waits before `step` of this golden run, or of the one that `args` begin. Its
-        socket is the reply."""
+        """Fork a process that waits before `step` of this golden run, or of the one that `args` begin.
+
+        Its socket is the reply.
+        """
         ours, theirs = socket.socketpair()
         get_ready()
         if not os.fork():
@@ -132,7 +134,7 @@ class Process:
         theirs.close()
 
     def go_on(self, step: int, args: list[str] | None) -> None:
-        """In a new process: get to its place, say so, and wait there."""
+        """In a new process: go to its place, report, and wait."""
         try:
             if args is not None:
                 sys.argv = [self.start["module"], *args]
@@ -144,7 +146,7 @@ class Process:
         self.serve()
 
     def advance(self, step: int) -> dict[str, Any]:
-        """Go on to before `step` of the golden run."""
+        """Advance to before `step` of the golden run."""
         while self.step < step and not self.run.done:
             self.run.step()
             self.step += 1
@@ -152,7 +154,7 @@ class Process:
         return {"step": self.step}
 
     def load(self, modules: list[str]) -> dict[str, Any]:
-        """Load what mutants will import; what cannot be loaded is theirs to complain about."""
+        """Load what mutants will import; failures are left to their own imports."""
         for name in modules:
             with suppress(Exception):
                 importlib.import_module(name)
@@ -161,8 +163,10 @@ class Process:
         return {"threads": threads.others()}
 
     def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
-        """Fork a child that goes on as a mutant, and guard it; how it ended. The child reads the job: what
-        this process writes to, it must copy after each fork."""
+        """Fork and guard a child that continues as a mutant; returns how it ended.
+
+        The child reads the job: what this process writes to, it must copy after each fork.
+        """
         if others := threads.others():
             return {"threads": others}
         space = guard.Space(home, disk_mb)
@@ -175,7 +179,7 @@ class Process:
         return {**ended, "threads": [], "touched": self.touched()}
 
     def become(self, job: dict[str, Any]) -> NoReturn:
-        """In a new child: be a mutant of the run so far, finish it, report."""
+        """In a new child: become a mutant of the run so far, finish it, report."""
         self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)
@@ -193,18 +197,18 @@ class Process:
         os._exit(0)
 
     def elsewhere(self, names: Iterable[str]) -> Any:
-        """Files of its packages that modules of these names were imported from, other than the tree's."""
+        """Files outside the tree from which modules of these names were imported."""
         return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)
 
     def touched(self) -> bool:
-        """Whether the tree is another one than it was."""
+        """Whether the tree has changed."""
         try:
             return bool(child.stamp(self.places) != self.stamp)
         except OSError:
             return True
 
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Drive the run to its end as the mutant; the report on it."""
+        """Finish the run as the mutant; returns its report."""
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         watch = job["watch"]
         probe, known = None, set() if watch is None else set(sys.modules)
@@ -214,7 +218,7 @@ class Process:
             swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
-            holder, state = job["probe_state"]  # what it would know had it been there from the beginning
+            holder, state = job["probe_state"]  # its state had it been there from the start
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
             seen = None if watch is None else swap.keep_observations(probe, holder, watch)
@@ -235,19 +239,21 @@ class Process:
 
 
 def get_ready() -> None:
-    """Before a fork: leave nothing for both to write, and no old object to the collector of the new one."""
+    """Before a fork: flush output, and freeze old objects for the new collector."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     gc.freeze()
 
 
 def end() -> None:
-    """Do what an interpreter does at its end, but for taking itself apart, which costs more than many a run:
-    end what `threading` keeps, call the `atexit` handlers, write what open files hold back."""
+    """Do what an interpreter does at its end, except tearing itself down, which is slower than many runs.
+
+    That is: end what `threading` keeps, call `atexit` handlers, flush open files.
+    """
     if "threading" in sys.modules:
         sys.modules["threading"]._shutdown()
     atexit._run_exitfuncs()
-    for thing in gc.get_objects():  # none from before the fork: these are frozen
+    for thing in gc.get_objects():  # new ones only: those from before the fork are frozen
         if isinstance(thing, io.IOBase):
             with suppress(Exception):
                 thing.flush()
@@ -256,7 +262,7 @@ def end() -> None:
 
 
 def reap() -> None:
-    """Take note of the children that ended."""
+    """Reap children that ended."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

@@ -1,9 +1,7 @@
-"""Runs code in a process of its own, within limits, and leaves nothing of what comes of it. Standard library
-only.
+"""Run code in a separate process within limits, and leave nothing behind. Standard library only.
 
-The process that waits is a subreaper: whatever its descendants leave behind, in whatever session, becomes its
-own child, and is killed. As a script, `guard.py PARENT PROGRAM WORDS...` is that program, but dies with its
-parent.
+The waiting process is a subreaper: anything its descendants leave, in any session, becomes its child and is
+killed. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
 """
 
 import ctypes
@@ -19,18 +17,18 @@ from contextlib import suppress
 from typing import Any
 
 WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # why a process was stopped
-HARD_CPU_EXTRA_S = 2  # who ignores SIGXCPU is killed this much later
+HARD_CPU_EXTRA_S = 2  # a process that ignores SIGXCPU is killed this much later
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}
-_LOOK_S = 0.2  # how often a limit of space is looked at
-_LOOK_SHARE = 20  # of the time, one part in so many may be spent on that
+_LOOK_S = 0.2  # between two checks of a limit of space
+_LOOK_SHARE = 20  # the checks take at most one part in so many of the time
 _BLOCK = 512  # bytes, the unit of st_blocks
 _libc = ctypes.CDLL(None)
 
 
 class Space:
-    """Room for `disk_mb` MiB more in the folder `home` than is in it now."""
+    """Room for `disk_mb` MiB more in the folder `home` than it uses now."""
 
     def __init__(self, home: str, disk_mb: int) -> None:
         self._home = home
@@ -43,12 +41,12 @@ class Space:
 def fork(
     caller: int, *, wall_s: float = math.inf, space: Space | None = None, patience_s: float = 0.0
 ) -> dict[str, Any] | None:
-    """Fork: None in the child, which leads a session of its own and dies with its parent.
+    """Fork: None in the child, which leads its own session and dies with its parent.
 
-    In the parent, wait until the child ends, until a limit stops it, or until the other end of `caller`, a
-    pipe or socket, is closed; then nothing is left of it. A child whose caller is gone is asked to end, and
-    has `patience_s` for it. Returns how it ended: `code` (of a signal, its negative number), `cpu_s`,
-    `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
+    The parent waits until the child ends, a limit stops it, or the other end of `caller`, a pipe or socket,
+    is closed; then nothing of it is left. A child whose caller is gone is asked to end, and has `patience_s`
+    for it. Returns `code` (negative for a signal), `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or
+    "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
@@ -76,7 +74,7 @@ def fork(
 
 
 def _mind_signals() -> None:
-    """As in an interpreter that nobody started deaf to signals, as shells do in the background."""
+    """Restore default signal handling, which shells change for background processes."""
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in _MINDED:
         if signal.getsignal(number) is signal.SIG_IGN:
@@ -84,14 +82,14 @@ def _mind_signals() -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Have the kernel kill this process when its parent dies; it ends now if that is no longer `parent`."""
+    """Make the kernel kill this process when its parent dies; exits now if that is no longer `parent`."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def used(folder: str) -> int:
-    """Bytes on the disk of what is in a folder, as far as it can be looked at."""
+    """Bytes on the disk of a folder's content, as far as readable."""
     total, folders = 0, [folder]
     while folders:
         with suppress(OSError), os.scandir(folders.pop()) as entries:
@@ -108,7 +106,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
-    """Wait until the child ended (it is not reaped) or is to be stopped; why."""
+    """Wait until the child ended (it is not reaped) or must be stopped; returns why."""
     handle, pause = os.pidfd_open(pid), _LOOK_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)
@@ -130,7 +128,7 @@ def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
 
 
 def _ask_to_end(pid: int, patience_s: float) -> None:
-    """Tell a child that is not reaped yet to end, and wait for it so long."""
+    """Tell an unreaped child to end, and wait for it so long."""
     os.kill(pid, signal.SIGTERM)
     handle = os.pidfd_open(pid)
     try:
@@ -140,7 +138,7 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
 
 
 def _end_what_is_left() -> None:
-    """Kill and reap children of other sessions than this process's, with all that came of them."""
+    """Kill and reap children of other sessions with all their descendants."""
     session, spared = os.getsid(0), set[int]()  # spared: root's, when this process is not root's
     while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
         for pid in _with_descendants(left):
@@ -162,7 +160,7 @@ def _with_descendants(pids: Iterable[int]) -> list[int]:
 
 
 def _children(pid: int) -> list[int]:
-    """Processes whose parent is `pid`, dead ones that nobody waited for included."""
+    """Children of `pid`, including unreaped dead ones."""
     found: list[int] = []
     with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # it may end meanwhile
         for thread in threads:

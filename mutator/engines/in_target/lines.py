@@ -1,7 +1,7 @@
-"""Notes which lines of a tree are executed, from the first observation on. Standard library only.
+"""Note which lines of a tree run from the first observation on. Standard library only.
 
-Python 3.12 tells of each line once (`sys.monitoring`); an older one traces the functions of the tree, which
-takes longer. Neither changes what the target does. Lines of other threads are noted from 3.12 on.
+Python 3.12 reports each line once (`sys.monitoring`); older versions trace the tree's functions, which is
+slower. Neither changes what the target does. Lines of other threads are noted from 3.12 on.
 """
 
 import os
@@ -11,12 +11,14 @@ from types import CodeType, FrameType
 from typing import Any
 
 _monitoring: Any = getattr(sys, "monitoring", None)
-_TOOL = 1  # of `sys.monitoring`: the place for measures of coverage
+_TOOL = 1  # of `sys.monitoring`: the id for coverage
 
 
 class Lines:
-    """Notes lines of the tree at `tree` once one of the lines `since` of the file `path` was executed: what
-    ran before can be no place of a fault."""
+    """Notes lines of the tree at `tree` after a line in `since` of the file `path` ran.
+
+    Faults cannot act in lines that ran before.
+    """
 
     def __init__(self, tree: str, path: str, since: Iterable[int]) -> None:
         self._tree = tree + os.sep
@@ -33,7 +35,7 @@ class Lines:
             sys.settrace(self._trace)
 
     def found(self) -> dict[str, list[int]]:
-        """The lines of each file, from 1, in order; nothing more is noted."""
+        """The lines of each file, from 1, in order; noting stops."""
         if _monitoring:
             _monitoring.set_events(_TOOL, 0)
             _monitoring.free_tool_id(_TOOL)
@@ -45,7 +47,7 @@ class Lines:
         return files
 
     def _note(self, file: str, line: int) -> bool:
-        """Note a line of the tree; is it the first observation, with which noting begins anew?"""
+        """Note a line of the tree; returns whether it is the first observation, where noting restarts."""
         first = not self._begun and file == self._path and line in self._since
         if first:
             self._begun = True

@@ -1,10 +1,9 @@
-"""One run of a target in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`. Standard library
-only: no code of the harness may change what the target does.
+"""One run of a target in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
-At its first moment it forks. The parent guards the run (see guard.py) and sends into the socket how it ended.
-The child limits itself, puts the tree first on sys.path, runs the entry module as `__main__`, and writes
-report.json: how the run ended, what the tree was (digests of its files), whether its packages were also
-imported from elsewhere, and what the probe counted.
+Standard library only: the harness must not change what the target does. It forks first. The parent guards the
+run (see guard.py) and sends how it ended into the socket. The child limits itself, puts the tree first on
+sys.path, runs the entry module as `__main__`, and writes report.json: how the run ended, digests of the
+tree's files, imports of its packages from elsewhere, and what the probe counted.
 """
 
 import errno
@@ -27,7 +26,7 @@ from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
 _LONGEST = 2000  # characters of an exception's text
-_MOST_ERRORS = 50  # of which an exception came
+_MOST_ERRORS = 50  # causes of an exception
 
 
 def beside(name: str) -> Any:
@@ -43,7 +42,7 @@ guard = beside("guard")
 
 
 class Harness:
-    """Finds `mutator`, of which targets import the glue, where this file lies, whatever is installed."""
+    """Finds `mutator`, whose glue targets import, next to this file, whatever is installed."""
 
     package = Path(__file__).resolve().parents[2]
 
@@ -64,7 +63,7 @@ def main(job_file: str, connection: int) -> int:
         os.close(connection)
         run(job)
     else:
-        ended["cpu_s"] += time.process_time()  # of the interpreter's start
+        ended["cpu_s"] += time.process_time()  # include the interpreter's start
         with suppress(BrokenPipeError):
             os.write(connection, json.dumps(ended).encode())
         os._exit(0)
@@ -72,7 +71,7 @@ def main(job_file: str, connection: int) -> int:
 
 
 def run(job: dict[str, Any]) -> None:
-    """Run the target as the job has it, and write the report."""
+    """Run the target as the job says, and write the report."""
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
@@ -122,7 +121,7 @@ def limit_resources(job: dict[str, Any]) -> None:
 
 
 def run_module(module: str, args: list[str]) -> None:
-    """Run `module` as `python -m` would; leaving with status 0 is a good end."""
+    """Run `module` like `python -m`; exit status 0 is a success."""
     sys.argv = [module, *args]
     try:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
@@ -132,7 +131,7 @@ def run_module(module: str, args: list[str]) -> None:
 
 
 def run_until(job: dict[str, Any]) -> bool:
-    """Drive the run step by step to its end or its first terminal hazard, and write it; was it stopped?"""
+    """Run to the end or the first terminal hazard, and write the results; returns whether it was stopped."""
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
@@ -142,7 +141,7 @@ def run_until(job: dict[str, Any]) -> bool:
 
 
 def note_activation(probe: Any, inactive: str) -> None:
-    """Have the first activation delete the file `inactive`: that is known however the run ends."""
+    """Make the first activation delete the file `inactive`, so that it is known however the run ends."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -157,7 +156,7 @@ def note_activation(probe: Any, inactive: str) -> None:
 
 
 def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
-    """What the probe `name` reports; an error that it has to tell instead is how the run ended."""
+    """The report of the probe `name`; if that fails, the error is how the run ended."""
     try:
         said = probe.report()
     except BaseException as err:
@@ -165,12 +164,12 @@ def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
     try:
         json.dumps(said)
     except Exception:
-        said = "what JSON cannot tell"  # the run overwrote what the probe knows
+        said = "what JSON cannot tell"  # the run overwrote the probe's data
     return {"probe": said}
 
 
 def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
-    """How a run ended that did not end well, in words that are the same each time; `probe` is a module."""
+    """How a run failed, in a reproducible text; `probe` is a module."""
     kind = type(err)
     if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}
@@ -181,7 +180,7 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """What it is as a text; classes of the target may fail to say so, in any way."""
+    """An object as text; classes of the target may fail to convert in any way."""
     try:
         return str(thing)
     except BaseException as why:
@@ -189,12 +188,12 @@ def text(thing: object) -> str:
 
 
 def of_full_disk(err: BaseException) -> bool:
-    """Whether an error tells of a full disk or quota, be it in the words of a library."""
+    """Whether an error reports a full disk or quota, including errors of libraries."""
     return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
 
 
 def origins(err: BaseException) -> list[BaseException]:
-    """The exception, then those that it came of or that are in it, each once."""
+    """The exception, then its causes and the ones in it, without duplicates."""
     found: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
     while todo and len(found) < _MOST_ERRORS:
@@ -207,7 +206,7 @@ def origins(err: BaseException) -> list[BaseException]:
 
 
 def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
-    """Where the exception passed the tree, each (file, line) once, innermost first, as is its column."""
+    """Where the exception passed the tree: (file, line) without duplicates, innermost first, with column."""
     places = []
     trace = err.__traceback__
     while trace is not None:
@@ -222,14 +221,14 @@ def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
 
 
 def column(trace: types.TracebackType) -> int:
-    """The byte of its line at which what raised, or was called, begins; -1 if that is unknown."""
+    """The start byte of what raised or was called in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
     *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
     return -1 if begins is None else begins
 
 
 def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:
-    """Files of the packages that were imported from outside the tree, among the modules of these names."""
+    """Files outside the tree from which packages were imported, among modules of these names."""
     found = []
     for name in sorted(name for name in names if name.partition(".")[0] in packages):
         file = getattr(sys.modules[name], "__file__", None)
@@ -239,7 +238,7 @@ def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str])
 
 
 def imported_since(name: str) -> list[str]:
-    """The modules that were imported after that one, newest first, and itself."""
+    """The modules imported after that one, newest first, and itself."""
     names = []
     for newer in reversed(sys.modules):
         names.append(newer)
@@ -249,20 +248,22 @@ def imported_since(name: str) -> list[str]:
 
 
 def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Modules that were imported beside the `known` ones, in that order, but for those of the packages."""
+    """Modules imported since the `known` ones, in order, without those of the packages."""
     return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
 
 
 def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Top-level names of what was imported beside the `known` modules, or of what a shared library is in use,
-    but for those of the packages, the standard library and the harness."""
+    """Top-level names of third-party modules imported since the `known` ones, or whose shared library is
+    in use.
+    """
     own = {*sys.stdlib_module_names, Harness.package.name, *packages, *known}
     return sorted({name.partition(".")[0] for name in (*libraries(known, packages), *mapped())} - own)
 
 
 def mapped() -> Iterator[str]:
-    """Names, in the folders of modules, of what this process has files of in its memory: a package's library
-    can be used without importing the package."""
+    """Yield names, in module folders, of files mapped into memory: a library can be used without its
+    package.
+    """
     folders = sorted((f"{folder}/" for folder in sys.path if folder), key=len, reverse=True)
     with suppress(OSError):
         for line in Path("/proc/self/maps").read_text(errors="replace").splitlines():
@@ -272,7 +273,7 @@ def mapped() -> Iterator[str]:
 
 
 def tree_files(tree: str) -> dict[str, str]:
-    """Digest of every file of the tree but bytecode, by its path in it."""
+    """Digest of every file of the tree except bytecode, by path."""
     files = {}
     for folder, _, names in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -283,7 +284,7 @@ def tree_files(tree: str) -> dict[str, str]:
 
 
 def places(tree: str) -> list[str]:
-    """Every folder and file of the tree, but for bytecode: that is checked by its source's hash when used."""
+    """Every folder and file of the tree except bytecode, which is checked against its source when used."""
     found = []
     for folder, _, files in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -292,7 +293,7 @@ def places(tree: str) -> list[str]:
 
 
 def stamp(places: list[str]) -> list[tuple[int, int, int]]:
-    """What changes when one of them is written to, or a file is put there or taken away."""
+    """What changes when one of them is written to, added or removed."""
     states = map(os.stat, places)
     return [(state.st_mtime_ns, state.st_size, state.st_ino) for state in states]
 

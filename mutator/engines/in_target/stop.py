@@ -1,4 +1,4 @@
-"""Drives a run to its end, or to its first terminal hazard. Standard library only."""
+"""Run to the end, or to the first terminal hazard. Standard library only."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -6,14 +6,16 @@ from typing import Any
 
 
 def drive(run: Any, source: str | None) -> bool:
-    """Make the steps of a run; was it stopped? `source` has the function that says after each whether the
-    drive is over (None: it never is)."""
+    """Make the steps of a run; returns whether it was stopped.
+
+    `source` has the function that says after each step whether the drive is over (None: it never is).
+    """
     if source is None:
         while not run.done:
             run.step()
         return False
     over = compiled(source)
-    recorded = run.recorded  # now: a run that has none must not come to its activation
+    recorded = run.recorded  # now: a run without it must not reach its activation
     while not run.done:
         run.step()
         if over(recorded()):
@@ -31,10 +33,10 @@ def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
 
 
 def least(*values: float) -> float:
-    """The least number; NaN if one of them is, as over a trace. Python's own depends on their order."""
+    """The least number; NaN if one is NaN, as over a trace. Python's `min` depends on the order."""
     return math.nan if any(map(math.isnan, values)) else min(values)
 
 
 def greatest(*values: float) -> float:
-    """The greatest number, likewise."""
+    """The greatest number, with the same rule."""
     return math.nan if any(map(math.isnan, values)) else max(values)

@@ -1,7 +1,7 @@
-"""Puts a mutant's code into the modules that are loaded in this process. Standard library only.
+"""Put a mutant's code into this process's loaded modules. Standard library only.
 
-Only the process that runs the target imports this module. `mutator.engines.code_swap` decides what may be
-swapped; this module makes sure that the loaded program is the one for which that was decided.
+Only the target's process imports this module. `mutator.engines.code_swap` decides what may be swapped; this
+module checks that the loaded program is the one that was analysed.
 """
 
 import sys
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 _INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")  # of methods, properties, wrappers
-_OWN_REFERENCES = 3  # to a code object: its function's, a local's, an argument's
+_OWN_REFERENCES = 3  # to a code object: from its function, a local, an argument
 
 
 class SwapRefused(Exception):
@@ -18,7 +18,7 @@ class SwapRefused(Exception):
 
 
 def install(name: str, parts: Sequence[types.CodeType]) -> Any:
-    """The probe module `name` (dotted), its code in parts, loaded as an import would load it."""
+    """Load the probe module `name` (dotted) from its code in parts, as an import would."""
     package, _, own = name.rpartition(".")
     module = types.ModuleType(name)
     module.__file__, module.__package__ = parts[0].co_filename, package
@@ -51,7 +51,7 @@ def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> 
 
 
 def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
-    """The function at `path` that alone has this code; SwapRefused if there is none, or if it is at work."""
+    """The only function at `path` with this code; SwapRefused if there is none, or if it is running."""
     where = ".".join((module, *path))
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
@@ -72,7 +72,7 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """The functions behind a name: itself, those that make up a method or property, what is wrapped."""
+    """The functions behind a name: itself, parts of a method or property, wrapped ones."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
@@ -81,14 +81,16 @@ def _functions(named: Any) -> Iterator[types.FunctionType]:
 
 
 def _mangled(holder: Any, name: str) -> str:
-    """The name as it is in the dict of a class."""
+    """The name as in the dict of a class."""
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
 def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Have the probe keep what it observes; the list that it fills with the time and the values of these
-    `names`. `holder` is the name of the object in which the probe keeps the time."""
+    """Make the probe keep its observations, in the returned list: time and values of these `names`.
+
+    `holder` is the name of the object in which the probe keeps the time.
+    """
     observe = probe.observe
     seen: list[tuple[float, ...]] = []
 
@@ -101,7 +103,7 @@ def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tup
 
 
 def observations_before_steps(run: Any, seen: list[Any]) -> list[int]:
-    """Drive the run to its end; the number of observations (`seen`) before each step."""
+    """Run to the end; returns the number of observations (`seen`) before each step."""
     before = []
     while not run.done:
         before.append(len(seen))

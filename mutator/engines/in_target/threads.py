@@ -10,13 +10,13 @@ _TASKS = Path("/proc/self/task")
 
 
 def others() -> list[str]:
-    """Names of the threads beside the main one, those of libraries included; "" where one has no name.
+    """Names of all threads except the main one, including those of libraries; "" without a name.
 
-    Python's threads are called what the program calls them, others what the system knows of them.
+    Python's threads have the program's names, others the system's.
     """
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
-    try:  # not counted by the folder's links: not every kernel keeps their number
+    try:  # not counted by the folder's links, which some kernels do not maintain
         numbers = [int(task.name) for task in _TASKS.iterdir() if task.name != str(os.getpid())]
     except FileNotFoundError:  # not on Linux
         return sorted(name for name in known.values() if name != threading.main_thread().name)

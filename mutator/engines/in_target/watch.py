@@ -1,9 +1,9 @@
-"""Notes which lines of a tree read a clock, draw without a seed or start a thread, while a run is driven.
-Standard library and numpy only.
+"""Note lines of a tree that read a clock, draw without a seed or start a thread. Standard library and numpy
+only.
 
-For runs that look for what keeps a target from being deterministic; their results count for nothing. What is
-watched is replaced where it lives before the target imports it. Noted is the innermost line of the tree on
-the stack: a library may stand in between, and is told. What a library does while it is imported is its own.
+It is for runs that look for causes of nondeterminism; their results do not count. Watched functions are
+replaced before the target imports them. The innermost line of the tree on the stack is noted, even behind a
+library, which is then named. Calls by a library during its import are ignored.
 """
 
 import builtins
@@ -28,9 +28,9 @@ threads: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(threads)
 
 CLOCK, DRAW, THREAD, HASH, PROCESS = "clock", "draw", "thread", "hash", "process"
-_MOST = 200  # lines that are noted
+_MOST = 200  # most noted lines
 _CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
-_STILL = ("localtime", "gmtime", "strftime", "ctime")  # clocks, unless they are given a time
+_STILL = ("localtime", "gmtime", "strftime", "ctime")  # clocks, unless a time is passed
 _IMPORTING = "<frozen importlib"
 _INSTALLED = f"{os.sep}site-packages{os.sep}"
 
@@ -43,10 +43,10 @@ class Watcher:
         self.noted: dict[tuple[str, int], dict[str, Any]] = {}
         self._threads: set[str] = set()
         self._quiet = False
-        self._seeded: set[Any] = set()  # shared generators that were given a seed
+        self._seeded: set[Any] = set()  # shared generators with a seed
 
     def begin(self) -> None:
-        self._watch_numpy()  # first: what it takes from `secrets` is its own
+        self._watch_numpy()  # first: it may use `secrets`
         for name in _CLOCKS:
             for one in (name, f"{name}_ns"):
                 self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
@@ -89,7 +89,7 @@ class Watcher:
         self.noted.setdefault(place, told | {"what": what, "via": via})
 
     def look_for_threads(self, probe: Any, seen: list[Any]) -> None:
-        """Look at observations 1, 2, 4, 8 and so on, which are those in `seen`, for threads."""
+        """Check observations 1, 2, 4, 8 and so on, by the length of `seen`, for threads."""
         observe = probe.observe
 
         def observe_and_look(**values: Any) -> None:
@@ -100,7 +100,7 @@ class Watcher:
         probe.observe = observe_and_look
 
     def found(self) -> dict[str, Any]:
-        """What was noted, in the order in which it came first, and the threads beside the main one."""
+        """What was noted, in order of first appearance, and the threads besides the main one."""
         names = sorted(self._threads.union(threads.others()))
         return {"noted": list(self.noted.values()), "threads": names}
 
@@ -114,7 +114,7 @@ class Watcher:
         *,
         direct: bool = False,
     ) -> None:
-        """Replace a function by one that notes who calls it, where the call `counts`."""
+        """Replace a function by one that notes its caller if the call `counts`."""
         original = getattr(home, name, None)
         if original is None:
             return
@@ -126,15 +126,18 @@ class Watcher:
         setattr(home, name, _Watched(original, before))
 
     def _watch_dates(self) -> None:
-        """The classes cannot be changed: others that are like them stand in their place, in a module that
-        the tree alone imports. Compiled code, such as that of pandas, dies of another class."""
+        """Replace the date classes, which cannot be changed, by similar ones in a module that only the tree
+        imports.
+
+        Compiled code, such as that of pandas, crashes with another class.
+        """
         watched = ModuleType("datetime")
         vars(watched).update(vars(datetime))
         for name, methods in (("date", ("today",)), ("datetime", ("today", "now", "utcnow"))):
             original = getattr(datetime, name)
             like = _Like(name, (original,), {"__module__": "datetime", "like": original})
             for method in methods:
-                setattr(like, method, getattr(original, method))  # which makes an original
+                setattr(like, method, getattr(original, method))  # returns an original
                 self._watch(like, method, CLOCK, f"datetime.{name}.{method}() reads the clock")
             setattr(watched, name, like)
         load = builtins.__import__
@@ -166,7 +169,7 @@ class Watcher:
         setattr(threading.Thread, "start", start)  # noqa: B010
 
     def _watch_shared(self, module: Any, generator: Any, named: str) -> None:
-        """The functions of a module that draw from one generator that all share, until that has a seed."""
+        """Watch a module's functions that draw from one shared generator, until it has a seed."""
         shared = f"draws from the generator that all of {named} share, which has no seed"
         for name in dir(module):
             original = getattr(module, name)
@@ -187,7 +190,7 @@ class Watcher:
         return _Watched(original, before)
 
     def _watch_seed(self, kind: Any) -> None:
-        """Generators of the standard library are seeded when they are made."""
+        """Watch generators of the standard library, which are seeded on creation."""
         original = kind.seed
 
         def seed(generator: Any, a: Any = None, version: int = 2) -> None:
@@ -210,7 +213,7 @@ class Watcher:
         def make(generator: Any, seed: Any = None) -> None:
             if seed is None:
                 self.note(DRAW, what)
-            self._quiet = True  # it asks for a seed also where it has one
+            self._quiet = True  # it asks for a seed even if it has one
             try:
                 kind.__init__(generator, seed)
             finally:
@@ -219,13 +222,16 @@ class Watcher:
         like = _Like("RandomState", (kind,), {"__init__": make, "like": kind})
         for home in (drawn, drawn.mtrand):
             setattr(home, "RandomState", like)  # noqa: B010
-        # whatever else is made without a seed asks this function for one
+        # everything else created without a seed asks this function for one
         self._watch(bit_generator, "randbits", DRAW, what)
 
 
 class _Watched:
-    """A function, and what is done before each call of it. Like the built-in functions that it stands for it
-    is no method where it is a class's attribute, and a copy of it is itself."""
+    """A function, and what is done before each call.
+
+    Like the built-in functions it replaces, it is not a method as a class attribute, and a copy of it is
+    itself.
+    """
 
     def __init__(self, original: Callable[..., Any], before: Callable[..., None]) -> None:
         self._original, self._before = original, before
@@ -240,7 +246,7 @@ class _Watched:
 
 
 class _Like(type):
-    """Of a class that stands in another one's place: what is the other's is its own."""
+    """The metaclass of a replacement class, which shares everything with the original."""
 
     like: type
 
@@ -252,10 +258,10 @@ class _Like(type):
 
 
 def _is_salted(thing: object) -> bool:
-    """Whether the hash of a thing may follow PYTHONHASHSEED."""
+    """Whether an object's hash may depend on PYTHONHASHSEED."""
     return not isinstance(thing, int | float)
 
 
 def _without_time(*args: Any, **_: Any) -> bool:
-    """Whether `time.localtime` and the like are given no time."""
+    """Whether `time.localtime` and similar functions get no time."""
     return not any(isinstance(one, int | float | tuple | time.struct_time) for one in args)

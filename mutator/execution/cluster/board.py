@@ -1,8 +1,7 @@
 """The board: which worker does which piece of work next. It knows no network and starts nothing.
 
-Pieces are cut on demand, each a share of what is left by the times measured so far, so that all workers
-finish at about the same time. A worker stays with the golden run that it has already driven. Near the end,
-an idle worker repeats pieces that others are late with.
+Pieces are cut on demand, each a share of the rest by measured times, so that all workers finish at about the
+same time. A worker keeps the golden run that it has. Near the end, idle workers repeat late pieces.
 """
 
 import time
@@ -18,19 +17,19 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Sample
 
-LEAST_S, MOST_S = 0.5, 8.0  # of a piece
-_SHARE = 4  # a piece is what is left, divided by the number of workers and by this
-_FIRST = 4  # runs in a piece before anything was measured
-_GUESS_S = 0.5  # a run takes, before anything was measured
-_LATE = 3.0  # times the expected time after which a piece is repeated elsewhere
-_LATE_S = 5.0  # and at least so long
-_DEATHS = 2  # of workers, until a piece is split
-_PROOF_S = 20.0  # without other work, until a worker proves what it ran itself; longer where runs are long
+LEAST_S, MOST_S = 0.5, 8.0  # duration of a piece
+_SHARE = 4  # a piece is the rest, divided by the number of workers and by this
+_FIRST = 4  # runs in a piece before the first measurement
+_GUESS_S = 0.5  # duration of a run before the first measurement
+_LATE = 3.0  # multiple of the expected time after which a piece is repeated elsewhere
+_LATE_S = 5.0  # and the minimum
+_DEATHS = 2  # of workers, before a piece is split
+_PROOF_S = 20.0  # without other work, before a worker proves its own runs; longer if runs are long
 
 
 @dataclass
 class _Out:
-    """A piece that is being done: by whom, since when, and how long it was expected to take."""
+    """A piece in progress: by whom, since when, and its expected duration."""
 
     piece: Piece
     worker: str
@@ -39,7 +38,7 @@ class _Out:
     others: set[str] = field(default_factory=set)  # workers that repeat it
 
     def goes_on_without(self, worker: str) -> bool:
-        """Whether somebody is still at it when this worker is not."""
+        """Whether another worker is still doing it."""
         if worker not in self.others and self.others:
             self.worker = self.others.pop()
             return True
@@ -49,7 +48,7 @@ class _Out:
 
 
 class Board:
-    """Deals out the pending work of a run folder. `now` is a clock, in seconds."""
+    """Distributes the pending work of a run folder. `now` is a clock, in seconds."""
 
     def __init__(
         self,
@@ -65,19 +64,19 @@ class Board:
         self._sampled = {sample.id for sample in proof}
         self._proof = [self._proof_piece(line) for line in plan_file.lines_named(folder.path, self._sampled)]
         self._out: dict[int, _Out] = {}
-        self._maker: dict[str, str] = {}  # of the sample's experiments that were run now: by which worker
+        self._maker: dict[str, str] = {}  # the worker that ran each experiment of the sample
         self._at: dict[str, str] = {}  # the golden run that each worker has
-        self._slots: dict[str, int] = {}  # pieces that each worker that is there does at once
+        self._slots: dict[str, int] = {}  # how many pieces each present worker runs at once
         self._idle_since: dict[str, float] = {}
         self._seconds = dict.fromkeys(Kind, 0.0)
         self._done: Counter[Kind] = Counter()
 
     def join(self, worker: str, slots: int) -> None:
-        """A worker joins that can run so many pieces at once."""
+        """Add a worker that can run `slots` pieces at once."""
         self._slots[worker] = slots
 
     def leave(self, worker: str) -> None:
-        """A worker is gone, or gets no more work."""
+        """Remove a worker that is gone, or gets no more work."""
         for known in (self._slots, self._at, self._idle_since):
             known.pop(worker, None)
 
@@ -88,17 +87,19 @@ class Board:
 
     @property
     def ran_all(self) -> bool:
-        """Whether nothing but proof is left."""
+        """Whether only proof is left."""
         outstanding = any(out.piece.kind is Kind.RUN for out in self._out.values())
         return not (self._waiting or outstanding)
 
     def drop_proof(self) -> None:
-        """Nothing needs a proof."""
+        """Drop the proof, as nothing needs one."""
         self._proof.clear()
 
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
-        """The next piece for a worker; None if there is none for now. A piece taken `ahead` waits at the
-        worker while it runs another; near the end none is given out that way."""
+        """The next piece for a worker, or None.
+
+        A piece taken `ahead` waits at the worker while it runs another; there are none near the end.
+        """
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
             return None
         piece = self._cut(worker)
@@ -116,7 +117,7 @@ class Board:
         return piece
 
     def done(self, piece: Piece, worker: str, seconds: float) -> bool:
-        """A piece came back done; False if another worker has already done it."""
+        """Note that a piece is done; False if another worker has already done it."""
         if self._out.pop(piece.number, None) is None:
             return False
         self._seconds[piece.kind] += seconds
@@ -126,7 +127,7 @@ class Board:
         return True
 
     def give_back(self, piece: Piece, worker: str) -> None:
-        """A worker returns a piece undone, for reasons that have nothing to do with the piece."""
+        """Return an unfinished piece, for reasons unrelated to it."""
         if (out := self._out.get(piece.number)) is None:
             return
         if not out.goes_on_without(worker):
@@ -134,9 +135,11 @@ class Board:
             self._again(out.piece)
 
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
-        """A worker, or its process, died of a piece, maybe while it ran the experiment `at`. Another worker
-        tries next, if there is one. What died twice is split; returns a piece of one experiment that died
-        twice: it is given up."""
+        """Note that a worker, or its process, died during a piece, perhaps in the experiment `at`.
+
+        Another worker tries next, if there is one. A piece that killed twice is split. A piece of one
+        experiment that killed twice is returned: it is given up.
+        """
         if (out := self._out.get(piece.number)) is None:
             return None
         out.piece = piece = replace(out.piece, died_at=(*out.piece.died_at, worker))
@@ -167,7 +170,7 @@ class Board:
         return sum(group.waiting for group in self._groups.values())
 
     def _mean_s(self, kind: Kind) -> float:
-        """What a run takes."""
+        """The mean duration of a run."""
         return self._seconds[kind] / self._done[kind] if self._done[kind] else _GUESS_S
 
     def _cut(self, worker: str) -> Piece | None:
@@ -185,7 +188,7 @@ class Board:
         return self._piece(Kind.RUN, group.golden, lines, runs=len(runs))
 
     def _runs(self) -> int:
-        """How many runs the next piece has."""
+        """The number of runs in the next piece."""
         if not self._done[Kind.RUN]:
             return _FIRST
         mean_s = self._mean_s(Kind.RUN)
@@ -193,7 +196,7 @@ class Board:
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
     def _group_for(self, worker: str) -> Group | None:
-        """The work with the golden run that the worker has; else that with the most left for each worker."""
+        """The work with the worker's golden run; else the group with the most work left per worker."""
         own = self._groups.get(self._at.get(worker, ""))
         if own is not None and self._has_for(own, worker):
             return own
@@ -205,12 +208,14 @@ class Board:
         return bool(group.left) or any(self._may_try(worker, piece) for piece in group.again)
 
     def _may_try(self, worker: str, piece: Piece) -> bool:
-        """Whether a piece did not take this worker down before, or there is nobody else."""
+        """Whether a piece did not kill this worker before, or there is no other worker."""
         return worker not in piece.died_at or self._slots.keys() <= set(piece.died_at)
 
     def _proof_for(self, worker: str) -> Piece | None:
-        """An experiment of the proof that another worker ran, or that was run before; its own, where there
-        are no others, or where they have left it for long."""
+        """An experiment of the proof that another worker, or an earlier session, ran.
+
+        A worker gets its own only without other workers, or after they left it for long.
+        """
         running = {name for out in self._out.values() for name in out.piece.lines if name in self._sampled}
         idle_s = self._now() - self._idle_since.get(worker, self._now())
         takes_own = len(self._slots) <= 1 or idle_s > max(_PROOF_S, _LATE * self._mean_s(Kind.RUN))
@@ -222,7 +227,7 @@ class Board:
         return None
 
     def _late_for(self, worker: str) -> Piece | None:
-        """A piece that another worker is late with."""
+        """A late piece of another worker."""
         now = self._now()
         late = [
             (now - out.since - out.expected_s, out.piece)

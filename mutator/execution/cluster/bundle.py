@@ -1,12 +1,12 @@
-"""The bundle: all that a worker needs of a campaign but its plan, named by its digest.
+"""The bundle: everything a worker needs of a campaign except its plan, named by its digest.
 
-meta.json           engine, limits, digests of the golden runs, version of mutator
-manifest/NAME       the target's manifest
-target/, overlay/   its tree, and what else its runs read in its root (`{root}/...` in their arguments)
-templates/          the fault models
-scenarios/          the scenario files of the golden runs
+    meta.json           engine, limits, digests of the golden runs, version of mutator
+    manifest/NAME       the target's manifest
+    target/, overlay/   its tree, and other files in its root that runs read (`{root}/...` in their arguments)
+    templates/          the fault models
+    scenarios/          the scenario files of the golden runs
 
-Golden runs do not travel: each machine drives them, so that their digests show whether it computes alike.
+Each machine makes the golden runs, so that their digests show whether it computes alike.
 """
 
 import json
@@ -36,14 +36,14 @@ _ROOT = "{root}/"
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """A bundle as it travels, and its digest."""
+    """A bundle in transit, and its digest."""
 
     data: bytes
     digest: str
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
-        """What workers need of a run whose checks have passed."""
+        """What workers need of a run that passed its checks."""
         data = pack(dict(_parts(workspace, folder, engine)))
         return cls(data, sha256(data).hexdigest())
 
@@ -78,7 +78,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
 
 
 def _read_in_root(manifest: TargetManifest) -> list[Path]:
-    """Files beside the tree that the arguments of a run name."""
+    """Files outside the tree that the arguments of a run name."""
     named = [word.removeprefix(_ROOT) for word in manifest.entry_args if word.startswith(_ROOT)]
     places = [manifest.root / name for name in named]
     return sorted(path for place in places for path in (place, *place.rglob("*")) if path.is_file())
@@ -91,7 +91,7 @@ def _below(folder: Path, name: str) -> Iterator[tuple[str, bytes]]:
 
 
 def lay_out(data: bytes, place: Path) -> None:
-    """Write the files of a bundle into the folder `place`; MutatorError for one that arrived damaged."""
+    """Write the files of a bundle into the folder `place`; MutatorError if it is damaged."""
     with raising_disk_full(place):
         for name, content in unpack(data).items():
             path = place / name
@@ -101,18 +101,18 @@ def lay_out(data: bytes, place: Path) -> None:
 
 @dataclass(frozen=True)
 class Site:
-    """A bundle that is laid out in the folder `place`."""
+    """A bundle unpacked in the folder `place`."""
 
     place: Path
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        """What meta.json says."""
+        """The content of meta.json."""
         return read_json(self.place / "meta.json", SCHEMA)
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        """The target, with the root that came with it."""
+        """The target, with the root from the bundle."""
         path = self.place / "manifest" / self.meta["manifest"]
         overlay = self.place / "overlay"
         found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)

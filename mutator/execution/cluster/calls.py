@@ -16,15 +16,15 @@ _T = TypeVar("_T")
 
 
 class Refused(Exception):
-    """A worker gets no work, or no more of it."""
+    """A worker gets no work, or no more."""
 
 
 class Cut(Refused):
-    """The scheduler lost the command for a moment, and dropped all that it had from it."""
+    """The scheduler briefly lost the command, and dropped all its tasks."""
 
 
 def submit(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> "Future[_T]":
-    """Have the worker at this address call a function, and no other."""
+    """Make exactly the worker at this address call a function."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Sending large graph")  # a bundle goes to each worker once
         return client.submit(
@@ -39,7 +39,7 @@ def submit(client: Client, address: str, function: Callable[..., _T], *arguments
 
 
 async def call(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
-    """As `answer`, of a function that is called now."""
+    """Call a function on a worker now; as `answer`."""
     future = submit(client, address, function, *arguments)
     try:
         return await answer(future)
@@ -48,12 +48,11 @@ async def call(client: Client, address: str, function: Callable[..., _T], *argum
 
 
 async def answer(future: "Future[_T]") -> _T:
-    """What a task returns. Refused for what it raises, Cut when nobody is to answer any more; a worker that
-    dies does not answer."""
+    """The result of a task. Refused if it raises, Cut if nobody will answer; a dead worker never answers."""
     try:
         return cast("_T", await future)
     except KilledWorker:
-        await asyncio.Event().wait()  # the worker is gone, which is seen elsewhere
+        await asyncio.Event().wait()  # the worker is gone, which is noticed elsewhere
         raise
     except FutureCancelledError:
         raise Cut("the scheduler dropped its work") from None

@@ -1,7 +1,7 @@
 """The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
 
-It talks to its host over the connection FD: pieces come in; the ids of experiments as they finish, and at the
-end the result, go out. It is another process than the host, so that no run can take down the worker.
+It receives pieces from its host over the connection FD, and sends ids of finished experiments, then the
+result. It is separate from the host so that no run can kill the worker.
 """
 
 import os
@@ -40,11 +40,11 @@ from mutator.verification.preflight_rules import look
 
 
 class Unlike(Exception):
-    """A golden run came out otherwise than the campaign's."""
+    """A golden run differs from the campaign's."""
 
 
 class PieceRunner:
-    """Runs pieces on the site of a bundle, and makes of each what travels back."""
+    """Runs pieces on the site of a bundle, and packs the results."""
 
     def __init__(self, site: Site, name: str, parent: int) -> None:
         self._site, self._name, self._parent = site, name, parent
@@ -55,12 +55,13 @@ class PieceRunner:
         self._base = prepare_base(site.manifest, self._work / "base")
         self._goldens = self._work / "golden"
         self._driven = DrivenGoldens(site)
-        self._alike: set[str] = set()  # golden runs that this machine drives to the campaign's bytes
+        self._alike: set[str] = set()  # golden runs that equal the campaign's
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
-        """Run a piece; `tell` is called with each experiment that is finished. Unlike where this machine
-        drives another golden run."""
+        """Run a piece; `tell` is called with each finished experiment. Unlike if the golden run differs
+        here.
+        """
         began = time.monotonic()
         experiments = piece.experiments()
         for same in runs(self._site.manifest, experiments):  # compared with the golden run of its first
@@ -75,7 +76,7 @@ class PieceRunner:
         return replace(made, number=piece.number, seconds=time.monotonic() - began)
 
     def close(self) -> None:
-        """End what engines keep running."""
+        """End the engines."""
         for runner in self._runners.values():
             runner.engine.close()
 
@@ -108,8 +109,7 @@ class PieceRunner:
         return self._runners[kind]
 
     def _have_golden(self, key: str) -> None:
-        """Have a golden run that this machine drove, now or for another campaign; Unlike unless its bytes are
-        the campaign's."""
+        """Get a golden run, new or from the cache; Unlike unless its bytes are the campaign's."""
         golden, known = self._site.goldens[key]
         place = self._goldens / key
         self._goldens.mkdir(exist_ok=True)
@@ -119,7 +119,7 @@ class PieceRunner:
         self._alike.add(key)
 
     def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
-        """Drive a golden run into the folder `place`; Unlike when it is not the campaign's to the byte."""
+        """Make a golden run in the folder `place`; Unlike if it differs from the campaign's."""
         site = self._site
         engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
         job = Job(
@@ -134,7 +134,7 @@ class PieceRunner:
                 came = found.problem or f"has the digest {found.digest[:16]} here, not {known[:16]}"
                 raise Unlike(f"golden run {golden.key} {came}")
             execution.out.rename(place)
-            if golden.seed is not None:  # the pictures of a hundred seeds would fill the disk
+            if golden.seed is not None:  # the images of a hundred seeds would fill the disk
                 caches.make_room(site.manifest.name)
 
     def _golden_of(self, experiment: Experiment) -> GoldenRun:
@@ -142,7 +142,7 @@ class PieceRunner:
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
-    """What the run folder is to have of experiments."""
+    """What the run folder stores of these experiments."""
     records = tuple(canonical(line_of(one.record)).encode() for one in finished)
     if proof:
         return Result(number=0, ending=Ending.DONE, records=records)
@@ -161,7 +161,7 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
 
 
 def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> Result:
-    """What comes of a piece, however it ends."""
+    """The result of a piece, however it ends."""
     try:
         with raising_disk_full(runner.place):
             return runner.run(piece, tell)
@@ -186,7 +186,7 @@ def _serve(connection: Connection, runner: PieceRunner) -> None:
 
 
 def _refuse(connection: Connection, err: Exception) -> None:
-    """Say of the first piece that none can be run here."""
+    """Answer the first piece with the reason why none can run here."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))
@@ -194,9 +194,9 @@ def _refuse(connection: Connection, err: Exception) -> None:
 
 
 def main() -> int:
-    """Run pieces until the host closes the connection, or say why that cannot be done here."""
+    """Run pieces until the host closes the connection, or report why that is impossible."""
     connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host's to answer
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the host to handle
     try:
         with raising_disk_full(site.place):
             runner = PieceRunner(site, name, os.getppid())

@@ -1,4 +1,4 @@
-"""Cluster files: which kind of cluster is started for a run, with how many workers and which options.
+"""Cluster files: the kind of cluster to start for a run, its number of workers, and its options.
 
 The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes; a file never names what to import.
 """
@@ -39,7 +39,7 @@ _CLASSES = {
     "lsf": ("dask_jobqueue", "LSFCluster"),
     KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
 }
-# Not for a file to say: what is set here, and what names Python objects.
+# Options not allowed in a file: those that are set here, and those that name Python objects.
 RESERVED = (
     "asynchronous",
     "config_name",
@@ -50,11 +50,11 @@ RESERVED = (
     "shutdown_on_close",
 )
 _NO_OPTIONS = {"self", "args", "kwargs", "base_class_kwargs", "job_kwargs", "scheduler", "name", *RESERVED}
-_RENEWED_EVERY = "5s"  # a job that has ended, as its time was over, is replaced by another
+_RENEWED_EVERY = "5s"  # a job that reaches its time limit is replaced
 
 
 class ClusterModel(StrictModel, title="A cluster file"):
-    """A cluster that a run starts, and ends when it ends itself."""
+    """A cluster that a run starts and ends."""
 
     kind: Literal["slurm", "pbs", "sge", "lsf", "kubernetes"] = Field(
         description="The queueing system that starts the workers as jobs, or Kubernetes with Dask's operator."
@@ -71,14 +71,14 @@ class ClusterModel(StrictModel, title="A cluster file"):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterFile:
-    """A cluster file, checked but for the names of its options, which the class alone knows."""
+    """A checked cluster file; the class checks the names of its options."""
 
     model: ClusterModel
     source: Source
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
-        """As of `Where`: starts the cluster, and ends it with all its jobs or pods."""
+        """As in `Where`: starts the cluster, and ends it with all its jobs or pods."""
         if not insecure:
             self._check_closed()
         cluster_class = _class(self.model.kind)
@@ -94,7 +94,7 @@ class ClusterFile:
             try:
                 await self._started(cluster, insecure, problems)
             except BaseException:
-                with suppress(Exception):  # what went wrong is known
+                with suppress(Exception):  # the cause is known
                     await cluster.close()
                 _delete_keys(cluster)
                 raise
@@ -106,7 +106,7 @@ class ClusterFile:
                 _delete_keys(cluster)
 
     async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
-        """Once scheduler and jobs are started; `problems` is filled by jobs that the system refuses."""
+        """Wait for scheduler and jobs; jobs that the system refuses are added to `problems`."""
         with self._blamed():
             await cluster
         if not insecure and not is_closed(cluster.scheduler_address):
@@ -121,7 +121,7 @@ class ClusterFile:
             cluster.adapt(minimum=workers, maximum=workers, interval=_RENEWED_EVERY)
 
     def _check_closed(self) -> None:
-        """MutatorError where it is known before the start that others could reach the scheduler."""
+        """Raise MutatorError if others could reach the scheduler, as far as known before the start."""
         options = self.model.options
         scheduler = options.get("scheduler_options")
         scheduler = scheduler if isinstance(scheduler, Mapping) else {}
@@ -135,7 +135,7 @@ class ClusterFile:
         raise refused(what, where=self.source.path, line=self.source.line(("options",)))
 
     def _check_options(self, cluster_class: type) -> None:
-        """MutatorError for an option that the class does not have, or that is not for a file to say."""
+        """Raise MutatorError for an option that the class lacks or that a file may not set."""
         known = set(_parameters(cluster_class)) - _NO_OPTIONS
         for name, value in self.model.options.items():
             if name not in known:
@@ -159,7 +159,7 @@ class ClusterFile:
             )
 
     def _options(self) -> dict[str, Any]:
-        """What the class is given: one thread for each worker, a dashboard for this machine alone."""
+        """The arguments of the class: one thread for each worker, a dashboard for this machine only."""
         options = dict(self.model.options)
         if self.model.kind == KUBERNETES:
             from tornado.ioloop import IOLoop
@@ -176,8 +176,9 @@ class ClusterFile:
 
     @contextmanager
     def _blamed(self) -> Iterator[None]:
-        """Have what the class does not like about the options, or the queueing system about a job, told as an
-        error of the file."""
+        """Report the class's complaints about options, and the queueing system's about a job, as errors of
+        the file.
+        """
         try:
             yield
         except FileNotFoundError as error:
@@ -195,13 +196,13 @@ class ClusterFile:
 
 
 def load_cluster(path: Path) -> ClusterFile:
-    """Read a cluster file strictly; MutatorError with file and line for anything wrong with it."""
+    """Read a cluster file strictly; MutatorError with file and line for a mistake."""
     model, source = read(path, ClusterModel, SCHEMA)
     return ClusterFile(model=model, source=source)
 
 
 def _noting(job_class: Any, problems: list[Exception]) -> type:
-    """The class of jobs, but one that cannot be submitted is noted: Dask would only log it."""
+    """A class of jobs that notes failed submissions, which Dask would only log."""
 
     from distributed import Status
 
@@ -210,25 +211,25 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
             try:
                 await super().start()
             except (OSError, RuntimeError, ValueError) as error:
-                problems.append(error.with_traceback(None))  # which would keep the job alive
+                problems.append(error.with_traceback(None))  # a traceback would keep the job alive
                 self.status = Status.running
 
     return Noting
 
 
 def _delete_keys(cluster: Any) -> None:
-    """Delete the files of `security: true`: Dask does once the cluster is collected, which may be never."""
+    """Delete the files of `security: true`: Dask does so when the cluster is collected, perhaps never."""
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):
             file.close()
 
 
 def _class(kind: str) -> Any:
-    """The class that starts clusters of a kind; MutatorError when its extra is not installed."""
+    """The class that starts clusters of a kind; MutatorError if its extra is not installed."""
     module, name = _CLASSES[kind]
     original = signal.signal
     try:
-        # importing dask_jobqueue sets a handler of Ctrl-C, and fails where that is not allowed: in a thread
+        # importing dask_jobqueue sets a handler of Ctrl-C, which fails in a thread
         signal.signal = lambda *_: None
         with importing(KUBERNETES if kind == KUBERNETES else "cluster"):
             return getattr(importlib.import_module(module), name)
@@ -237,7 +238,7 @@ def _class(kind: str) -> Any:
 
 
 def _parameters(cluster_class: type) -> Iterator[str]:
-    """Names of the options of a class, those of its bases and of its jobs included."""
+    """The option names of a class, its bases and its jobs."""
     for part in (*cluster_class.__mro__, *getattr(cluster_class, "job_cls", object).__mro__):
         if part.__module__.startswith(("dask_jobqueue", "dask_kubernetes")) and "__init__" in vars(part):
             yield from inspect.signature(part).parameters

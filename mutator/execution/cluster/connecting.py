@@ -1,4 +1,4 @@
-"""Connections to Dask schedulers: over which networks one is made, and what is said when there is none."""
+"""Connect to Dask schedulers: allowed networks, and the errors of failed connections."""
 
 import asyncio
 import ipaddress
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from distributed import Client, Security
     from distributed.deploy.cluster import Cluster
 
-CONNECT_S = 10.0  # until a scheduler that does not answer is given up
+CONNECT_S = 10.0  # before a silent scheduler is given up
 _ADDRESS = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
@@ -44,16 +44,16 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Whether nobody else can read or join in: over TLS, or on this machine alone.
+    """Whether nobody else can read or join: over TLS, or on this machine only.
 
-    A host's name is not looked up; that of this machine is `localhost`.
+    Host names are not looked up; this machine's is `localhost`.
     """
     found = _ADDRESS.fullmatch(address)
     return found is not None and (found["protocol"] == "tls" or is_loopback(found["host"]))
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host's name or number means the machine itself."""
+    """Whether a host's name or number means this machine."""
     try:
         return host == "localhost" or ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -73,7 +73,7 @@ def refused(what: str, *, where: Path | None = None, line: int | None = None) ->
 
 @contextmanager
 def importing(extra: str) -> Iterator[None]:
-    """Have a package that is not installed answered with the extra that has it."""
+    """Turn the error of a missing package into one that names its extra."""
     try:
         yield
     except ModuleNotFoundError as error:
@@ -86,9 +86,11 @@ def importing(extra: str) -> Iterator[None]:
 
 @contextmanager
 def own_scheduler() -> Iterator[None]:
-    """Settings of Dask for a scheduler in this process: a frozen worker is noticed within a minute, Dask does
-    not take CPU time from the runs to watch its own threads, and the dashboard's link is for this machine,
-    the only one that it answers."""
+    """Dask settings for a scheduler in this process.
+
+    A frozen worker is noticed within a minute, Dask does not spend CPU time on watching its threads, and the
+    dashboard's link is for this machine only, the only one it answers.
+    """
     import dask
 
     settings = {
@@ -102,7 +104,7 @@ def own_scheduler() -> Iterator[None]:
 
 
 def certificates() -> "Security":
-    """TLS as Dask's configuration has it (`distributed.comm.tls`); MutatorError unless it is of use."""
+    """TLS from Dask's configuration (`distributed.comm.tls`); MutatorError unless it is usable."""
     from distributed import Security
 
     remedy = (
@@ -139,7 +141,7 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
             OSError,
             TimeoutError,
             ssl.SSLError,
-        ) as error:  # Dask's own errors of connections are OSErrors
+        ) as error:  # Dask's own connection errors are OSErrors
             raise MutatorError(
                 f"no Dask scheduler answers at {address}{await _reason(address, error)}",
                 where=where,
@@ -152,8 +154,10 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
 
 
 async def _reason(address: str, error: BaseException) -> str:
-    """Why, as the innermost error has it: Dask says only for how long it has tried. Where its last try was
-    cut short that error says nothing, and one more is made."""
+    """The reason, from the innermost error, since Dask only reports how long it tried.
+
+    If its last try was cut short, that error says nothing, and one more try is made.
+    """
     while error.__cause__ is not None:
         error = error.__cause__
     if str(error):

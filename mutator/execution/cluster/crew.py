@@ -1,4 +1,4 @@
-"""The workers of a run: which were let in, which were refused and why, and how fast each one is."""
+"""The workers of a run: admitted ones, refused ones with reasons, and the speed of each."""
 
 import time
 from collections import deque
@@ -10,12 +10,12 @@ from mutator._common.text import counted
 from mutator._common.version import VERSION
 from mutator.store.stretches import Stretch, differences
 
-_RECENT = 20  # pieces that a worker's rate is taken of
+_RECENT = 20  # pieces that a worker's rate is measured over
 
 
 @dataclass
 class _Member:
-    """A worker that was let in: its machine, and when it finished how many experiments."""
+    """An admitted worker: its machine, and when it finished how many experiments."""
 
     host: str
     finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -31,31 +31,32 @@ class Crew:
 
     @property
     def packages(self) -> list[str]:
-        """The packages whose versions must be those of the stretch."""
+        """The packages whose versions must equal the stretch's."""
         return sorted(self._stretch.packages)
 
     def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
-        """A worker takes part; `facts` are those of `dask_side.facts`."""
+        """Admit a worker; `facts` are those of `dask_side.facts`."""
         self._present[name] = _Member(str(facts["host"]))
 
     def leave(self, name: str) -> None:
-        """A worker no longer takes part."""
+        """Remove a worker."""
         self._present.pop(name, None)
 
     def refuse(self, name: str, why: str) -> None:
-        """A worker may not take part."""
+        """Note that a worker may not take part."""
         self.refused[name] = why
 
     def objection(self, facts: Mapping[str, Any]) -> str:
-        """Why a worker may not take part: whatever would keep its machine from resuming the run. Empty if it
-        may."""
+        """Why a worker may not take part: anything that would keep its machine from resuming the run, else
+        empty.
+        """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"
         found = differences(self._stretch, facts["python"], facts["packages"])
         return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
 
     def finished(self, name: str, count: int) -> None:
-        """A worker has finished so many experiments."""
+        """Note that a worker finished so many experiments."""
         if name in self._present:
             self._present[name].finished.append((self._now(), count))
 
@@ -70,7 +71,7 @@ class Crew:
         return f"{text}; {len(self.refused)} refused" if self.refused else text
 
     def _per_s(self, member: _Member) -> float | None:
-        """Experiments a second that a worker has done lately; None before that is known."""
+        """A worker's recent experiments per second; None if unknown."""
         if len(member.finished) < 2:
             return None
         (began, first), *_ = member.finished
@@ -79,7 +80,7 @@ class Crew:
 
 
 def describe(name: str, facts: Mapping[str, Any]) -> str:
-    """A worker, for people: its name and, as far as they are known, its machine, processor and versions."""
+    """A worker, for people: its name and, as far as known, its machine, processor and versions."""
     if not facts:
         return name
     parts = (facts["host"], facts["cpu"] or facts["platform"], facts["python"], f"mutator {facts['mutator']}")

@@ -1,8 +1,7 @@
-"""What a Dask worker is asked to do: functions that the command submits by reference.
+"""Functions that the command submits to Dask workers by reference.
 
-A worker takes part in a run by a task that lasts as long as the run does, without a place in the pool of
-threads (`attend`); its end, whatever ends it, is the end of all that the run has on the worker. Each piece is
-a task of its own.
+A worker takes part in a run through a task outside the thread pool that lasts as long as the run (`attend`).
+When that task ends, everything of the run on the worker ends. Each piece is a separate task.
 """
 
 import platform
@@ -21,14 +20,14 @@ from mutator.campaigns import machine
 from mutator.errors import MutatorError
 from mutator.execution.cluster.host import Host, Wanted
 
-_PATIENCE_S = 60.0  # for the run to be there when its first piece comes
+_PATIENCE_S = 60.0  # for the run to exist when its first piece comes
 
-_hosts: dict[str, Host] = {}  # what this process has, by run
+_hosts: dict[str, Host] = {}  # by run
 _arrived = threading.Condition()
 
 
 def facts(packages: Iterable[str]) -> dict[str, Any]:
-    """What this worker computes with: as a stretch of work notes it, with versions of these packages."""
+    """What this worker computes with, as in a stretch of work, including versions of these packages."""
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
@@ -41,7 +40,7 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
 
 
 def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
-    """Lay out the bundle of a run; MutatorError for one that is damaged."""
+    """Unpack the bundle of a run; MutatorError if damaged."""
     if sha256(bundle).hexdigest() != digest:
         raise MutatorError("another bundle arrived than was sent", remedy="check the network")
     host = Host.lay_out(bundle, get_worker().local_directory, name)
@@ -58,18 +57,18 @@ def attend(run: str) -> None:
         host.attend(wanted)
     finally:
         with _arrived:
-            if _hosts.get(run) is host:  # the run may have come again meanwhile
+            if _hosts.get(run) is host:  # the run may have returned meanwhile
                 del _hosts[run]
 
 
 def leave(run: str) -> None:
-    """Have no part in a run any more; all that it had here is gone by then."""
+    """Leave a run, and wait until everything it had here is gone."""
     if (host := _hosts.get(run)) is not None:
         host.end()
 
 
 def work(run: str, piece: bytes) -> bytes:
-    """Run a piece; what came of it."""
+    """Run a piece and return its result."""
     deadline = time.monotonic() + _PATIENCE_S
     with _arrived:
         while run not in _hosts:
@@ -80,7 +79,7 @@ def work(run: str, piece: bytes) -> bytes:
 
 
 def _wanted() -> Wanted:
-    """Whether the task of this thread is still wanted: nobody released it, and the worker does not close."""
+    """Whether this thread's task is still wanted: it is not released, and the worker is not closing."""
     worker: Worker = get_worker()
     key = worker.get_current_task()
 

@@ -1,4 +1,4 @@
-"""The distributor of `mutator run --cluster`: Dask in a thread of its own."""
+"""The distributor of `mutator run --cluster`: Dask in a separate thread."""
 
 import asyncio
 import queue
@@ -13,7 +13,7 @@ from mutator.execution.cluster.dealing import Deal
 from mutator.execution.cluster.where import Where
 from mutator.execution.session import Session
 
-_LOOK_S = 0.5  # how often it is looked for remarks
+_LOOK_S = 0.5  # between two checks for remarks
 
 
 class ClusterWorkers:
@@ -23,7 +23,7 @@ class ClusterWorkers:
         self._where, self._insecure = where, insecure
 
     def run(self, session: Session) -> None:
-        """Deal out the pending work in a thread of its own, so that a signal finds this one idle."""
+        """Distribute the pending work in another thread, so that a signal finds this one idle."""
         remarks: queue.Queue[str] = queue.Queue()
         loop = asyncio.new_event_loop()
         deal = loop.create_task(self._deal(session, remarks.put))
@@ -39,7 +39,7 @@ class ClusterWorkers:
             with suppress(RuntimeError):  # the loop has just closed
                 loop.call_soon_threadsafe(deal.cancel)
             over.wait()
-            if not isinstance(err, KeyboardInterrupt):  # where warnings are errors
+            if not isinstance(err, KeyboardInterrupt):  # if warnings are errors
                 raise
             session.interrupted = True
         if not deal.cancelled() and (error := deal.exception()) is not None:
@@ -53,7 +53,7 @@ class ClusterWorkers:
 
 def _run(loop: asyncio.AbstractEventLoop, deal: "asyncio.Task[None]", over: threading.Event) -> None:
     try:
-        with suppress(BaseException):  # who waits for the task asks it
+        with suppress(BaseException):  # the waiter on the task gets it
             loop.run_until_complete(deal)
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.run_until_complete(loop.shutdown_default_executor())

@@ -1,7 +1,7 @@
-"""Work dealt out by Dask, which carries the bytes and knows who is there.
+"""Distribute work through Dask, which carries the bytes and knows which workers are present.
 
-The board decides which worker does what: each task names its worker, a worker has at most two tasks for each
-of its threads, and a finished task is released at once.
+The board decides which worker does what: each task names its worker, a worker has at most two tasks per
+thread, and a finished task is released at once.
 """
 
 import asyncio
@@ -26,22 +26,22 @@ from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.session import Session
 from mutator.verification import equivalence
 
-_LOOK_S = 0.5  # between two looks at which workers are there
-_ALONE_S = 60.0  # without any worker, until the command gives up
-_AHEAD = 2  # pieces that a thread of a worker has at once: one waits while the other is done
-_FAILURES = 3  # of a worker in a row, until it gets no more work
+_LOOK_S = 0.5  # between two checks of the present workers
+_ALONE_S = 60.0  # without any worker, before the command gives up
+_AHEAD = 2  # pieces per thread of a worker: one waits while the other runs
+_FAILURES = 3  # of a worker in a row, before it gets no more work
 _PAUSE_S = 0.1  # before an idle worker asks again
 _PART_S = 5.0  # for workers to drop the run
-_PATIENCE_S = 30.0  # with a scheduler that does not answer
+_PATIENCE_S = 30.0  # with a silent scheduler
 
 
 class _Gone(Exception):
-    """The scheduler does not answer any more."""
+    """The scheduler no longer answers."""
 
 
 @dataclass
 class _Tended:
-    """A worker that is present, and the pieces that it has, oldest first."""
+    """A present worker and its pieces, oldest first."""
 
     name: str
     address: str
@@ -49,15 +49,18 @@ class _Tended:
     lease: "Future[None] | None" = None  # the task that is its part in the run
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
-    is_cut: bool = False  # to be let in again
+    is_cut: bool = False  # to be admitted again
     failures: int = 0  # since it last finished something
     ailment: str = ""  # reason of the last failure
     facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted
 
 
 class Deal:
-    """The work of a session, dealt out to the workers of a scheduler. `remark` is called with what a person
-    should know; `queued` is how many workers will come in time, None where nobody knows."""
+    """Distributes the work of a session to the workers of a scheduler.
+
+    `remark` is called with messages for people; `queued` is how many workers will come in time, None if
+    unknown.
+    """
 
     def __init__(
         self, session: Session, client: Client, remark: Callable[[str], None], *, queued: int | None
@@ -70,14 +73,14 @@ class Deal:
         self._crew = Crew(folder.stretches[-1], accept=session.accept_versions)
         self._run = f"mutator-{uuid.uuid4().hex}"
         self._tended: dict[str, _Tended] = {}
-        self._changed = asyncio.Event()  # somebody who found nothing to do may find something now
+        self._changed = asyncio.Event()  # idle workers may find work now
         self._writing = asyncio.Lock()
         self._writes: set[asyncio.Task[None]] = set()
         self._forked = False
         self._alone_since = time.monotonic()
 
     async def run(self) -> None:
-        """Deal out the work until all is done, or no worker is left to do it."""
+        """Distribute the work until it is done or no worker is left."""
         try:
             while not (self._board.is_empty and not self._writes) and not self._session.problem:
                 await self._meet()
@@ -104,7 +107,7 @@ class Deal:
             self._intake.close()
 
     async def _part(self) -> None:
-        """Have the workers drop the run; those that do not answer drop it once the client is gone."""
+        """Tell the workers to drop the run; silent ones drop it once the client is gone."""
         present = [one for one in self._tended.values() if one.lease is not None]
         parting = [call(self._client, one.address, dask_side.leave, self._run) for one in present]
         with suppress(TimeoutError):
@@ -123,7 +126,7 @@ class Deal:
         return self._crew.told() + (f"; {link}" if link else "")
 
     async def _meet(self) -> None:
-        """Look which workers are there: tend new ones, and take back the work of those that are gone."""
+        """Find new workers and serve them; take back the work of those that are gone."""
         try:
             async with asyncio.timeout(_PATIENCE_S):
                 scheduler = self._client.scheduler
@@ -144,11 +147,11 @@ class Deal:
             self._tended[key] = one
         for one in self._tended.values():
             if one.task is not None and one.task.done():
-                one.task.result()  # raises what ended the work of all
+                one.task.result()  # raises what ended everything
         self._check_left()
 
     async def _mourn(self, one: _Tended) -> None:
-        """A worker is gone. The pieces it was running may be why; those it had waiting are not."""
+        """Handle a lost worker. Its running pieces may be the cause; waiting ones are not."""
         assert one.task is not None
         one.task.cancel()
         await asyncio.gather(one.task, return_exceptions=True)
@@ -160,7 +163,7 @@ class Deal:
                 self._board.give_back(piece, one.name)
 
     def _check_left(self) -> None:
-        """End the session when nobody is left, or comes, to do the work."""
+        """End the session if no worker is left or expected."""
         if any(one.task is not None and not one.task.done() for one in self._tended.values()):
             self._alone_since = time.monotonic()
         elif len(self._tended) >= (self._queued or 1):
@@ -173,14 +176,14 @@ class Deal:
             )
 
     def _drop_needless_proof(self) -> None:
-        """Once all is run, nothing is to be proved if nothing was forked."""
+        """Drop the proof once everything ran and nothing was forked."""
         if self._board.ran_all and self._session.proof and not self._forked:
-            self._forked = True  # asked once
+            self._forked = True  # computed once
             if equivalence.needless(self._session.folder) is not None:
                 self._board.drop_proof()
 
     async def _tend(self, one: _Tended) -> None:
-        """Let a worker in, and give it work for as long as it is there."""
+        """Admit a worker, and give it work while it is present."""
         facts: Mapping[str, Any] = {}
         try:
             facts = await call(self._client, one.address, dask_side.facts, tuple(self._crew.packages))
@@ -224,7 +227,7 @@ class Deal:
             raise found.exceptions[0] from None
 
     async def _serve(self, one: _Tended) -> None:
-        """Give a worker one piece after the other."""
+        """Give a worker one piece after another."""
         while True:
             if one.failures >= _FAILURES:
                 raise Refused(one.ailment)
@@ -238,7 +241,7 @@ class Deal:
             await self._take(one, piece, _read(data, piece))
 
     async def _take(self, one: _Tended, piece: Piece, result: Result) -> None:
-        """Take in what came of a piece."""
+        """Handle the result of a piece."""
         if result.ending is Ending.DONE:
             one.failures = 0
             if self._board.done(piece, one.name, result.seconds):
@@ -255,24 +258,24 @@ class Deal:
             raise Refused(result.text)
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
-        """A piece is done for the first time."""
-        if one.facts:  # its first results: the run says where they come from
+        """Handle a piece that is done for the first time."""
+        if one.facts:  # its first results: run.json must name their origin
             self._session.note_machine({"worker": one.name, **one.facts})
             one.facts = {}
-        for other in self._tended.values():  # it was not the piece's fault
+        for other in self._tended.values():  # the piece was not the cause
             other.failures += other.name in piece.died_at and other is not one
         self._forked |= result.forked
         self._crew.finished(one.name, len(piece.lines))
         await self._write(self._intake.take, piece, result)
 
     async def _died(self, piece: Piece, one: _Tended, result: Result) -> None:
-        """A worker, or its process, died of a piece: it is tried again, or given up."""
+        """Retry or give up a piece during which a worker or its process died."""
         if (given_up := self._board.died(piece, one.name, result.at)) is not None:
             what = "takes down what runs it, and did so" if result.ending is Ending.DIED else "failed"
             await self._write(self._intake.give_up, given_up, f"{what} twice: {result.text}")
 
     async def _write(self, function: Callable[[Piece, Any], None], piece: Piece, what: Any) -> None:
-        """Write into the run folder, one after the other. What has begun when all ends is written."""
+        """Write into the run folder, one write at a time. A write that has begun is finished."""
 
         async def in_turn() -> None:
             async with self._writing:
@@ -285,7 +288,7 @@ class Deal:
 
 
 def _read(data: bytes, piece: Piece) -> Result:
-    """What came of a piece; a result that arrived damaged is none."""
+    """The result of a piece; a damaged one counts as missing."""
     try:
         return Result.of(data)
     except MutatorError as err:

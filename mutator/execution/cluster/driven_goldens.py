@@ -1,7 +1,7 @@
-"""Golden runs that this machine drove for earlier campaigns: a worker need not drive them again.
+"""Cached golden runs that this machine made for earlier campaigns.
 
-An entry is found by everything that a golden run follows from: sources, scenario, seed, limits, and what the
-machine computes with. Its bytes are compared with the campaign's digest like those of a new run.
+An entry is found by everything that a golden run depends on: sources, scenario, seed, limits, and the
+machine's software. Its bytes are compared with the campaign's digest like those of a new run.
 """
 
 import platform
@@ -21,7 +21,7 @@ _SOURCES = ("manifest", "target", "overlay")  # folders of a bundle
 
 
 class DrivenGoldens:
-    """The golden runs kept for a site."""
+    """The cached golden runs of a site."""
 
     def __init__(self, site: Site) -> None:
         self._site = site
@@ -35,7 +35,9 @@ class DrivenGoldens:
         ]
 
     def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
-        """Copy a golden run to `to`. False, and nothing there, unless one with the digest `known` is kept."""
+        """Copy a golden run to `to`. False, with nothing there, unless one with the digest `known` is
+        cached.
+        """
         with suppress(OSError):
             kept_folders.fetch(self._entry(golden), to)
             if digest_of(self._site.manifest, to) == known:
@@ -44,7 +46,7 @@ class DrivenGoldens:
         return False
 
     def keep(self, golden: GoldenRun, out: Path) -> None:
-        """Keep the golden run in the folder `out`; an unwritable cache is ignored."""
+        """Cache the golden run in the folder `out`; an unwritable cache is ignored."""
         kept_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
 
     def _entry(self, golden: GoldenRun) -> Path:

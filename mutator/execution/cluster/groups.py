@@ -1,4 +1,4 @@
-"""The pending work of a run folder by golden run, read from the plan as it is asked for."""
+"""The pending work of a run folder by golden run, read from the plan on demand."""
 
 import json
 from collections import deque
@@ -12,7 +12,7 @@ from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
-_OF_A_RUN = ("fault", "trigger", "seed")  # equal in experiments that are one run in several scenarios
+_OF_A_RUN = ("fault", "trigger", "seed")  # equal in experiments that share a run
 
 Run = dict[str, bytes]  # lines of the plan by experiment id: a run, and those that share it
 Faults = Mapping[str, bytes]  # lines of the plan's faults by id
@@ -20,12 +20,12 @@ Faults = Mapping[str, bytes]  # lines of the plan's faults by id
 
 @dataclass
 class Group:
-    """What is left of the work with one golden run."""
+    """The remaining work with one golden run."""
 
     golden: str
     runs: Iterator[Run]
-    left: int  # experiments that were not cut off yet
-    again: deque[Piece] = field(default_factory=deque)  # pieces that came back
+    left: int  # experiments not yet cut off
+    again: deque[Piece] = field(default_factory=deque)  # returned pieces
 
     @property
     def waiting(self) -> int:
@@ -45,7 +45,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """What is left of these chunks, run by run: those that share one are side by side."""
+    """Yield the rest of these chunks run by run, with sharing experiments together."""
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
         read = [(_read(lines[place]), lines[place]) for place in one.places]
@@ -54,7 +54,7 @@ def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
 
 
 def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
-    """The name of the golden run that the experiment on a line of the plan is compared with."""
+    """The golden run of the experiment on a line of the plan."""
     data = _read(line)
     fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
     experiment = plan_file.experiment_from(data, {fault.id: fault})
@@ -62,7 +62,7 @@ def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
 
 
 def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
-    """The lines of the faults that these experiments have, each once."""
+    """The lines of these experiments' faults, without duplicates."""
     return tuple(dict.fromkeys(faults[_read(line)["fault"]] for line in lines.values()))
 
 

@@ -1,7 +1,7 @@
 """A worker's side of a run: its bundle on the disk, and the processes that run its pieces.
 
-One thread attends a host for as long as it lives. That thread starts the processes, and the kernel kills them
-when the thread ends, however it ends; the host's folder is then deleted. Other threads hand it pieces.
+One thread attends a host throughout. It starts the processes, and the kernel kills them when the thread ends.
+The host's folder is then deleted. Other threads pass it pieces.
 """
 
 import os
@@ -26,9 +26,9 @@ from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.worker import dying_python
 
-_LOOK_S = 0.25  # how often it is looked whether the work is still wanted
+_LOOK_S = 0.25  # between two checks whether the work is still wanted
 _END_S = 5.0
-_START_S = 60.0  # for a process to begin with its first piece
+_START_S = 60.0  # for a process to begin its first piece
 _CHILD = "mutator.execution.cluster.child"
 
 Wanted = Callable[[], bool]
@@ -40,13 +40,13 @@ class NotWanted(Exception):
 
 @dataclass
 class _Child:
-    """A process that runs pieces, one after the other."""
+    """A process that runs pieces one after another."""
 
     process: subprocess.Popen[bytes]
     connection: Connection
 
     def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
-        """Have it run a piece. NotWanted as soon as nobody waits for it; the process is then of no use."""
+        """Run a piece. NotWanted as soon as nobody waits for it; the process is then unusable."""
         finished: set[str] = set()
         try:
             result = self._answer(data, patience_s, wanted, finished)
@@ -59,7 +59,7 @@ class _Child:
         return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
 
     def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """What it says of a piece; notes what is finished. TimeoutError when it says nothing for so long."""
+        """Its answer about a piece; notes finished experiments. TimeoutError after so much silence."""
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
@@ -88,7 +88,7 @@ class _Child:
 
 @dataclass
 class Host:
-    """What a worker has of one run. `name` is the worker's, in the timings of its experiments."""
+    """A worker's part of one run. `name` is the worker's, in the timings of its experiments."""
 
     folder: Path
     name: str
@@ -96,13 +96,13 @@ class Host:
     _idle: list[_Child] = field(default_factory=list)
     _orders: "queue.Queue[queue.Queue[_Child | Exception]]" = field(default_factory=queue.Queue)
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _ended: bool = False  # nothing is lent any more
+    _ended: bool = False  # no process is lent any more
     _leaving: bool = False
     _gone: threading.Event = field(default_factory=threading.Event)
 
     @classmethod
     def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """A host for the bundle `data` in a new folder of `place`; MutatorError for a damaged bundle."""
+        """A host for the bundle `data` in a new folder of `place`; MutatorError if it is damaged."""
         with raising_disk_full(Path(place)):
             Path(place).mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
@@ -115,7 +115,7 @@ class Host:
         return cls(folder, name, patience_s)
 
     def attend(self, wanted: Wanted) -> None:
-        """Start processes as they are asked for, until the host is not wanted any more; then end all."""
+        """Start processes on request until the host is no longer wanted; then end all."""
         try:
             while wanted() and not self._leaving:
                 with suppress(queue.Empty):
@@ -135,12 +135,12 @@ class Host:
             self._gone.set()
 
     def end(self) -> None:
-        """Have the attending thread end, and wait until all is gone."""
+        """Make the attending thread end, and wait for it."""
         self._leaving = True
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted once nobody is waiting for it; MutatorError for a damaged one."""
+        """Run a piece. NotWanted once nobody waits for it; MutatorError if it is damaged."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()
@@ -160,7 +160,7 @@ class Host:
                 child.end()
 
     def _borrowed(self) -> _Child:
-        """A process that has nothing to do, or a new one; NotWanted once nobody starts any more."""
+        """An idle process, or a new one; NotWanted once none are started."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
@@ -183,7 +183,7 @@ class Host:
                 [*dying_python(os.getpid()), *words],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
-                start_new_session=True,  # a signal to the worker's terminal is the worker's to answer
+                start_new_session=True,  # a signal to the worker's terminal is for the worker
             )
         except BaseException:
             ours.close()

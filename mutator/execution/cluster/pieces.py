@@ -1,4 +1,4 @@
-"""Pieces of work, and what comes back of one."""
+"""Pieces of work, and their results."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -12,28 +12,28 @@ from mutator.store import plan_file
 
 
 class Kind(StrEnum):
-    """What is done with the experiments of a piece."""
+    """What to do with the experiments of a piece."""
 
     RUN = "run"
-    PROVE = "prove"  # drive them on the reference engine, for the proof
+    PROVE = "prove"  # run them on the reference engine, for the proof
 
 
 class Ending(StrEnum):
     """How a piece of work ended."""
 
     DONE = "done"
-    UNLIKE = "unlike"  # the worker drives another golden run than the campaign's
-    UNFIT = "unfit"  # it has no more room, memory, files or processes, or lacks what the target needs
-    DIED = "died"  # the process that runs pieces ended in the middle of it
+    UNLIKE = "unlike"  # the worker's golden run differs from the campaign's
+    UNFIT = "unfit"  # it lacks room, memory, files, processes, or something that the target needs
+    DIED = "died"  # the process that runs pieces ended during it
     FAILED = "failed"  # by a defect of the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """Experiments that one worker is to run, most of them with the golden run `golden`.
+    """Experiments for one worker, most of them with the golden run `golden`.
 
-    `lines` are those of the plan, by experiment id, in the plan's order; `faults` the lines of their faults.
-    A run that several experiments share is whole in one piece.
+    `lines` are those of the plan, by experiment id, in plan order; `faults` the lines of their faults. A
+    shared run stays in one piece.
     """
 
     number: int
@@ -41,22 +41,22 @@ class Piece:
     golden: str
     lines: Mapping[str, bytes]
     faults: tuple[bytes, ...]
-    runs: int = 1  # that its experiments are: several may share one
-    died_at: tuple[str, ...] = ()  # workers that it took down
+    runs: int = 1  # of its experiments: several may share one
+    died_at: tuple[str, ...] = ()  # workers that it killed
 
     @property
     def ids(self) -> tuple[str, ...]:
         return tuple(self.lines)
 
     def packed(self) -> bytes:
-        """What travels to the worker."""
+        """The bytes for the worker."""
         head = {"number": self.number, "kind": self.kind, "golden": self.golden, "ids": self.ids}
         parts = {"head": json.dumps(head).encode(), "plan": b"\n".join(self.lines.values())}
         return pack(parts | {"faults": b"\n".join(self.faults)})
 
     @classmethod
     def of(cls, data: bytes) -> "Piece":
-        """A piece that has arrived; MutatorError where it is damaged."""
+        """Unpack a piece; MutatorError if damaged."""
         parts = unpack(data)
         head = json.loads(parts["head"])
         return cls(
@@ -68,17 +68,17 @@ class Piece:
         )
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """Its experiments; MutatorError for a line that is not what its id stands for."""
+        """Its experiments; MutatorError for a line that does not match its id."""
         faults = {fault.id: fault for fault in (plan_file.fault_from(json.loads(f)) for f in self.faults)}
         return tuple(plan_file.experiment_from(json.loads(line), faults) for line in self.lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """What came of a piece. `text` says why it is not done, and `at` which experiment was being run then.
+    """The result of a piece. `text` says why it is not done, and `at` which experiment was running.
 
-    `records` and `timings` are lines as files of the run folder have them, but for their checksums; `patches`
-    and `series` blocks, in the form of their files.
+    `records` and `timings` are lines of the run folder's files without checksums; `patches` and `series` are
+    blocks of its files.
     """
 
     number: int
@@ -86,24 +86,24 @@ class Result:
     text: str = ""
     at: str = ""
     seconds: float = 0.0
-    forked: bool = False  # whether a record is of an engine that a proof is needed for
+    forked: bool = False  # whether a record needs a proof
     records: tuple[bytes, ...] = ()
     timings: tuple[bytes, ...] = ()
     patches: bytes = b""
     series: bytes = b""
-    series_of: tuple[str, ...] = field(default=())  # golden runs that `series` are made with
+    series_of: tuple[str, ...] = field(default=())  # golden runs that `series` refer to
 
     _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 
     def packed(self) -> bytes:
-        """What travels to the command."""
+        """The bytes for the command."""
         head = {name: getattr(self, name) for name in self._HEAD}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
         return pack(parts | {"records": _joined(self.records), "timings": _joined(self.timings)})
 
     @classmethod
     def of(cls, data: bytes) -> "Result":
-        """A result that has arrived; MutatorError where it is damaged."""
+        """Unpack a result; MutatorError if damaged."""
         parts = unpack(data)
         head: dict[str, Any] = json.loads(parts["head"])
         return cls(

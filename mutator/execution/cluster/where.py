@@ -1,7 +1,7 @@
-"""`WHERE` of a run on a cluster: what is written there, and the Dask client that comes of it.
+"""`WHERE` of a run on a cluster, and the Dask client for it.
 
-`parse` is cheap and imports no Dask. What a person may write: the address of a scheduler, the file that it
-has written, `local:N`, or a cluster file, which says what to start.
+`parse` is fast and does not import Dask. Users write the address of a scheduler, the file that it wrote,
+`local:N`, or a cluster file that says what to start.
 """
 
 import json
@@ -32,18 +32,17 @@ _LOCAL = re.compile(r"local:(\d{1,4})")
 
 
 class Where(Protocol):
-    """A cluster that can be used. `open` gives an asynchronous Dask client, in a running event loop.
+    """A usable cluster. `open` returns an asynchronous Dask client, in a running event loop.
 
-    What `open` has started ends with it; a scheduler that was there before stays. MutatorError when there is
-    no such cluster, when the extra is not installed, or, unless `insecure`, for a network on which others can
-    reach it.
+    What `open` starts ends with it; an existing scheduler stays. MutatorError if there is no such cluster,
+    the extra is not installed, or, unless `insecure`, others on the network can reach it.
     """
 
     def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
 
 
 def parse(text: str) -> Where:
-    """What `WHERE` means; MutatorError for what means nothing, and for a file that is not as it must be."""
+    """The meaning of `WHERE`; MutatorError for an invalid text or file."""
     if "://" in text:
         return Scheduler(address=checked_address(text))
     if match := _LOCAL.fullmatch(text):
@@ -86,7 +85,7 @@ def _scheduler_file(path: Path) -> "Scheduler":
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheduler:
-    """A scheduler that runs already; `file` is where its address was read."""
+    """A running scheduler; `file` is where its address was read."""
 
     address: str
     file: Path | None = None
@@ -106,7 +105,7 @@ class Scheduler:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Local:
-    """Worker processes of one thread each on this machine, with a scheduler of their own."""
+    """Worker processes of one thread each on this machine, with their own scheduler."""
 
     workers: int
 
