@@ -32,6 +32,9 @@ document.addEventListener("DOMContentLoaded", () => {
   for (const cell of document.querySelectorAll("td")) {
     cell.classList.toggle("long", cell.textContent.length > 60);
   }
+  // What scrolls can be reached with the keyboard, and captions of the sidebar have a level.
+  for (const scrolled of document.querySelectorAll("pre, .table-wrapper")) scrolled.tabIndex = 0;
+  for (const caption of document.querySelectorAll(".caption[role=heading]")) caption.ariaLevel = "2";
   for (const block of document.querySelectorAll("div.highlight")) {
     const button = block.appendChild(document.createElement("button"));
     button.type = "button";

@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +86,18 @@ def test_the_first_page_is_the_front_page(site: Path, visited: Any) -> None:
     listed = set(visited.eval_on_selector_all(".sidebar-tree a", links))
     made_by_sphinx = {site / f"{name}.html" for name in ("docs/README", "genindex", "index", "search")}
     assert listed == {str(page) for page in {*site.rglob("*.html")} - made_by_sphinx}
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("page", ["README", "docs/README", "docs/reference/api", "docs/tutorial/first-fault"])
+def test_pages_are_accessible(
+    site: Path, browser: Any, page: str, scheme: str, serious_faults: Callable[[Any], list[str]]
+) -> None:
+    """axe-core finds nothing serious in pages of each kind, light and dark."""
+    shown = browser.new_page(color_scheme=scheme, reduced_motion="reduce")
+    shown.goto((site / f"{page}.html").as_uri())
+    assert serious_faults(shown) == []
+    shown.close()
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
