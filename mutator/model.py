@@ -137,11 +137,7 @@ class Injection:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger:
-    """When a fault is active.
-
-    `condition` is a validated expression over time `t` and the observed values. It can fire from
-    `armed_after_s` on. A random time is the condition `t >= T` with hold `to_end`.
-    """
+    """When a fault is active. A random time is the condition `t >= T` with hold `to_end`."""
 
     name: str  #: name of the trigger: a context, `always`, a time
     condition: str  #: expression over time `t` and what the target observes
@@ -164,9 +160,7 @@ def fault_label(spec: str, value: Value, unit: str) -> str:
 class Fault:
     """One fault with its value drawn: what is injected, where, and what it aims at.
 
-    `value` and `unit` are as in the spec, for tables. `injections` have numbers in the unit of the variable
-    they change. `hold` overrides the trigger's if the fault latches by nature. `changes` are the changes of
-    the scenario that belong to the fault (`alone`).
+    `hold` overrides the trigger's if the fault latches by nature.
     """
 
     spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
@@ -199,10 +193,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Experiment:
-    """One run: a fault, in a scenario, under a trigger, with a seed.
-
-    `setting` names scenario changes that a campaign makes for all its experiments.
-    """
+    """One run: a fault, in a scenario, under a trigger, with a seed."""
 
     fault: Fault  #: what is injected
     scenario: str  #: name of the scenario
@@ -270,10 +261,9 @@ class Activation:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunError:
-    """An exception that ended a run: type, text, and innermost target line as `file:line` in the tree that
-    ran.
+    """An exception that ended a run.
 
-    The line is empty if the exception passed none.
+    `place` is the innermost target line, `file:line` in the tree that ran; empty if it passed none.
     """
 
     kind: str
@@ -283,15 +273,7 @@ class RunError:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Record:
-    """Everything that is stored for one experiment. Times are seconds of simulation; None: did not happen.
-
-    * `error`: the exception that ended the run, whatever its cause
-    * `hazards`, `alerts`: (name, first time) pairs sorted by time, from the activation on
-    * `max_dev`, `t_manifest`: refer to the manifest's compared channels
-    * `t_end`: when a terminal hazard ended the drive; `dev`: `max_dev` up to then (empty if nothing ended it)
-    * `metrics`: the manifest's metrics and the margins of its hazards that have a value
-    * `left`: name, first time and largest deviation of each channel that left golden's tolerance in the drive
-    """
+    """Everything that is stored for one experiment. Times are seconds of simulation; None: did not happen."""
 
     experiment_id: str  #: id of the experiment
     status: Status  #: whether the experiment itself worked

@@ -146,7 +146,6 @@ class ScratchFolder:
 
 
 def _opened(name: str, parent: int | None = None) -> int:
-    """Open a folder, after unlocking it."""
     with suppress(OSError):
         os.chmod(name, stat.S_IRWXU, dir_fd=parent)
     return os.open(name, _FOLDER, dir_fd=parent)

@@ -1,9 +1,7 @@
 """The shipped controller, fault library and templates.
 
-In a clone they are folders next to the package. A wheel carries them as one archive: pip compiles every .py
-file that it installs, a target's sources must have no bytecode next to them, and `selfdrive` must not become
-importable. The archive is unpacked once into $XDG_DATA_HOME or ~/.local/share. Runs read it all the time, so
-it is not part of the cache.
+In a clone they are folders next to the package. A wheel carries them as an archive, since pip would compile a
+target's sources and make `selfdrive` importable. It is unpacked once into $XDG_DATA_HOME or ~/.local/share.
 """
 
 import os

@@ -46,10 +46,7 @@ _IN_MEMORY = 50_000  # the largest plan that is read as a whole
 class Choices:
     """Options on top of the campaign file; None: as in the file.
 
-    * `only`, `exclude`: filters (`mutator.campaigns.filters`) over the columns known before running
-    * `limit`: how many experiments are kept, spread like a campaign's `sample`, but in pairs
-    * `shard` (`k/n`): the share of the plan that the run folder runs
-    * `series_mb`: the budget of its series, 0 for none
+    Filters (`mutator.campaigns.filters`) use the columns known before running.
     """
 
     seed: int | None = None  #: seed of the sample, of drawn values and of random triggers
@@ -87,11 +84,7 @@ class Cost:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Plan:
-    """Experiments in run order, and the lengths of their chunks.
-
-    `runs` is the number of runs; scenarios may share one. `run_cpu_s` is the measured CPU time of one run, if
-    known.
-    """
+    """Experiments in run order, cut into chunks."""
 
     campaign: Campaign  #: the campaign file, read
     choices: Choices  #: what overrides the file
@@ -236,7 +229,6 @@ class Planning:
         idle.warn()
 
     def _part(self, seed: int, most: int | None) -> Part:
-        """The experiments of a seed, at most `most`."""
         found = self._expansion.with_seed(seed).experiments()
         once = in_turn(runs(self._manifest, _choose(found, self.campaign, self.choices, seed, most)))
         return Part(
@@ -256,7 +248,6 @@ class Planning:
 
 
 def _seeds(campaign: Campaign, choices: Choices) -> range:
-    """The seeds of the campaign, or the chosen one."""
     return campaign.seeds if choices.seed is None else range(choices.seed, choices.seed + 1)
 
 

@@ -57,7 +57,6 @@ class BaseTree:
         whole.replace(path)
 
     def _look(self) -> dict[Path, _Stamp]:
-        """What changes when a file is written to."""
         states = {path: path.stat() for path in self._files}
         return {path: (s.st_mode, s.st_mtime_ns, s.st_size, s.st_ino) for path, s in states.items()}
 

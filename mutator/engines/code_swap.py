@@ -1,10 +1,8 @@
 """Find the functions of a loaded program that a mutant changes, and whether their code can be swapped.
 
-A mutant's files differ from the pristine ones only by inserted lines. Outside functions these are the import
-of the probe and lines that tell it which constants and defaults to set. Between two steps of a run no
-function of the target is active, so the code of changed functions can be swapped in place. Methods, closures
-and names imported elsewhere then use the new code. Until its trigger first holds, such a program acts like
-the pristine one: the probe guards every inserted statement, and no mutant changes what a name means.
+Between two steps of a run no function of the target is active, so code can be swapped in place. Until its
+trigger first holds, such a program acts like the pristine one: the probe guards every inserted statement, and
+no mutant changes what a name means.
 """
 
 import re

@@ -1,9 +1,8 @@
 """The fork engine: a mutant is a fork of its golden run, made right before its fault is first active.
 
-The results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be put
-into a loaded program, and repeats failed runs, so that messages are its own. `warm` forks before the first
-step of every run; so does this engine for runs that end at a terminal hazard that is also in their golden
-run.
+Results equal the reference engine's byte for byte; that engine runs mutants that cannot be forked, and
+repeats failed runs. `warm` forks before the first step, as this does for runs that end at a terminal hazard
+of golden.
 """
 
 import marshal

@@ -213,6 +213,5 @@ class Pool:
 
 
 def _why(failed: dict[str, Any]) -> str:
-    """Describe what failed in a process of the server."""
     raised = raised_in(failed)
     return raised.text if raised else ""

@@ -36,7 +36,6 @@ class LocalWorkers:
 
 @contextmanager
 def _without(*names: str) -> Iterator[None]:
-    """Hide these environment variables, also from the workers."""
     kept = {name: os.environ.pop(name) for name in names if name in os.environ}
     try:
         yield

@@ -226,7 +226,6 @@ def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str,
 
 
 def _copy_patches(folder: RunFolder, out: Path) -> None:
-    """Copy the patches that the records name."""
     assert folder.shard is not None
     writer = PatchWriter(out, f"0001-shard{folder.shard.number}")
     for record in endings(folder.records()):

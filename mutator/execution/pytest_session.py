@@ -249,7 +249,6 @@ class Controller:
             self._worker.close()
 
     def _note(self, problem: str) -> None:
-        """Keep the first problem of the session."""
         if self.begun and problem and not self.begun.problem and not self.begun.interrupted:
             self.begun.problem = problem
 
@@ -351,7 +350,6 @@ def _told(config: pytest.Config) -> Notify | None:
 
 
 def _lines(summary: Summary) -> list[str]:
-    """The summary of a campaign for a terminal."""
     lines = [
         f"{summary.done} of {summary.planned} experiments done, {summary.ran} now",
         ", ".join(f"{name} {count}" for name, count in sorted(summary.outcomes.items())),

@@ -189,7 +189,6 @@ class Runner:
         )
 
     def _raising(self, experiment: Experiment, built: Mutant) -> set[str]:
-        """The injections that raise on purpose."""
         models = [self.models.get(injection.model) for injection in experiment.fault.injections]
         return {name for name, model in zip(built.injections, models, strict=True) if model.raises}
 
@@ -245,7 +244,6 @@ class Runner:
         )
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
-        """The record of a run that failed."""
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
         # a time-out's count depends on the machine's speed, a crash's does not
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
@@ -273,7 +271,6 @@ def _bare(
     built: Mutant | None,
     activation: Activation | None = None,
 ) -> Record:
-    """The record of an experiment without an outcome."""
     bare = without_outcome(experiment.id, status, detail)
     if built is not None:
         bare = replace(bare, tree=built.tree_digest, patch=digest(built.patch_bytes))

@@ -218,7 +218,6 @@ class Session:
         )
 
     def _finish_again(self, known: Ended) -> Summary:
-        """Like `finish`, for a run that was finished before."""
         built = None
         with self._noting_full_disk():
             built = results.ensure(self.folder.path)

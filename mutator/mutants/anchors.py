@@ -1,8 +1,7 @@
 """Anchors: resolve a qualified function name and a statement to lines of a source file.
 
-LibCST parses each file once. For each function, the statements that assign, call or return are kept with
-their lines. A location resolves to exactly one that `ast` sees in the same place, or to an error that lists
-candidates.
+A location resolves to exactly one statement that LibCST and `ast` see in the same place, or to an error that
+lists candidates.
 """
 
 from collections.abc import Hashable, Mapping
@@ -284,7 +283,6 @@ def _what(verb: str, name: str) -> str:
 
 
 def _candidates(functions: tuple[Function, ...], verb: str) -> str:
-    """All statements of this kind, with their lines."""
     found = [
         f"'{name}' (line {s.first + 1})" if name else f"line {s.first + 1}"
         for f in functions

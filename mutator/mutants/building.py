@@ -148,7 +148,6 @@ def _probe(
 
 
 def _compile(data: bytes, where: Path) -> None:
-    """Raise InvalidMutant unless `data` compiles."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError) as error:

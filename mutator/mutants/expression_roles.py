@@ -117,7 +117,6 @@ def _base(node: ast.expr) -> _Pairs:
 
 
 def _of(node: ast.expr, *roles: Role) -> _Pairs:
-    """An expression, and those in it."""
     if isinstance(node, ast.JoinedStr):
         yield node, roles  # nested ones have positions only from Python 3.12 on
         return

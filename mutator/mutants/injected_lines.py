@@ -1,8 +1,6 @@
-"""The syntax of injected lines: their tags, their calls of the probe, and how to find them in files and
-patches.
+"""The syntax of injected lines: tags, calls of the probe, and how to find them in files and patches.
 
-All knowledge of this syntax is here; the probe is that of `mutants.probe`. Code inside a target's process
-cannot import this module, so engines pass it what it needs.
+Code inside a target's process cannot import this module, so engines pass it what it needs.
 """
 
 import ast

@@ -1,8 +1,7 @@
 """The probe's contract: the path of `_fi`, its template values, its operation and its report.
 
-Every mutant carries the probe, a module rendered from `templates/_fi.py.j2`; `mutants.injected_lines` has the
-calls of injected lines. Code inside a target's process cannot import this module, so engines pass it what it
-needs.
+Every mutant carries this module, rendered from `templates/_fi.py.j2`. Code inside a target's process cannot
+import the contract, so engines pass on what is needed.
 """
 
 import math

@@ -1,9 +1,8 @@
 """Reusable changes: a changed file without its inserted lines, to be filled with those of other mutants.
 
-Splicing, comparing and compiling a file of some hundred lines takes milliseconds, and many mutants of a
-campaign insert the same lines at the same places, except for numbers and ids. The first is spliced and leaves
-a reusable change; the others fill it with their lines, which gives the same bytes. The number of reusable
-changes depends on the library, not on the number of mutants.
+Splicing and compiling a file takes milliseconds, and many mutants insert the same lines except for numbers
+and ids. Only the first is spliced. The number of reusable changes depends on the library, not on the number
+of mutants.
 """
 
 from collections.abc import Sequence

@@ -66,7 +66,6 @@ class Mutation:
 
 
 def _in_common(one: str, other: str) -> int:
-    """The length of the common prefix."""
     same = 0
     while same < min(len(one), len(other)) and one[same] == other[same]:
         same += 1

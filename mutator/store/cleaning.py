@@ -56,7 +56,6 @@ def finish_deletion(path: Path) -> bool:
 
 
 def _delete(path: Path, files: Iterable[Path]) -> None:
-    """Delete files below `path`, then every empty folder."""
     for file in files:
         file.unlink()
     for folder, _, _ in os.walk(path, topdown=False):

@@ -113,7 +113,6 @@ class Line:
 
 
 def _name(data: bytes) -> str | None:
-    """The experiment that a line names, or None."""
     if found := _ID.search(data):
         return found[1].decode()
     try:

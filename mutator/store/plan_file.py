@@ -105,7 +105,6 @@ def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> I
 
 
 def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T]:
-    """Like `_tried`, but raise problems."""
     for found in _tried(path, lines, made):
         if isinstance(found, MutatorError):
             raise found

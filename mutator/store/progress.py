@@ -11,11 +11,7 @@ from mutator.model import Status
 
 @dataclass(kw_only=True)
 class Progress:
-    """The progress of a run. `outcomes` counts outcomes of ok experiments and other statuses by name.
-
-    Stages in order: `plan`, `checks`, `golden` (golden runs), `experiments`, `proof`, `tables`, `pictures`,
-    `report`. Rate and remaining time are those of the stage; `total` is 0 if nothing is counted.
-    """
+    """The progress of a run in its current stage."""
 
     stage: str  #: `plan`, `checks`, `golden`, `experiments`, `proof`, `tables`, `pictures` or `report`
     detail: str = ""  #: what the stage is working on

@@ -86,7 +86,6 @@ def read_head(run: Path) -> Head:
 
 
 def _wrong(head: Head) -> Iterator[str]:
-    """Yield keys with invalid values."""
     yield from (key for key, shape in _SHAPES.items() if key in head and not _fits(head[key], shape))
     known = {field.name for field in fields(Limits)}
     if not head.get("limits", {}).keys() <= known:

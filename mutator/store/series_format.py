@@ -145,7 +145,6 @@ def _words(numbers: np.ndarray) -> np.ndarray:
 
 
 def _numbers(words: np.ndarray) -> np.ndarray:
-    """The inverse of `_words`."""
     steps = (words >> 1).view("<i4") ^ -(words & 1).view("<i4")
     numbers: np.ndarray = steps.cumsum(dtype="<i4").cumsum(dtype="<i4")
     return numbers

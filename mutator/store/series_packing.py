@@ -1,7 +1,6 @@
-"""Pack what workers appended into the chunks of a run's series, under a budget.
+"""Pack what workers appended into the chunks of a run's series, the best by worth as far as the budget goes.
 
-The same experiments with the same worth result in the same files, whatever the workers and order: old and new
-content is packed together, the best by worth as far as the budget goes.
+The same experiments with the same worth result in the same files, whatever the workers and order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -133,7 +132,6 @@ def pack_again(run: Path, index: Index) -> None:
 
 
 def _remove_others(run: Path, index: Index) -> None:
-    """Remove chunks that the index no longer names."""
     known = {name for name, _ in index.chunks} | {INDEX}
     for path in (run / FOLDER).glob("*.js"):
         if path.stem not in known:
@@ -243,7 +241,6 @@ def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
 
 
 def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
-    """Entries by digest, in order of first appearance."""
     found: dict[str, _Entry] = {}
     for entry in entries:
         found.setdefault(entry.digest, entry)

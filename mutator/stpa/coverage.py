@@ -1,9 +1,8 @@
 """Prove that the conditions of a context table cover everything exactly once.
 
-If every condition compares one variable with a constant, the constants cut each variable's line into points
-and open intervals. Conditions are constant within such a cell, so testing one place per cell, including the
-outermost, is a proof. Variables count as independent even if some are derived from others: a table that
-passes is complete; one that is complete only because of such a dependence fails.
+The constants in conditions cut each variable's line into points and open intervals. Conditions are constant
+within such a cell, so testing one place per cell is a proof. Variables count as independent: a table that is
+complete only because one variable depends on another fails.
 """
 
 import ast
@@ -63,7 +62,6 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
 
 
 def _cuts(conditions: Iterable[str]) -> dict[str, set[float]]:
-    """The constants that each variable is compared with."""
     found: dict[str, set[float]] = {}
     for condition in conditions:
         for node in ast.walk(ast.parse(condition, mode="eval")):

@@ -1,8 +1,7 @@
 """Lay out a control structure: rows of boxes, channels with one track per arrow.
 
-Lengths are in px, y points down. Boxes stand in the grid of the file. Arrows leave and enter a box at ports
-on its edges. An arrow that cannot go straight up or down gets its own track in a channel between two rows;
-one that would cross a box takes the left margin.
+Lengths are in px, y points down. An arrow that cannot go straight up or down gets its own track between two
+rows; one that would cross a box takes the left margin.
 """
 
 from collections import defaultdict

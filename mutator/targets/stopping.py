@@ -45,7 +45,6 @@ def stop_source(manifest: TargetManifest) -> str:
 
 
 def _condition(manifest: TargetManifest, hazard: Hazard) -> str:
-    """The condition under which a hazard ends the drive."""
     own = hazard.terminal != "True"
     text = hazard.terminal if own else hazard.when
     keys = ("hazards", hazard.name)

@@ -48,7 +48,6 @@ def _tree(node: ast.expr, derived: Mapping[str, str]) -> Tree:
 
 
 def _application(node: ast.expr) -> tuple[str, list[ast.expr]]:
-    """The operator of a node, and its operands."""
     if isinstance(node, ast.BoolOp):
         return _OPERATORS[type(node.op)], node.values
     if isinstance(node, ast.UnaryOp):

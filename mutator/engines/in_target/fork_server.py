@@ -1,10 +1,9 @@
 """A loaded target that forks: `python -P -s fork_server.py SOCKET START.marshal`. Standard library only.
 
-Each process of the server waits at a step boundary of a golden run (the first one before any run), and
-answers on its own socket. On request it forks a child that continues as a mutant, or a process that waits
-some steps later. Messages are marshalled dicts, each after its length. A process forks only while it has one
-thread. It ends when the other end of its socket is closed. All are guarded (see guard.py), and end with the
-first one or its socket.
+Each process waits at a step boundary of a golden run (the first one before any run) and answers on its own
+socket in marshalled dicts, each after its length. On request it forks a mutant, or a process that waits some
+steps later, while it has one thread. It ends when the other end of its socket is closed, or with the first
+process (guard.py).
 """
 
 import array

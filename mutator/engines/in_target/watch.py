@@ -1,9 +1,8 @@
 """Note lines of a tree that read a clock, draw without a seed or start a thread. Standard library and numpy
 only.
 
-It is for runs that look for causes of nondeterminism; their results do not count. Watched functions are
-replaced before the target imports them. The innermost line of the tree on the stack is noted, even behind a
-library, which is then named. Calls by a library during its import are ignored.
+Watched functions are replaced before the target imports them, so results of such runs do not count. The
+innermost line of the tree on the stack is noted, even behind a library, except while that is imported.
 """
 
 import builtins

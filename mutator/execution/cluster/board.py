@@ -170,7 +170,6 @@ class Board:
         return sum(group.waiting for group in self._groups.values())
 
     def _mean_s(self, kind: Kind) -> float:
-        """The mean duration of a run."""
         return self._seconds[kind] / self._done[kind] if self._done[kind] else _GUESS_S
 
     def _cut(self, worker: str) -> Piece | None:
@@ -188,7 +187,6 @@ class Board:
         return self._piece(Kind.RUN, group.golden, lines, runs=len(runs))
 
     def _runs(self) -> int:
-        """The number of runs in the next piece."""
         if not self._done[Kind.RUN]:
             return _FIRST
         mean_s = self._mean_s(Kind.RUN)
@@ -227,7 +225,6 @@ class Board:
         return None
 
     def _late_for(self, worker: str) -> Piece | None:
-        """A late piece of another worker."""
         now = self._now()
         late = [
             (now - out.since - out.expected_s, out.piece)

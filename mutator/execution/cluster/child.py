@@ -161,7 +161,6 @@ def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
 
 
 def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> Result:
-    """The result of a piece, however it ends."""
     try:
         with raising_disk_full(runner.place):
             return runner.run(piece, tell)
@@ -175,7 +174,6 @@ def _result(runner: PieceRunner, piece: Piece, tell: Callable[[str], None]) -> R
 
 
 def _serve(connection: Connection, runner: PieceRunner) -> None:
-    """Run pieces until the host closes the connection."""
     try:
         with suppress(EOFError):
             while True:

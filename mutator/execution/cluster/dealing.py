@@ -227,7 +227,6 @@ class Deal:
             raise found.exceptions[0] from None
 
     async def _serve(self, one: _Tended) -> None:
-        """Give a worker one piece after another."""
         while True:
             if one.failures >= _FAILURES:
                 raise Refused(one.ailment)
@@ -241,7 +240,6 @@ class Deal:
             await self._take(one, piece, _read(data, piece))
 
     async def _take(self, one: _Tended, piece: Piece, result: Result) -> None:
-        """Handle the result of a piece."""
         if result.ending is Ending.DONE:
             one.failures = 0
             if self._board.done(piece, one.name, result.seconds):

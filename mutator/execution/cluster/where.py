@@ -67,7 +67,6 @@ def _counted(workers: int) -> int:
 
 
 def _scheduler_file(path: Path) -> "Scheduler":
-    """The scheduler that wrote this file (`dask scheduler --scheduler-file`)."""
     remedy = "give the file that `dask scheduler --scheduler-file FILE` has written"
     try:
         content = json.loads(no_pipe(path).read_bytes())
