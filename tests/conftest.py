@@ -72,7 +72,7 @@ variants:
 """
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
-    # a shell starts what it puts into the background deaf to Ctrl-C, and so would be the commands under test
+    # A shell starts background commands with Ctrl-C ignored; the commands under test would inherit that.
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
@@ -83,7 +83,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """What tests have to tell, wherever they ran."""
+    """Report what tests have recorded, in whichever process they ran."""
     reports = [*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")]
     told = [text for report in reports for name, text in report.user_properties if name == "tally"]
     for text in told:
@@ -92,14 +92,16 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """What fixtures of modules and sessions cache is not the user's. What matplotlib knows of fonts is kept
-    for all tests, and so is bytecode: each command would look for them, or compile the harness, anew."""
+    """Keep the caches of module and session fixtures apart from the user's.
+
+    All tests share matplotlib's font cache and the bytecode: otherwise each command would build them again.
+    """
     folder = tmp_path_factory.mktemp("caches")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MPLCONFIGDIR", str(folder / "matplotlib"))
         patch.setenv("XDG_CACHE_HOME", str(folder))
         patch.delenv("PYTHONDONTWRITEBYTECODE", raising=False)
-        patch.setenv("COLUMNS", "1000")  # so that no sentence that a test looks for is folded
+        patch.setenv("COLUMNS", "1000")  # keep the sentences that tests look for on one line
         yield folder
 
 
@@ -107,7 +109,7 @@ def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 def _cache(
     tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch, _caches: Path
 ) -> Iterator[Path]:
-    """A test finds nothing that an earlier one cached, and leaves nothing: pictures take 184 MB."""
+    """Give each test an empty cache, and delete it afterwards: frames take 184 MB."""
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     yield folder
@@ -116,8 +118,9 @@ def _cache(
 
 @pytest.fixture
 def kept_checks(_cache: Path, _caches: Path) -> None:
-    """Checks that passed in an earlier test of these very sources are known, as on anyone's machine: they
-    take as long as a small campaign."""
+    """Reuse checks that passed in an earlier test of the same sources: they take as long as a small
+    campaign.
+    """
     kept = _caches / "mutator" / "checks"
     kept.mkdir(parents=True, exist_ok=True)
     (_cache / "mutator").mkdir()
@@ -126,7 +129,7 @@ def kept_checks(_cache: Path, _caches: Path) -> None:
 
 @pytest.fixture
 def toy(toycar: Workspace) -> Workspace:
-    """The toy of every kind of test but the unit tests of specs and mutants, which have one of their own."""
+    """The toy target, for all tests except the unit tests of specs and mutants."""
     return toycar
 
 
@@ -138,7 +141,7 @@ def toycar(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Workspac
 
 @pytest.fixture(scope="session")
 def copy_toycar() -> Callable[[Path], Workspace]:
-    """Puts such a copy into a folder."""
+    """Copy the toy car's library and tree into a folder."""
 
     def copy(folder: Path) -> Workspace:
         root = folder / "toy"
@@ -152,7 +155,7 @@ def copy_toycar() -> Callable[[Path], Workspace]:
 
 @pytest.fixture(scope="session")
 def give_eyes() -> Callable[..., None]:
-    """Lets the car of a copied toy see a picture, and gives its library an image effect, `sensor/light`."""
+    """Let the car of a copied toy see a frame, and add the image effect `sensor/light` to its library."""
 
     def give(
         toycar: Workspace,
@@ -185,7 +188,7 @@ def pole(tmp_path: Path) -> Workspace:
 
 @pytest.fixture
 def experiment() -> Callable[..., Experiment]:
-    """Makes an experiment that differs from the others made in what is given."""
+    """Build an experiment with the given fields; the rest are defaults."""
 
     def make(
         value: float = 1.0,
@@ -226,7 +229,9 @@ def experiment() -> Callable[..., Experiment]:
 
 @pytest.fixture(scope="session")
 def record() -> Callable[..., Record]:
-    """Makes a record of an experiment that went well and whose fault was masked, but for what is given."""
+    """Build the record of a successful experiment with a masked fault; the given fields replace the
+    defaults.
+    """
 
     def make(experiment_id: str = "e" * 16, **given: Any) -> Record:
         fields: dict[str, Any] = {
@@ -249,7 +254,7 @@ def record() -> Callable[..., Record]:
 
 @pytest.fixture(scope="session")
 def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
-    """Gives experiments of a run folder other patches, or none."""
+    """Replace or remove the patches of experiments in a run folder."""
 
     def put(run: Path, given: Mapping[str, bytes | None]) -> None:
         found = Patches(run)
@@ -262,7 +267,7 @@ def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
 
 @pytest.fixture(scope="session")
 def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
-    """Makes a run folder whose records are made up: nothing is driven."""
+    """Create a run folder with made-up records, without running anything."""
 
     def write(
         workspace: Workspace,
@@ -272,8 +277,10 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         changed: Callable[[Plan], Plan] = lambda plan: plan,
         **choices: Any,
     ) -> Path:
-        """`became` says what a record has of its own; None: the experiment was not run. `changed` makes
-        another plan of that of the campaign."""
+        """`became` holds each record's own fields; None means the experiment was not run.
+
+        `changed` alters the campaign's plan.
+        """
         plan = changed(make_plan(workspace, campaign, Choices(**choices)))
         freeze(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
@@ -291,8 +298,9 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Makes a plan one of operators' mutants: each operation of a file with its sign changed, in the drives
-    of the plan's first experiments (the second of them with a permanent fault)."""
+    """Turn a plan into one of operators' mutants: each operation of a file with its sign changed, in the
+    drives of the plan's first experiments (the second of them with a permanent fault).
+    """
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
         def changed(plan: Plan) -> Plan:
@@ -311,7 +319,7 @@ def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
 
 
 def operator_faults(file: ParsedFile) -> Iterator[Fault]:
-    """A mutant for each operation with two sides."""
+    """A mutant for each binary operation."""
     for function, known in file.expressions.items():
         seen: list[str] = []
         for expression in known:
@@ -334,7 +342,7 @@ def operator_faults(file: ParsedFile) -> Iterator[Fault]:
 
 @pytest.fixture(scope="session")
 def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
-    """Makes a finished run folder whose records, patches, checks, golden runs and proof are made up."""
+    """Create a finished run folder with made-up records, patches, checks, golden runs and proof."""
 
     def write(workspace: Workspace, out: Path, **given: Any) -> Path:
         patch = b"diff --git a/a.py b/a.py\n"
@@ -368,8 +376,9 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def reseal() -> Callable[..., None]:
-    """Computes every checksum and digest of a run folder anew: who changed a file, and is that careful, is
-    found by nothing that the folder itself tells."""
+    """Recompute every checksum and digest of a run folder, as a careful forger would; the folder itself then
+    shows no trace.
+    """
 
     def compute(run: Path, finished: bool | None = None) -> None:
         for path in (file for kind in ("records", "timings", "proof") for file in (run / kind).glob("*")):

@@ -1,4 +1,4 @@
-"""The command line in this process, on a copy of the toy target and its library."""
+"""The command line, run in this process on a copy of the toy target and its library."""
 
 import json
 import shutil
@@ -17,7 +17,7 @@ TOY = Path(__file__).parents[1] / "toy"
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command line printed, and its exit code."""
+    """The output and exit code of a command."""
 
     code: int
     out: str
@@ -33,7 +33,7 @@ Cli = Callable[..., Answer]
 
 @pytest.fixture
 def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Runs `mutator WORDS...` and gives its answer."""
+    """Run `mutator WORDS...` and return its answer."""
 
     def run(*words: object) -> Answer:
         capfd.readouterr()
@@ -46,8 +46,10 @@ def cli(capfd: pytest.CaptureFixture[str]) -> Cli:
 
 @pytest.fixture
 def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept_checks: None) -> Path:
-    """The toy's root, named by the environment, without what is broken on purpose; one works elsewhere, and
-    its checks are known."""
+    """The toy's root, set in the environment, without the deliberately broken parts.
+
+    The current folder is elsewhere, and the checks are cached.
+    """
     root = toy.library.parent
     shutil.rmtree(toy.library / "faults" / "hostile")
     for template in (TOY / "templates").iterdir():
@@ -61,7 +63,7 @@ def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept_c
 
 @pytest.fixture
 def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder as the current one, and no environment that names a library."""
+    """An empty current folder, with no library in the environment."""
     for name in ("ROOT", "LIBRARY", "TEMPLATES", "TARGET"):
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Mistakes in specs, templates and run folders, as the command line answers them."""
+"""How the command line answers mistakes in specs, templates and run folders."""
 
 import json
 import re
@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 SPEC = """\
 schema: fault_spec/1
@@ -32,14 +32,14 @@ variants:
 
 @pytest.fixture
 def own(root: Path) -> Path:
-    """A spec of one's own that is well."""
+    """A valid spec of the user."""
     own = Path("own.yaml")
     own.write_text(SPEC)
     return own
 
 
 def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
-    """What the other tests break works before it is broken."""
+    """The spec that the other tests break is valid."""
     assert cli("diff", own).code == 0
 
 
@@ -50,10 +50,10 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
         ("toycar/sensing.py, function: Sensor.sense, after_assign: gap",
          "toycar/driver.py, function: Driver.drive, after_assign: wanted", 13, "nth"),  # ambiguous anchor
         ("toycar/sensing.py", "../../outside.py", 13, "outside"),  # beyond the target's root
-        ("toycar/sensing.py", "toycar/world.py", 13, "toycar/world.py"),  # a forbidden place
+        ("toycar/sensing.py", "toycar/world.py", 13, "toycar/world.py"),  # a forbidden location
         ("by_m: error", "by_kph: error", 16, "by_m"),  # a unit of another dimension
         ("error_m: {values", "error_s: {values", 16, "by_m"),  # a draw of another dimension
-        ("by_m: error", "by_m: far", 16, "error"),  # no number
+        ("by_m: error", "by_m: far", 16, "error"),  # not a number
         ("model: offset", "model: ofset", 14, "offset"),  # unknown model
         ("aim: H1", "aim: H2", 7, "TOO_FAST"),  # a hazard that the target does not have
         ("aim: H1", "aims: H1", 7, "aim"),  # unknown key
@@ -66,7 +66,7 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
 def test_a_mistake_in_a_spec_is_told_with_its_place(
     cli: Cli, own: Path, right: str, wrong: str, line: int, said: str
 ) -> None:
-    """File and line, what was got, what to do; exit code 2 and no traceback."""
+    """The error gives file, line, finding and remedy; exit code 2, no traceback."""
     assert right in SPEC
     own.write_text(SPEC.replace(right, wrong))
     answer = cli("diff", own)
@@ -77,7 +77,7 @@ def test_a_mistake_in_a_spec_is_told_with_its_place(
 
 
 def test_a_value_out_of_its_range_is_refused(cli: Cli, own: Path) -> None:
-    """A parameter beyond what its model allows is told with the range."""
+    """A parameter outside its model's range is refused, and the error shows the range."""
     flip = SPEC.replace("model: offset", "model: bit_flip").replace("          unit: m\n", "")
     own.write_text(flip.replace("by_m: error", "bit: 64"))
     answer = cli("diff", own)
@@ -87,7 +87,7 @@ def test_a_value_out_of_its_range_is_refused(cli: Cli, own: Path) -> None:
 
 
 def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Path, root: Path) -> None:
-    """A mistake in a template is told with the template's file and line, wherever it is used."""
+    """A mistake in a template is reported with the template's file and line, whichever spec uses it."""
     template = root / "templates" / "offset.py.j2"
     template.write_text(template.read_text() + "{% if %}\n")
     for words in (["diff", own], ["check"]):
@@ -98,7 +98,7 @@ def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Pa
 
 
 def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path, root: Path) -> None:
-    """`try` says what does not compile, drives nothing, and exits with 2."""
+    """`try` says what does not compile, runs nothing, and exits with 2."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
     answer = cli("try", own, "-s", "A")
@@ -122,7 +122,7 @@ def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path
 def test_a_mistake_on_the_command_line_is_told(
     cli: Cli, own: Path, root: Path, words: list[str], said: str
 ) -> None:
-    """A time, context, seed or folder that cannot be meant is told in words, with exit code 2."""
+    """An impossible time, context, seed or folder gets a clear error and exit code 2."""
     contexts = root / "fault_library" / "stpa" / "contexts"
     other = (contexts / "near_far.yaml").read_text().replace("name: near_far", "name: other")
     (contexts / "other.yaml").write_text(other)
@@ -134,7 +134,7 @@ def test_a_mistake_on_the_command_line_is_told(
 
 
 def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) -> None:
-    """An exception in injected code makes an invalid mutant: its line is shown, and the command is fine."""
+    """An exception in injected code makes the mutant invalid: its line is shown, and the command succeeds."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
     answer = cli("try", own, "-s", "A")
@@ -147,7 +147,7 @@ def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) 
 
 
 def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> None:
-    """Every verb that reads a run folder refuses one that a newer version wrote."""
+    """Every verb that reads a run folder refuses one written by a newer version."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     head = Path("runs/p/run.json")
     data = json.loads(head.read_text())
@@ -178,7 +178,7 @@ def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> N
 def test_the_command_line_names_its_options(
     cli: Cli, own: Path, root: Path, words: list[str], said: str
 ) -> None:
-    """Where the API names an argument, the command line names the option that stands for it."""
+    """Where the API names an argument, the command line names the matching option."""
     answer = cli(*words)
     assert answer.code == 2, answer.err
     assert said in answer.err
@@ -186,7 +186,7 @@ def test_the_command_line_names_its_options(
 
 
 def test_two_targets_are_told_apart_by_an_option(cli: Cli, own: Path, root: Path) -> None:
-    """The argument `target` is the option --manifest, since --target is the controller's source."""
+    """The API's argument `target` becomes --manifest, since --target is the controller's source."""
     targets = root / "fault_library" / "targets"
     (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
     answer = cli("diff", "own.yaml")

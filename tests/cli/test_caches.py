@@ -8,7 +8,7 @@ import pytest
 
 from mutator._common import caches
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 pytestmark = pytest.mark.usefixtures("nowhere")
 
@@ -24,7 +24,9 @@ def filled() -> Path:
 
 
 def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
-    """What, how many, how much, and where; the same as JSON; a library is not needed."""
+    """The list shows what is cached, how many files, their size and location; JSON holds the same; no library
+    is needed.
+    """
     answer = cli("cache")
     assert answer.code == 0, answer.err
     assert [line.split() for line in answer.out.splitlines()[:3]] == [
@@ -40,7 +42,7 @@ def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
 
 
 def test_the_path_alone(cli: Cli) -> None:
-    """--path prints the folder, also one that is not there, for use in other commands."""
+    """--path prints the folder, even a missing one, for use in other commands."""
     assert cli("cache", "--path").out == f"{caches.folder()}\n"
 
 
@@ -49,7 +51,7 @@ def test_the_path_alone(cli: Cli) -> None:
     [(("--max", "25kB"), 2), (("--max", "0"), 0), (("--max", "2 GB"), 3), (("--clear",), 0)],
 )
 def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
-    """--max deletes down to a size, --clear everything, and both say how much that was."""
+    """--max deletes down to a size, --clear deletes everything; both report how much they deleted."""
     answer = cli("cache", *words, "--json")
     assert (answer.code, len(answer.json["kept"]), len(answer.json["deleted"])) == (0, left, 3 - left)
     assert len(list(filled.iterdir())) == left
@@ -68,7 +70,7 @@ def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, .
 def test_what_makes_no_sense_deletes_nothing(
     cli: Cli, filled: Path, words: tuple[str, ...], said: str
 ) -> None:
-    """A size that is none, and two wishes at once, are wrong input."""
+    """An invalid size, or two options at once, is wrong input and deletes nothing."""
     answer = cli("cache", *words)
     assert answer.code == 2 and said in answer.err
     assert len(list(filled.iterdir())) == 3

@@ -1,4 +1,7 @@
-"""What runs something: `plan`, `run`, `report`, `show`, `rerun`, `clean`, on the toy target."""
+"""The commands that run experiments or read runs:
+
+`plan`, `run`, `report`, `show`, `rerun`, `clean`, on the toy target.
+"""
 
 import json
 import os
@@ -21,15 +24,15 @@ from mutator.review import gate
 from mutator.store.run_folder import CONTENT
 from mutator.store.series import SeriesFolder, read_kept
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
-Reseal = Callable[..., None]  # computes every checksum and digest of a run folder anew
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
+Reseal = Callable[..., None]  # recomputes every checksum and digest of a run folder
 
 TESTS = Path(__file__).parents[1]
 CHOSEN = ["--only", 'fault_type != "distance"']  # some of them always do harm, whatever their ids
 
 
 def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
-    """A `mutator` of its own, as a user starts it."""
+    """A separate `mutator` process, as a user starts it."""
     command = [sys.executable, "-m", "mutator", *map(str, words)]
     environment = os.environ | {"MUTATOR_ROOT": str(root)}
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment, cwd=root)
@@ -37,7 +40,7 @@ def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A root with runs/first, a finished run of twelve experiments, and what the command said."""
+    """A root with runs/first, a finished run of twelve experiments, and the output of its command."""
     root = tmp_path_factory.mktemp("finished") / "toy"
     shutil.copytree(TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates", "hostile"))
     shutil.copytree(TESTS.parent / "templates", root / "templates")
@@ -48,7 +51,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess
 
 @pytest.fixture
 def run(finished: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The finished run's folder; one works in its root."""
+    """The finished run's folder; its root is the current folder."""
     root, _ = finished
     monkeypatch.chdir(root)
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
@@ -60,12 +63,12 @@ def results(run: Path) -> list[str]:
 
 
 def experiment_with(run: Path, word: str) -> str:
-    """Id of the first experiment in whose row `word` stands."""
+    """The id of the first experiment with `word` in its row."""
     return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
 
 
 def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """A plan is written with its table, expected time and disk, and the command that runs it."""
+    """`plan` writes the plan with its table, expected time and disk space, and the command that runs it."""
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):
@@ -96,7 +99,7 @@ def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
 def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: str) -> None:
-    """A fault that would make a module's name local is told with file and line, before any run."""
+    """A fault that would make a module's name local is refused with file and line, before any run."""
     driver = root / "tree" / "toycar" / "driver.py"
     driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
@@ -111,7 +114,7 @@ def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: 
 
 
 def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
-    """The same campaign and seed give the same digest; another seed gives another."""
+    """The same campaign and seed give the same digest; another seed gives another one."""
     one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")
     other = cli("plan", "toy", "--out", "c", "--seed", "8", "--json").json
     assert one["digest"] == two["digest"] != other["digest"]
@@ -142,7 +145,7 @@ def test_what_cannot_be_planned_is_answered(cli: Cli, root: Path, words: list[st
 
 
 def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> None:
-    """The last lines are the counts for each fault type, and where the report is."""
+    """The last lines show the counts for each fault type and the path of the report."""
     root, said = finished
     lines = said.stdout.splitlines()
     assert lines[0].split()[:5] == ["fault", "type", "injected", "activated", "manifested"]
@@ -151,11 +154,11 @@ def test_run_ends_with_the_table_and_the_report(finished: tuple[Path, Any]) -> N
     [report] = [line for line in lines if line.startswith("report: ")]
     assert (root / "runs/first/report/REPORT.md").exists()
     assert "runs/first/report/REPORT.md" in report
-    assert "experiments " in said.stderr  # progress goes beside, not into the result
+    assert "experiments " in said.stderr  # progress goes to stderr
 
 
 def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
-    """The same command on a complete run changes nothing and is fine."""
+    """The same command on a complete run changes nothing and succeeds."""
     before = results(run)
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0")
     assert answer.code == 0
@@ -164,7 +167,7 @@ def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
 
 
 def test_run_as_json(cli: Cli, run: Path) -> None:
-    """A program gets numbers and paths, and nothing else on standard output."""
+    """With --json, standard output holds numbers and paths, and nothing else."""
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0", "--json").json
     assert (answer["planned"], answer["done"], answer["ran"]) == (12, 12, 0)
     assert sum(answer["outcomes"].values()) == 12
@@ -172,23 +175,23 @@ def test_run_as_json(cli: Cli, run: Path) -> None:
 
 
 def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
-    """A run folder goes on with the options it was planned with, or not at all."""
+    """A run folder resumes only with the options it was planned with."""
     answer = cli("run", "toy", "--out", run, "--limit", "9")
     assert answer.code == 2
     assert "--limit" in answer.err
 
 
 def wait_for(folder: Path, files: str) -> None:
-    """Wait until there are such files in the folder, a minute at most."""
+    """Wait at most a minute for such files in the folder."""
     deadline = time.monotonic() + 60
     while not any(folder.glob(files)) and time.monotonic() < deadline:
         time.sleep(0.05)
 
 
 def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
-    """Ctrl-C ends with 130, what is done, and the command that goes on; that command completes the run.
+    """Ctrl-C exits with 130 and prints progress and the command that resumes; that command completes the run.
 
-    While it runs, a second command in the same folder is refused.
+    While a command runs, a second one in the same folder is refused.
     """
     words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
@@ -197,7 +200,7 @@ def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
     ) as process:
         wait_for(Path("runs/cut"), "run.json")
-        process.send_signal(signal.SIGSTOP)  # there is time for the second command
+        process.send_signal(signal.SIGSTOP)  # leaves time for the second command
         try:
             second = cli(*words)
         finally:
@@ -216,7 +219,7 @@ def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
 
 
 def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
-    """Deleted results and report come back byte for byte as the run wrote them."""
+    """Deleted results and report are rebuilt byte for byte."""
     files = [run / "results.csv", run / "report/REPORT.md", run / "report/index.html"]
     before = [file.read_bytes() for file in files]
     for file in files:
@@ -228,7 +231,7 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
 
 
 def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """It is written into that folder, and names each run."""
+    """The history is written into that folder and names each run."""
     shutil.copytree(run, tmp_path / "runs" / "first")
     answer = cli("report", tmp_path / "runs", "--json")
     assert answer.code == 0
@@ -237,7 +240,7 @@ def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_pa
 
 
 def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """It is written, with what failed on top, and the command ends with 1 and names the experiment."""
+    """The report is written with the failure on top; the command exits with 1 and names the experiment."""
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
     path = next(path for path in sorted((run / "proof").iterdir()) if len(path.read_text().splitlines()) > 1)
@@ -254,7 +257,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
 
 
 def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
-    """A report is written where no library is found; one that is named must be there."""
+    """A report is written even where no library is found; a library that is named must exist."""
     assert cli("report", run).code == 0
     assert cli("report", run, "--root", root).code == 0
     answer = cli("report", run, "--root", nowhere / "none")
@@ -263,7 +266,7 @@ def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, 
 
 
 def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
-    """The page loads nothing over the net and no file beside it: links and pictures are in it."""
+    """The page loads nothing from the network or from other files: links and figures are inside it."""
     text = (run / "report" / "index.html").read_text()
     assert "http" not in text.replace("http://www.w3.org/2000/svg", "")
     links = re.findall(r'<[^>]* (?:href|src)="([^"]*)"', text)
@@ -272,7 +275,7 @@ def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
 
 
 def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
-    """Diff, times and verdict are shown, a plot is drawn where it says, and the page can draw one, too."""
+    """`show` prints diff, times and verdict and says where it drew the plot; the page can also draw one."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
@@ -286,7 +289,7 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
 
 
 def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
-    """Hazards come first; a filter over the results leaves out what it does not hold for."""
+    """Hazards come first; a filter over the results leaves out the rest."""
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")
@@ -302,7 +305,7 @@ def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None
 
 
 def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
-    """As many digits as needed are enough; the newest run is taken unless one is named."""
+    """Any unique start of an id is enough; the newest run is used unless one is named."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name[:8], "--json", "--no-plot").json
     assert answer["experiment"] == name
@@ -315,14 +318,14 @@ def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["", "0123456789abcdef", "xyz"])
 def test_an_experiment_that_is_not_one_is_answered(cli: Cli, run: Path, name: str) -> None:
-    """No experiment, or too many, for an id is wrong input."""
+    """An id that matches no experiment, or several, is wrong input."""
     answer = cli("show", name)
     assert answer.code == 2
     assert "Traceback" not in answer.err
 
 
 def test_show_before_the_run(cli: Cli, root: Path) -> None:
-    """A planned experiment can be looked at; it says that it has not run, and how to run it."""
+    """`show` accepts a planned experiment, says that it has not run, and how to run it."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     name = results_id(Path("runs/p/plan.csv"))
     answer = cli("show", name)
@@ -336,7 +339,7 @@ def results_id(table: Path) -> str:
 
 
 def test_rerun_gives_the_same_again(cli: Cli, run: Path) -> None:
-    """A second run of an experiment equals its record; without --trace nothing is left behind."""
+    """A rerun reproduces the record; without --trace it leaves no files behind."""
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name)
     assert answer.code == 0
@@ -354,7 +357,7 @@ def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
 
 
 def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """A record that the run does not reproduce is a failed check."""
+    """A rerun that differs from the record is a failed check."""
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
     name = experiment_with(run, "hazard")
@@ -371,7 +374,7 @@ def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: R
 
 
 def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
-    """A run folder goes; a folder that is none stays, and so does a run when nobody says yes."""
+    """`clean` deletes a run folder only after a yes, and never any other folder."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     Path("mine").mkdir()
     assert cli("clean", "mine", "--yes").code == 2
@@ -386,7 +389,7 @@ KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run fol
 
 
 def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """After every command that writes into a run folder, `clean` deletes it; through a link it does not."""
+    """After every command that writes into a run folder, `clean` deletes it; it refuses a link."""
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):
         shutil.copytree(run, folder)

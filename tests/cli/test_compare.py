@@ -11,12 +11,12 @@ import mutator
 from mutator.model import Experiment, Outcome, Status
 from mutator.workspace import Workspace
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 Write = Callable[..., Path]
 
 
 def worse(e: Experiment) -> dict[str, Any]:
-    """One fault is hazardous now, the rest is as before."""
+    """One fault becomes hazardous, the rest stays the same."""
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
     return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
 
@@ -29,7 +29,7 @@ def runs(root: Path, write_run: Write) -> tuple[Path, Path]:
 
 
 def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """What changed is in the terminal's tables, and written beside the second run."""
+    """The terminal shows the changes in tables, and the same is written next to the second run."""
     answer = cli("compare", *runs)
     assert answer.code == 0, answer.err
     for wanted in ("new-hazard", "sensor/silence", "In both runs: 24 experiments"):
@@ -39,7 +39,9 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> None:
-    """Before any table it is said that one run has fewer experiments by choice; once, and on the page too."""
+    """Before any table, one remark says that one run has fewer experiments by choice; the page has
+    it, too.
+    """
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
@@ -56,7 +58,7 @@ def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> 
 def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whichever run has them: the terminal, the page and the Markdown say so beside their tables."""
+    """The terminal, the page and the Markdown name alerts of fault-free runs of either side."""
     note = "Not every alert is caused by a fault: fault-free runs raise fcw in A."
     monkeypatch.setattr(mutator.Run, "alerts_note", lambda run: note if run.path.name == "after" else "")
     answer = cli("compare", *runs, "--out", "c")
@@ -71,7 +73,7 @@ def test_alerts_of_fault_free_runs_are_named(
 
 
 def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """With --fail-on a new hazard is exit code 1 and named; the other way round it is fine."""
+    """With --fail-on, a new hazard is named and exits with 1; in the other direction the gate passes."""
     failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
@@ -88,7 +90,7 @@ def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run: Write) -> None:
-    """Where results are missing a gate ends with 3: nobody can say that nothing got worse."""
+    """A gate with missing results exits with 3, because a regression cannot be ruled out."""
     workspace = Workspace.find(root)
     whole = write_run(workspace, Path("whole"), campaign="small")
     part = write_run(
@@ -112,7 +114,7 @@ def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run
     ],
 )
 def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: str) -> None:
-    """A kind or a filter that does not exist is wrong input, and the known ones are named."""
+    """An unknown kind or filter is wrong input; the error lists the known ones."""
     answer = cli("compare", *runs, *words)
     assert answer.code == 2
     assert told in answer.err
@@ -120,7 +122,7 @@ def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: 
 
 
 def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """Each format is written where it is asked for, else into the run folder."""
+    """Each format is written to the given path, by default into the run folder."""
     _, after = runs
     answer = cli("export", after, "--format", "mutation-elements", "--out", "m.json")
     assert answer.code == 0, answer.err
@@ -140,7 +142,7 @@ def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_on_severity_needs_classes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """Of a target without severity nobody can say that a contact got worse: that is wrong input."""
+    """A gate on severity is wrong input for a target without severity classes."""
     answer = cli("compare", *runs, "--fail-on", "severity:S2")
     assert answer.code == 2
     assert "has no severity classes" in answer.err

@@ -1,4 +1,4 @@
-"""What a shell is offered when Tab is pressed."""
+"""What a shell offers when Tab is pressed."""
 
 import os
 import subprocess
@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 Complete = Callable[..., list[str]]
 
 
 @pytest.fixture
 def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
-    """Answers as a shell is answered after these words, the last one being typed."""
+    """Return the completions that a shell gets after these words, the last one being typed."""
 
     def ask(*words: str) -> list[str]:
         monkeypatch.setenv("_MUTATOR_COMPLETE", "complete_bash")
@@ -44,13 +44,12 @@ def complete(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> Complete:
     ],
 )
 def test_names_are_completed(complete: Complete, words: list[str], offered: list[str]) -> None:
-    """Verbs, campaigns, specs, scenarios, targets and formats are offered by what their names begin with."""
+    """Verbs, campaigns, specs, scenarios, targets and formats are completed from their first letters."""
     assert complete(*words) == offered
 
 
 def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli: Cli) -> None:
-    """Run folders in runs/ are offered, and the ids of experiments of the run that is named, or of the
-    newest one."""
+    """Run folders in runs/ are offered, and the experiment ids of the named run or of the newest one."""
     cli("plan", "small", "--out", "runs/old", "--limit", "2")
     cli("plan", "toy", "--out", "runs/new", "--limit", "2")
     os.utime("runs/old/run.json", (1, 1))
@@ -70,7 +69,7 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
 def test_a_library_that_is_named_is_looked_into(
     complete: Complete, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The options that name a library count before and after the verb; without them, the environment."""
+    """Library options before and after the verb count; without them, the environment does."""
     monkeypatch.delenv("MUTATOR_ROOT")
     assert "small" not in complete("run", "")
     assert "small" in complete("--root", str(root), "run", "")
@@ -78,7 +77,7 @@ def test_a_library_that_is_named_is_looked_into(
 
 
 def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`--show-completion` prints what a shell must be given, for the command `mutator`."""
+    """`--show-completion` prints the shell's script for the command `mutator`."""
     monkeypatch.setattr("typer.completion._get_shell_name", lambda: "bash")
     answer = cli("--show-completion")
     assert answer.code == 0
@@ -87,7 +86,7 @@ def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyP
 
 
 def test_completion_loads_little(root: Path) -> None:
-    """What a shell waits for imports nothing that is large."""
+    """Completion imports no large package."""
     code = (
         "import sys\nfrom mutator.cli.app import main\nassert main() == 0\n"
         "print(sorted({'jinja2', 'libcst', 'numpy', 'pandas', 'yaml', 'rich'} & set(sys.modules)))"

@@ -1,9 +1,9 @@
-"""What README and docs print is what the commands print; what they link exists.
+"""README and docs print what the commands print, and their links resolve.
 
-A page is worked through as a reader would: its commands are given in its order, a block that follows a line
-with the name of a file (`` `late.yaml`: ``) is written to that file, one with a difference is applied.
-After a change that alters the output, `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into
-the pages; read the difference before it is kept.
+The test works through a page as a reader would: it runs its commands in order, writes a block after a line
+with a file name (`` `late.yaml`: ``) to that file, and applies diffs. After a change that alters the output,
+`UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into the pages; read the difference before you
+keep it.
 """
 
 import json
@@ -44,28 +44,28 @@ WORKED_THROUGH = [
     TUTORIAL.with_name("tour-safety-engineer.md"),
     TUTORIAL.with_name("tour-controller-developer.md"),
     COMPARISON,
-    *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # whose code test_studies runs
+    *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # test_studies runs its code
     *EXAMPLES,
 ]
 INDEX = CLONE / "docs" / "README.md"
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
-CAMPAIGN = "mutator run quickstart "  # whose table is in both pages
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
+CAMPAIGN = "mutator run quickstart "  # both pages have its table
 TABLE = re.compile(r"^```text\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FENCE = re.compile(r"(?:^([^\n]*)\n\n)?^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 CODE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 FILE = re.compile(r"`([^`\s]+)`[^`]*:$")
-# Also `[text]: page.md`, and images; not what is on the web.
+# Also `[text]: page.md` and images; no links to the web.
 LINK = re.compile(r"\]\(([^)#:\s]*)(?:#([^)\s]+))?\)")
 IMAGE = re.compile(r"""<(?:img|source) [^>]*\bsrc(?:set)?="([^"#:\s]+)\"""")
-# What differs from machine to machine: how long it took, and the seal, in which are all versions.
+# Parts that differ between machines: durations, and the seal, which covers all versions.
 VARYING = re.compile(
     r"\d+ h \d\d min|\d+ min \d\d s|(?<![.\d])\d+ s\b|\d\.\d s each|(?<=^seal: )[0-9a-f]{64}$"
 )
 
 
-# A package called mutator on an index is not this project.
+# A package called mutator on an index is another project.
 BY_NAME = re.compile(r"\b(?:pip|pipx|uv)\b[^\n`]*\b(?:install|add)\b[^\n`]*(?<![\w/.-])mutator(?![\w/.*-])")
 
 
@@ -74,12 +74,12 @@ def name(page: Path) -> str:
 
 
 def sessions(page: Path) -> list[tuple[str, list[str]]]:
-    """The commands of a page with the lines they are said to print."""
+    """The commands of a page with the lines that the page says they print."""
     return [step for step in steps(page) if isinstance(step[1], list)]  # type: ignore[misc]
 
 
 def steps(page: Path) -> list[tuple[str, list[str] | str]]:
-    """What a reader does, in order: (command, lines it prints), (file, its text) or ("", a difference)."""
+    """What a reader does, in order: (command, lines it prints), (file, its text) or ("", a diff)."""
     found: list[tuple[str, list[str] | str]] = []
     for before, kind, text in FENCE.findall(page.read_text(encoding="utf-8")):
         if kind == "console":
@@ -103,7 +103,7 @@ def _commands(block: str) -> list[tuple[str, list[str]]]:
 
 @pytest.fixture
 def work(tmp_path: Path) -> Path:
-    """A folder with what the commands of the docs need of a clone."""
+    """A folder with the parts of a clone that the commands in the docs need."""
     for folder in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=shutil.ignore_patterns("__pycache__"))
     for toy in (Path("tests") / "toy", Path("tests") / "pole"):
@@ -114,7 +114,7 @@ def work(tmp_path: Path) -> Path:
 
 
 def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
-    """Do in `folder` what the page says; gives the commands with what they printed."""
+    """Follow the page in `folder`; return the commands with their output."""
     printed = []
     for what, text in steps(page):
         if isinstance(text, list):
@@ -130,10 +130,10 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
 
 
 def run(command: str, folder: Path) -> str:
-    """Standard output of a command line that must be fine; `mutator` is that of this interpreter."""
+    """Standard output of a command line that must succeed; `mutator` is that of this interpreter."""
     bin_folder = str(Path(sys.executable).parent)
     environment = os.environ | {"PATH": bin_folder + os.pathsep + os.environ["PATH"]}
-    environment.pop("COLUMNS", None)  # a page shows what a pipe gets
+    environment.pop("COLUMNS", None)  # pages show piped output
     done = subprocess.run(
         ["bash", "-c", command], cwd=folder, env=environment, capture_output=True, text=True, check=False
     )
@@ -147,7 +147,7 @@ def lines_of(output: str) -> list[str]:
 
 
 def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
-    """Put what the commands printed into the page, and the tutorial's table into the README."""
+    """Write the commands' output into the page, and the tutorial's table into the README."""
     rest = iter(printed)
 
     def session(block: re.Match[str]) -> str:
@@ -167,7 +167,7 @@ def rewrite(page: Path, printed: list[tuple[str, str]]) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("page", WORKED_THROUGH, ids=name)
 def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Path) -> None:
-    """The console sessions of a page, run in its order, give exactly the output that is printed there."""
+    """The console sessions of a page, run in order, print exactly what the page shows."""
     found = sessions(page)
     assert len(found) >= 2
     if page in EXAMPLES:
@@ -193,7 +193,7 @@ def test_every_command_of_a_page_prints_what_the_page_says(page: Path, work: Pat
     ],
 )
 def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lists and diffs in README and tutorial are those of the library and target as they are."""
+    """Lists and diffs in README and tutorial match the current library and target."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE))
     monkeypatch.delenv("COLUMNS")
     said = {command: said for page in (README, TUTORIAL) for command, said in sessions(page)}
@@ -202,21 +202,21 @@ def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: 
 
 
 def test_the_readme_shows_the_table_of_the_tutorial() -> None:
-    """README and tutorial run the same campaign, so they show the same numbers."""
+    """README and tutorial run the same campaign and show the same numbers."""
     [table] = TABLE.findall(README.read_text(encoding="utf-8"))
     [shown] = [said for command, said in sessions(TUTORIAL) if command.startswith(CAMPAIGN)]
     assert table.replace("runs/quickstart", "runs/first").splitlines() == shown
 
 
 def anchors(page: Path) -> set[str]:
-    """Names of a page's headings, as the web sites that show Markdown make them; fences are no headings."""
+    """The anchors of a page's headings, as Markdown sites build them; code fences have no headings."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def links(page: Path) -> list[tuple[Path, str]]:
-    """Files that a page links, with anchors; its own anchors, too."""
+    """The files that a page links, with anchors, including its own."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     return [
         ((page.parent / target).resolve() if target else page, anchor)
@@ -226,7 +226,7 @@ def links(page: Path) -> list[tuple[Path, str]]:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page: Path) -> None:
-    """Each relative link is a file of the clone, each anchor a heading in it."""
+    """Each relative link is a file of the clone, and each anchor is a heading in it."""
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
@@ -234,19 +234,19 @@ def test_links_lead_somewhere(page: Path) -> None:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_nobody_is_told_to_install_by_name(page: Path) -> None:
-    """On an index the name is somebody else's project, so pages install from a clone or from a file."""
+    """Pages install from a clone or a file, because the name on the index belongs to another project."""
     assert not BY_NAME.search(page.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("command", ["pip install mutator", "pip install 'mutator[dev]'", "uv add mutator"])
 def test_installing_by_name_would_be_noticed(command: str) -> None:
-    """The pattern finds such commands, and lets those pass that name a folder or a file."""
+    """The pattern finds installs by name and accepts installs from a folder or a file."""
     assert BY_NAME.search(command)
     assert not BY_NAME.search("pip install dist/mutator-0.1.0.whl && .venv/bin/mutator list")
 
 
 def test_every_page_can_be_reached() -> None:
-    """The index of the documentation names every page, but for what belongs to one that it names."""
+    """The documentation's index names every page, except those that belong to a page it names."""
     listed = {file for file, _ in links(INDEX)}
     pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
     assert pages - listed == set()
@@ -261,7 +261,7 @@ def test_every_page_can_be_reached() -> None:
 
 
 def test_editors_are_told_of_every_schema() -> None:
-    """The settings that the guide prints map each schema to the files that it is made for."""
+    """The settings in the guide map each schema to its files."""
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
     [settings] = [json.loads(text) for _, kind, text in FENCE.findall(page) if kind == "json"]
     expected = {
@@ -273,13 +273,13 @@ def test_editors_are_told_of_every_schema() -> None:
 
 
 def test_every_benchmark_is_told_of() -> None:
-    """The table of benchmarks has a line for each, and for nothing that is not there."""
+    """The table of benchmarks has one line for each benchmark and no others."""
     told = re.findall(r"^\| `(\w+\.py)` ", BENCHMARKS.read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(file.name for file in BENCHMARKS.parent.glob("*.py"))
 
 
 def test_the_readme_has_both_command_lines() -> None:
-    """Installing and running, installing and testing: one line each, to be copied."""
+    """The README has one line to install and run, and one to install and test, ready to copy."""
     lines = [line for line in README.read_text().splitlines() if line.startswith("python3 -m venv ")]
     assert [("mutator run quickstart" in line, "pytest" in line) for line in lines] == [
         (True, False),

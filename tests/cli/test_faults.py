@@ -11,11 +11,11 @@ import pytest
 
 from mutator.mutants.building import unsplice
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
-    """Values of a variant share a diff, so each variant is shown once, without the probe's file."""
+    """Values of a variant share one diff, which is shown once, without the probe's file."""
     answer = cli("diff", "sensor/distance")
     assert answer.code == 0
     headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
@@ -33,7 +33,7 @@ def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
 
 
 def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
-    """With `--patch` what is printed is a patch for the target's root, heading or not."""
+    """With `--patch` the output is a patch for the target's root, with or without a heading."""
     answer = cli("diff", "sensor/silence", "--trigger", "near", "--patch")
     tree = root / "tree"
     subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
@@ -41,7 +41,7 @@ def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
 
 
 def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
-    """A spec file from anywhere is as good as a name."""
+    """A spec file may be anywhere; its path works like a name."""
     own = Path("own.yaml")
     shutil.move(root / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
     assert cli("diff", own).code == 0
@@ -62,7 +62,7 @@ def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
     ],
 )
 def test_wrong_choices_are_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """What does not exist is refused with 2 and the choices there are; no traceback."""
+    """An unknown choice exits with 2 and lists the known ones, without a traceback."""
     answer = cli("diff", *words)
     assert answer.code == 2
     assert said in answer.err
@@ -75,7 +75,7 @@ def read_index(out: Path) -> list[dict[str, str]]:
 
 
 def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
-    """Every patch of the index applies to the pristine target and un-splices to it again."""
+    """Every patch of the index applies to the pristine target, and un-splicing restores it."""
     out = Path("mutants")
     assert cli("generate", "sensor/*", "--out", out).code == 0
     index = read_index(out)
@@ -93,7 +93,7 @@ def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
 
 
 def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
-    """With `--trees` each mutant's whole tree stands beside its patch, and equals the patched target."""
+    """With `--trees` each mutant's whole tree is written next to its patch, and equals the patched target."""
     out = Path("mutants")
     cli("generate", "sensor/distance", "--out", out, "--trees", "--trigger", "near", "--trigger", "3")
     for line in read_index(out):
@@ -107,7 +107,7 @@ def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
 
 
 def test_generate_makes_mutants_of_operators(cli: Cli, root: Path) -> None:
-    """Without a spec: a sample of the mutants that operators make of a function, in executed lines."""
+    """Without a spec, `generate` samples the operators' mutants of a function, in executed lines."""
     words = ("--operators", "arithmetic,branch", "--in", "toycar/*.py::Driver.drive", "--scenario", "A")
     answer = cli("generate", *words, "--sample", 5, "--seed", 3, "--out", "m")
     assert answer.code == 0 and "5 draws of " in answer.err
@@ -155,7 +155,7 @@ def test_generate_refuses_what_it_cannot_do(cli: Cli, root: Path, words: list[st
 
 
 def test_generate_does_not_mix_with_older_files(cli: Cli, root: Path) -> None:
-    """A folder with something in it is refused and left as it was."""
+    """A folder with content is refused and left unchanged."""
     Path("m").mkdir()
     (Path("m") / "mine.txt").write_text("keep")
     answer = cli("generate", "sensor/distance", "--out", "m")

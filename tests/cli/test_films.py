@@ -1,4 +1,4 @@
-"""`mutator show --video` and `--still`, by the commands that the toy's manifest names."""
+"""`mutator show --video` and `--still`, with the commands of the toy's manifest."""
 
 import base64
 import gzip
@@ -15,7 +15,7 @@ from mutator.cli.app import main
 from mutator.report import stills
 from mutator.workspace import Workspace
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +44,7 @@ def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
-    """The target's command gets the films of both runs, what happened when, and for a still its time."""
+    """The target's command receives the films of both runs, the event times, and the time of a still."""
     answer = cli("show", name, "--no-plot", "--video", "out/a.json", "--still", "1.5=b.json", "--json").json
     assert answer["films"] == ["b.json", "out/a.json"]
     video, still = (json.loads(Path(path).read_text()) for path in ("out/a.json", "b.json"))
@@ -61,7 +61,7 @@ def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
 
 
 def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
-    """The run folder holds the same files as before, and the record is the campaign's to the byte."""
+    """The run folder keeps the same files, and the record stays byte for byte the campaign's."""
     before = sorted(Path("runs/a").rglob("*"))
     answer = cli("show", name, "--no-plot", "--video", "a.json")
     assert sorted(Path("runs/a").rglob("*")) == before
@@ -71,7 +71,7 @@ def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
 
 
 def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
-    """It is kept beside the plots, and the page carries it with its time."""
+    """A still without a file name is kept next to the plots, and the page shows it with its time."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
     page = Path(cli("report", "runs/a", "--json").json["page"])
@@ -83,8 +83,9 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
 
 
 def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of the experiments with a change that shows pictures, at activation and hazard, one of so many
-    that are planned; another run of the command takes none again, and `--no-stills` none at all."""
+    """A run takes stills of its worst experiments with visible changes, at activation and hazard, in
+    proportion to the plan. Running the command again takes none; nor does `--no-stills`.
+    """
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
     monkeypatch.setattr(stills, "ONE_IN", 2)
@@ -106,7 +107,7 @@ def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pyte
 
 
 def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
-    """A format that the target does not write is wrong input, in the target's own words."""
+    """A format that the target cannot write is wrong input; the error quotes the target."""
     answer = cli("show", name, "--no-plot", "--video", "a.avi")
     assert answer.code == 2
     assert "a.avi: no .avi here" in answer.err
@@ -114,7 +115,7 @@ def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
 
 
 def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
-    """The manifest's `film` may be missing; then the error says what to write there."""
+    """Without `film` in the manifest, the error says what to write there."""
     manifest = root / "fault_library/targets/toycar.yaml"
     before, rest = manifest.read_text().split("film:\n")
     manifest.write_text(before + "trace:" + rest.split("trace:")[1])
@@ -128,7 +129,7 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
 
 @pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
 def test_a_still_needs_a_time(cli: Cli, name: str, still: str) -> None:
-    """Anything else, or a file without a name, is wrong input; the error shows how it is written."""
+    """Any other time, or a file without a time, is wrong input; the error shows the syntax."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
-    """All that the library holds is listed under its kind, with counts."""
+    """`list` shows everything in the library under its kind, with counts."""
     answer = cli("list")
     assert answer.code == 0
     for wanted in ("specs (3)", "sensor/distance", "scenarios (2)", "campaigns (", "models (", "offset"):
@@ -20,7 +20,7 @@ def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
 
 
 def test_list_as_json_is_the_same_for_programs(cli: Cli, root: Path) -> None:
-    """`--json` prints one document with one entry for each kind, or only the kind asked for."""
+    """`--json` prints one document with one entry for each kind, or only the requested kind."""
     listed = cli("list", "--json").json
     assert set(listed) == {"specs", "scenarios", "campaigns", "models", "triggers", "targets"}
     assert [(s["name"], s["faults"]) for s in listed["specs"]] == [
@@ -33,7 +33,7 @@ def test_list_as_json_is_the_same_for_programs(cli: Cli, root: Path) -> None:
 
 
 def test_a_kind_that_is_none_is_answered(cli: Cli, root: Path) -> None:
-    """The kinds there are, in words of ours alone."""
+    """An unknown kind is refused with the list of known kinds, in the project's own words."""
     answer = cli("list", "nothing")
     assert answer.code == 2
     assert "'nothing' is not one of 'specs', 'scenarios'" in answer.err
@@ -41,7 +41,7 @@ def test_a_kind_that_is_none_is_answered(cli: Cli, root: Path) -> None:
 
 
 def test_a_piped_table_has_no_control_characters(cli: Cli, root: Path) -> None:
-    """What goes into a pipe is plain text: no colours, no box, no trailing blanks."""
+    """Piped output is plain text: no colours, boxes or trailing blanks."""
     lines = cli("list").out.splitlines()
     assert all(line.isprintable() and line == line.rstrip() for line in lines)
 
@@ -54,7 +54,7 @@ def test_check_says_all_is_well(cli: Cli, root: Path) -> None:
 
 
 def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
-    """An anchor that the target does not have fails the check with file and line."""
+    """An anchor missing from the target fails the check with file and line."""
     spec = root / "fault_library" / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("after_assign: gap", "after_assign: pace"))
     answer = cli("check")
@@ -67,7 +67,7 @@ def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
 
 
 def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None:
-    """A target with a thread is told so before any campaign, by `check` and by `doctor`, with its name."""
+    """`check` and `doctor` report a target with a thread, by name, before any campaign."""
     go = root / "tree" / "toycar" / "go.py"
     thread = "threading.Thread(target=threading.Event().wait, name='poll', daemon=True).start()"
     go.write_text(go.read_text().replace("class Drive", f"import threading\n\n{thread}\n\n\nclass Drive"))
@@ -83,7 +83,7 @@ def test_check_says_what_prevents_the_fast_engines(cli: Cli, root: Path) -> None
 
 
 def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
-    """A variant whose injections do not take its draw is told with the line of the draw."""
+    """If a variant's injections do not use its draw, the check gives the line of the draw."""
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     spec.write_text(spec.read_text().replace("by_m: offset", "by_m: 2.5"))
     answer = cli("check")
@@ -95,7 +95,7 @@ def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
 
 
 def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) -> None:
-    """With `--drive` what is well is shown, too; for programs each finding has its level."""
+    """`--drive` also shows what passed; in JSON each finding has its level."""
     answer = cli("check", "--drive", "--scenario", "A")
     assert answer.code == 0
     for name in ("golden A: the same bytes twice", "fast engines: ", "statements: ", "triggers: ", "canary "):
@@ -105,7 +105,7 @@ def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) ->
 
 
 def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
-    """A target that is not deterministic fails the check; the line that reads the clock is named."""
+    """A non-deterministic target fails the check, which names the line that reads the clock."""
     driver = root / "tree" / "toycar" / "driver.py"
     text = driver.read_text().replace("class Driver", "import time\n\n\nclass Driver")
     driver.write_text(text.replace("return gas,", "return gas + time.time() * 1e-12,"))
@@ -119,13 +119,13 @@ def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
 
 
 def test_scenarios_are_for_drives(cli: Cli, root: Path) -> None:
-    """A scenario without `--drive` would be ignored, so it is refused; so is one that is unknown."""
+    """A scenario without `--drive`, or an unknown one, is refused."""
     assert "add --drive" in cli("check", "--scenario", "A").err
     assert cli("check", "--drive", "--scenario", "nowhere").code == 2
 
 
 def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
-    """On a machine that runs the tests, doctor finds nothing that fails."""
+    """On a machine that runs the tests, `doctor` reports no failure."""
     answer = cli("doctor")
     assert answer.code == 0
     assert answer.out.endswith("ready\n")
@@ -135,7 +135,7 @@ def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
 def test_doctor_without_library_fails_and_helps(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a library doctor still looks at the rest, says what to do, and exits with 1."""
+    """Without a library `doctor` still checks the rest, says what to do, and exits with 1."""
     monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("doctor")
     assert answer.code == 1

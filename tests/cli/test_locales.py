@@ -1,4 +1,4 @@
-"""Names that are not ASCII, in environments that know UTF-8 and in one that does not."""
+"""Non-ASCII names, with and without UTF-8 in the environment."""
 
 import os
 import subprocess
@@ -9,7 +9,7 @@ import pytest
 
 from mutator.workspace import Workspace
 
-PLAIN = {"LC_ALL": "C"}  # in which Python finds UTF-8 by itself
+PLAIN = {"LC_ALL": "C"}  # where Python chooses UTF-8 automatically
 NARROW = PLAIN | {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
 
 
@@ -27,7 +27,7 @@ def mutator(place: Path, environment: dict[str, str], *words: str) -> "subproces
 
 @pytest.fixture
 def place(toy: Workspace) -> Path:
-    """The toy's root, in which the text of a spec is not ASCII."""
+    """The toy's root, with non-ASCII text in a spec."""
     root = toy.library.parent
     spec = toy.library / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("about: ", "about: Maß → ", 1), encoding="utf-8")
@@ -35,7 +35,7 @@ def place(toy: Workspace) -> Path:
 
 
 def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
-    """Under LC_ALL=C a campaign runs whose library, target files and run folder have names of any letters."""
+    """Under LC_ALL=C a campaign runs with non-ASCII names of library, target files and run folder."""
     (place / "tree" / "toycar" / "größe.py").write_text("SIZE = 1\n")
     root = place.rename(place.with_name("bücher"))
     answer = mutator(root, PLAIN, "run", "small", "--out", "läufe/1", "--limit", "1", "-n", "1")
@@ -45,7 +45,7 @@ def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
 
 
 def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
-    """Where output can only be ASCII, what is not is shown by its number; JSON stays JSON."""
+    """Where output must be ASCII, other characters are printed as escapes; JSON stays valid."""
     answer = mutator(place, NARROW, "list", "specs")
     assert (answer.returncode, "Ma\\xdf \\u2192" in answer.stdout) == (0, True)
     answer = mutator(place, NARROW, "list", "specs", "--json")
@@ -54,7 +54,7 @@ def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
 
 @pytest.mark.parametrize("what", ["run folder", "library", "target file"])
 def test_names_that_are_no_text(place: Path, what: str) -> None:
-    """A name that this environment cannot read as text is refused in one message that says what to set."""
+    """A name that the environment cannot decode is refused in one message that says what to set."""
     out = "run"
     if what == "run folder":
         out = "läufe"

@@ -14,14 +14,14 @@ from mutator.cli import library
 from mutator.cli.app import GROUPS, app, main
 from mutator.errors import EXIT_CHECK_FAILED, CheckFailed, MutatorError
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 VERBS = [verb for _, verbs in GROUPS for verb in verbs]
 HEAVY = ("pandas", "libcst", "matplotlib", "pydantic", "rich", "jinja2", "pyarrow", "numpy", "pytest")
 
 
 def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
-    """The help lists each verb once, in groups, and no verb is left out of them."""
+    """The help lists every verb once, under a group heading."""
     answer = cli("--help")
     assert answer.code == 0
     registered = [*app.registered_commands, *app.registered_groups]
@@ -33,7 +33,7 @@ def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
 
 @pytest.mark.parametrize("verb", VERBS)
 def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
-    """`mutator VERB --help` says what it does and how it is called."""
+    """`mutator VERB --help` says what the verb does and how to call it."""
     answer = cli(verb, "--help")
     assert answer.code == 0
     assert answer.out.startswith(f"Usage: mutator {verb} ")
@@ -50,7 +50,7 @@ def test_the_version_is_told(cli: Cli) -> None:
 
 
 def test_help_needs_no_heavy_package() -> None:
-    """Help and errors of use come at once, since nothing that takes long to import is imported."""
+    """Help and usage errors import no slow package."""
     code = (
         "import sys, mutator.cli.app as m; m.main(['--help']);"
         f"print([x for x in {HEAVY} if x in sys.modules])"
@@ -60,7 +60,7 @@ def test_help_needs_no_heavy_package() -> None:
 
 
 def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
-    """`list` reads YAML and nothing else, so libcst, matplotlib and pandas stay away."""
+    """`list` reads only YAML, so it imports neither libcst nor matplotlib nor pandas."""
     code = (
         "import sys, mutator.cli.app as m; m.main(['list']);"
         "print([x for x in ('libcst', 'matplotlib', 'pandas', 'pyarrow') if x in sys.modules])"
@@ -71,7 +71,7 @@ def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
 
 
 def test_python_m_mutator_is_mutator() -> None:
-    """The package runs as a module too, with the same exit codes."""
+    """`python -m mutator` works with the same exit codes."""
     done = subprocess.run(
         [sys.executable, "-m", "mutator", "lst"], capture_output=True, text=True, check=False
     )
@@ -90,7 +90,7 @@ def test_python_m_mutator_is_mutator() -> None:
     ],
 )
 def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], said: str) -> None:
-    """A mistake in the command line exits with 2, names the mistake and the help; no traceback."""
+    """A usage error exits with 2 and names the mistake and the help, without a traceback."""
     answer = cli(*words)
     assert answer.code == 2
     assert said in answer.err
@@ -99,14 +99,14 @@ def test_wrong_use_is_two_and_says_where_to_look(cli: Cli, words: list[str], sai
 
 
 def test_outside_a_clone_what_ships_is_there(cli: Cli, nowhere: Path) -> None:
-    """In an empty folder the verbs have the library that ships with the harness."""
+    """In an empty folder the verbs use the library that ships with the harness."""
     answer = cli("list", "specs")
     assert answer.code == 0
     assert "radar/chaff" in answer.out
 
 
 def test_a_library_that_is_missing_is_told(cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the environment names a folder that is not there, the answer names options and variables."""
+    """If the environment names a missing folder, the error names the options and variables."""
     monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("list")
     assert answer.code == 2
@@ -116,7 +116,7 @@ def test_a_library_that_is_missing_is_told(cli: Cli, nowhere: Path, monkeypatch:
 
 
 def test_library_and_templates_are_found_by_options(cli: Cli, root: Path, nowhere: Path) -> None:
-    """The options that name the place work before and after the verb."""
+    """The library options work before and after the verb."""
     place = ["--root", root.parent, "--library", root / "fault_library", "--templates", root / "templates"]
     before, after = cli(*place, "list", "specs"), cli("list", "specs", *place)
     assert before.code == after.code == 0
@@ -125,7 +125,7 @@ def test_library_and_templates_are_found_by_options(cli: Cli, root: Path, nowher
 
 
 def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    """Let `list` fail with `error`."""
+    """Make `list` fail with `error`."""
 
     def broken(_: object) -> None:
         raise error
@@ -136,7 +136,7 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 def test_an_error_shows_place_expectation_and_remedy(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A MutatorError is told in one piece: file:line, what was got, what was expected, what to do."""
+    """A MutatorError is printed in one piece: file:line, finding, expectation, remedy."""
     here = Path.cwd() / "spec.yaml"
     fail_with(monkeypatch, MutatorError("[bold]x", where=here, line=7, expected="a number", remedy="mend it"))
     answer = cli("list", "specs")
@@ -158,8 +158,9 @@ def test_an_error_shows_place_expectation_and_remedy(
 def test_exit_codes(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
-    """A failed check is 1, a folder that is shut the user's to mend (2), a full disk 3, whatever library says
-    so, and an interruption 130; no traceback."""
+    """Exit codes: failed check 1, unreadable folder 2, full disk 3 (whichever library raises it),
+    interruption 130; no traceback.
+    """
     fail_with(monkeypatch, error)
     answer = cli("list", "specs")
     assert answer.code == code
@@ -168,7 +169,7 @@ def test_exit_codes(
 
 
 def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An error nobody foresaw keeps its traceback, says that it is a defect, and exits with 3."""
+    """An unexpected error keeps its traceback, is called a defect, and exits with 3."""
     fail_with(monkeypatch, ZeroDivisionError("oops"))
     answer = cli("list", "specs")
     assert answer.code == 3
@@ -178,7 +179,7 @@ def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("words", ["list --json", "list targets", "--help"], ids=["long", "short", "help"])
 def test_a_closed_pipe_is_no_error(words: str) -> None:
-    """`mutator list | head` ends quietly when head has seen enough, be it before anything is printed."""
+    """`mutator list | head` ends quietly when head closes the pipe, even before any output."""
     clone = Path(__file__).parents[2]
     command = f"{sys.executable} -m mutator {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=clone)
@@ -186,7 +187,7 @@ def test_a_closed_pipe_is_no_error(words: str) -> None:
 
 
 def test_main_returns_the_code_of_a_verb(root: Path) -> None:
-    """`main` returns instead of exiting, so that a program may call it."""
+    """`main` returns instead of exiting, so that a program can call it."""
     assert main(["list", "targets"]) == 0
 
 
@@ -199,8 +200,9 @@ def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     ],
 )
 def test_remarks_that_nobody_can_read(root: Path, tmp_path: Path, streams: str) -> None:
-    """A command whose standard error is closed, full or not read does its work all the same, and says how
-    it ended."""
+    """A command with closed, full or unread standard error still does its work and returns the right exit
+    code.
+    """
     words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
     begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     for code in (0, 2):

@@ -1,4 +1,4 @@
-"""`init`: a new library to edit, and a first one for a foreign controller."""
+"""`init`: an editable new library, and a first library for a foreign controller."""
 
 import re
 from collections.abc import Callable
@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 def test_init_writes_a_library_that_is_then_used(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """After `init` the verbs given in that folder list what is edited there."""
+    """After `init`, the verbs in that folder use the files edited there."""
     assert cli("init", "faults").out.startswith("faults: fault_library/, templates/ and a README.md")
     spec = nowhere / "faults/fault_library/faults/radar/chaff.yaml"
     spec.write_text(spec.read_text().replace("The radar's echo", "My radar's echo"))
@@ -24,7 +24,7 @@ def test_init_writes_a_library_that_is_then_used(
 
 
 def test_the_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
-    """The five commands of the README are verbs of the command line."""
+    """The five commands in the README are verbs of the command line."""
     cli("init", "faults")
     readme = (nowhere / "faults" / "README.md").read_text()
     block = readme.split("```sh\n")[1].split("```")[0]
@@ -34,7 +34,7 @@ def test_the_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
 
 
 def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
-    """A folder that holds anything is wrong input, and stays as it is."""
+    """A folder with content is wrong input and stays unchanged."""
     (nowhere / "thesis.tex").touch()
     answer = cli("init", ".")
     assert answer.code == 2
@@ -43,7 +43,7 @@ def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
 
 
 def test_init_for_a_program(cli: Cli, nowhere: Path) -> None:
-    """`--json` names the folder."""
+    """With `--json`, `init` prints the folder."""
     assert cli("init", "faults", "--json").json == {"folder": "faults"}
 
 
@@ -63,7 +63,7 @@ MARK = re.compile(r"^ *# TODO\(init\):.*\n", re.MULTILINE)
 
 @pytest.fixture
 def tree(nowhere: Path) -> Callable[..., Path]:
-    """Makes a source tree of these files."""
+    """Create a source tree with these files."""
 
     def make(files: dict[str, str]) -> Path:
         folder = nowhere / "tree"
@@ -88,8 +88,9 @@ TREES: dict[str, tuple[dict[str, str], str, str]] = {
 def test_a_first_library_runs_once_its_marks_are_gone(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For a controller with an ordinary step all is there: without an edit but the deletion of its marks the
-    library fits, and the likeliest value is put in and driven."""
+    """For a controller with an ordinary step the library is complete: once the marks are deleted it passes
+    the check, and the likeliest value is injected and run.
+    """
     files, manifest, place = TREES[name]
     cli("init", "faults", "--target", tree(files))
     (written,) = (nowhere / "faults/fault_library/targets").iterdir()
@@ -126,8 +127,9 @@ FOREIGN: dict[str, dict[str, str]] = {
 def test_check_lists_every_place_to_fill_in(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whatever the tree holds, a library is written, and `check` names each mark once, with file and line and
-    what belongs there."""
+    """A library is written for any tree, and `check` lists each mark once, with file, line and what to fill
+    in.
+    """
     told = cli("init", "faults", "--target", tree(FOREIGN[name]), "--json").json
     assert (nowhere / "faults" / "README.md").exists()
     marks = [
@@ -159,7 +161,7 @@ NOTHING: dict[str, tuple[dict[str, str], str]] = {
 
 @pytest.mark.parametrize("name", NOTHING)
 def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
-    """A library for it is written, and a warning says that nothing was found to put into it, and why."""
+    """The library is written, with a warning that no controller was found, and why."""
     files, told = NOTHING[name]
     folder = tree(files)
     answer = cli("init", "faults", "--target", folder)
@@ -169,7 +171,7 @@ def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable
 
 
 def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., Path]) -> None:
-    """Where a step was found nothing is said, also if another file cannot be read."""
+    """If a step was found there is no warning, even when another file cannot be read."""
     assert cli("init", "faults", "--target", tree(FOREIGN["syntax errors"])).err == ""
 
 
@@ -177,7 +179,7 @@ def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., P
 def test_a_tree_may_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What would be something else than a text in YAML is quoted: the manifest finds the tree."""
+    """A name with a special meaning in YAML is quoted, and the manifest finds the tree."""
     folder = nowhere / name
     folder.mkdir()
     for file in ("steer.py", "null.py"):
@@ -191,7 +193,7 @@ def test_a_tree_may_have_any_name(
 def test_marks_tell_all_that_their_comment_says(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A comment that goes on below its mark is told as a whole; one in another line is none of it."""
+    """`check` prints the whole comment of a mark, including its continuation lines, but no other comment."""
     cli("init", "faults", "--target", "installed:typer")
     path = nowhere / "faults/fault_library/scenarios/first.yaml"
     path.write_text("# TODO(init): the speed\n# in m/s\nspeed: 3\n# another\n")
@@ -200,7 +202,7 @@ def test_marks_tell_all_that_their_comment_says(
 
 
 def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
-    """The commands of a first library's README are verbs with such options, on names that the library has."""
+    """The README of a first library names existing verbs, options and library entries."""
     cli("init", "faults", "--target", "installed:typer")
     readme = (nowhere / "faults" / "README.md").read_text()
     block = readme.split("```sh\n")[1].split("```")[0]
@@ -226,8 +228,7 @@ def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     [("nowhere", "no folder nowhere"), ("installed:no.where", "no installed package 'no.where'")],
 )
 def test_init_refuses_a_target_that_is_not_there(target: str, told: str, cli: Cli, nowhere: Path) -> None:
-    """A missing folder or package is wrong input, told by the option that names it; no library is begun for
-    it."""
+    """A missing folder or package is wrong input, reported by its option; no library is written."""
     answer = cli("init", "faults", "--target", target)
     assert answer.code == 2
     assert f"error: --target: {told}" in answer.err

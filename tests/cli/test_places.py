@@ -16,7 +16,7 @@ def place(toy: Workspace) -> tuple[str, ...]:
 
 
 def test_lists_places(cli: Cli, toy: Workspace) -> None:
-    """A table has line, anchor and models; JSON has the same with the file, and can be put into a spec."""
+    """The table has line, anchor and models; JSON has the same with the file, ready for a spec."""
     answer = cli("places", "toycar/sensing.py::Sensor.sense", *place(toy))
     assert answer.code == 0
     assert "{function: Sensor.sense, after_assign: gap}" in answer.out
@@ -37,7 +37,7 @@ def test_lists_places(cli: Cli, toy: Workspace) -> None:
     ],
 )
 def test_refuses_other_files(cli: Cli, toy: Workspace, where: str, words: str) -> None:
-    """A file or function that there is not, or that is forbidden, is told with what to do."""
+    """A missing or forbidden file or function is refused with a remedy."""
     answer = cli("places", where, *place(toy))
     assert answer.code == 2
     assert words in answer.err

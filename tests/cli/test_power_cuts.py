@@ -1,4 +1,4 @@
-"""Power cuts: the disk has what was synced, and of the rest any part."""
+"""Power cuts: the disk keeps what was synced and any part of the rest."""
 
 import os
 import re
@@ -20,20 +20,22 @@ from mutator.store.run_folder import RunFolder
 from mutator.store.series import SeriesFolder
 from mutator.store.series_packing import pack, segments
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 WORDS = ("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "reference")
 
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """Where the run folder of the first test is kept for the others, and the seal that it comes to."""
+    """The run folder of the first test, kept for the others, and its final seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]) -> Path:
-    """A run folder whose experiments have run, and whose command came no further. It is driven once, as each
-    test has the same library."""
+    """A run folder with finished experiments that the command did not complete.
+
+    It is run once, since each test has the same library.
+    """
 
     def end(self: Session) -> None:
         raise MutatorError("the power is cut")
@@ -51,7 +53,7 @@ def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]
 
 @pytest.fixture
 def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
-    """The seal of the run that nothing happens to after the power is back."""
+    """The seal of the same run without a power cut."""
     if not driven[1:]:
         shutil.copytree(cut, "whole")
         whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
@@ -63,7 +65,7 @@ def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
 
 
 def last_block(path: Path) -> int:
-    """Where the last block of a file begins."""
+    """The offset of a file's last block."""
     data = path.read_bytes()
     return data.rindex(b"FIB1", 0, read_blocks(path).blocks[-1].offset)
 
@@ -71,7 +73,7 @@ def last_block(path: Path) -> int:
 def test_records_are_synced_after_what_they_refer_to(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whenever records are, the patch and the series of each are on the disk."""
+    """Before a record is synced, its patch and series are on the disk."""
     synced: dict[str, int] = {}
     looks = []
     fsync = os.fsync
@@ -103,8 +105,9 @@ def test_records_are_synced_after_what_they_refer_to(
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
 def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """However much of the block is there: the folder is not believed, the answer says what mends it, and the
-    run then comes to the result that it would have had."""
+    """However much of the block survives, the folder is rejected with a remedy, and the mended run reaches
+    the original result.
+    """
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
     for length in range(last_block(path), len(data)):
@@ -126,8 +129,9 @@ def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest
 
 
 def test_a_record_without_its_series_has_none(cli: Cli, cut: Path) -> None:
-    """However much of the block is there, nothing else is shown in its place: the others keep theirs, the
-    run ends as it would have, and the experiment gets it by being driven again."""
+    """However much of the block survives, nothing replaces the lost series: the others keep theirs, the run
+    completes as usual, and a rerun restores it.
+    """
     [path] = segments(cut)
     data = path.read_bytes()
     names = [block.key.split()[0] for block in read_blocks(path).blocks if block.kind]

@@ -1,4 +1,4 @@
-"""`review show --pictures`: what an image effect does, as files."""
+"""`review show --pictures`: the result of an image effect, as files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,7 +10,9 @@ from mutator.workspace import Workspace
 def test_pictures_are_written_and_named(
     cli: Callable[..., Any], root: Path, toy: Workspace, tmp_path: Path, give_eyes: Callable[..., None]
 ) -> None:
-    """One before and one for each level; a group that is no image effect has none, which is told."""
+    """One image before and one for each level; a group without an image effect has none, and the command says
+    so.
+    """
     give_eyes(toy, values="[10, 50]")
     groups = {group["model"]: group["group"] for group in cli("review", "--json").json}
     light, silent = groups["image_effect"], groups["omission"]

@@ -1,4 +1,4 @@
-"""`review`: groups listed, shown, decided about, walked through, and as a page; `run --require-reviewed`."""
+"""`review`: list, show, decide, walk through, and write a page; `run --require-reviewed`."""
 
 import base64
 import gzip
@@ -17,7 +17,7 @@ from mutator.cli.app import main
 from mutator.review.catalogue import of_library
 from mutator.workspace import Workspace
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 JANE = ("--by", "Jane Doe")
 
 
@@ -29,7 +29,7 @@ def ids(cli: Cli, *words: object) -> list[str]:
 def known(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> dict[str, str]:
-    """The groups of the toy: what they are about, by id, as listed when all are new."""
+    """The toy's groups by id with their subjects, listed while all are new."""
     toy = copy_toycar(tmp_path_factory.mktemp("known"))
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
     return {group.id: group.what for group in groups}
@@ -40,7 +40,7 @@ def about(known: dict[str, str], words: str) -> str:
 
 
 def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """`review` alone lists; approved groups come last, those whose template has changed before them."""
+    """`review` alone lists the groups: approved ones last, those with a changed template before them."""
     first, *rest = known
     cli("review", "approve", first, *JANE)
     lines = cli("review").out.splitlines()
@@ -53,7 +53,7 @@ def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict
 
 
 def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Filters name what the table tells; the start of an id is enough where only one group has it."""
+    """Filters use the table's columns; the start of an id is enough if it is unique."""
     silent = about(known, "omission()")
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
@@ -65,7 +65,7 @@ def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, kn
 
 
 def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Diff with holes, a row of values for each fault, the conditions; for a program, too."""
+    """A group shows its diff with holes, a row of values for each fault, and the conditions; in JSON, too."""
     longer = about(known, "offset(by, target=gap)")
     answer = cli("review", "show", longer)
     assert f"group {longer}: new" in answer.out
@@ -79,7 +79,7 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
 
 
 def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """All of the library, specs of it, or a campaign; of a campaign the runs are counted."""
+    """A review covers the whole library, some specs, or a campaign; for a campaign the runs are counted."""
     assert set(ids(cli, "--spec", "sensor/lane")) < known.keys()
     campaign = cli("review", "--campaign", "small", "--json").json
     assert {group["group"] for group in campaign} <= known.keys()
@@ -88,7 +88,7 @@ def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, s
 
 
 def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Who approved or rejected what, with a remark; a change says what has changed since."""
+    """Decisions keep who approved or rejected what, with remarks; a change shows what has changed since."""
     group = about(known, "omission()")
     answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
     assert re.fullmatch(rf"{group} rejected by Jane Doe on 20..-..-..", answer.out.splitlines()[0])
@@ -108,7 +108,7 @@ def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]
 def test_no_name_is_no_decision(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Somebody must have looked: who is named, or else whom git names."""
+    """A decision needs a name: the given one, or git's user name."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     group = next(iter(known))
@@ -124,7 +124,9 @@ def test_no_name_is_no_decision(
 def test_all_that_a_filter_finds_is_decided_after_a_question(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It says how many; without a terminal only --yes will do; ids and a filter at once cannot be meant."""
+    """The command states the number of groups; without a terminal it needs --yes; ids plus a filter are
+    refused.
+    """
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
     assert (asked.code, "--only: 3 groups (3 new)" in asked.err) == (2, True)
@@ -141,7 +143,7 @@ def test_all_that_a_filter_finds_is_decided_after_a_question(
 
 
 def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """They are shown with who made them, and can be asked for; a decision that is cleared is gone."""
+    """Remarks and flags are shown with their authors and can be filtered; a cleared decision is gone."""
     first, second, *_ = known
     cli("review", "approve", first, *JANE)
     cli("review", "remark", first, second, *JANE, "--text", "why not\nbelow?")
@@ -159,7 +161,7 @@ def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: 
 
 
 def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Counts, what has changed and why, what is flagged; of a campaign what keeps it from running."""
+    """The status shows counts, changes with reasons, flags, and what keeps a campaign from running."""
     gap = about(known, "offset(by, low, target=gap)")
     cli("review", "approve", *known, *JANE)
     cli("review", "flag", gap, *JANE)
@@ -182,7 +184,7 @@ def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str
 
 
 def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Of a group that is not what was approved any more; of others that there is nothing to show."""
+    """A group that changed since its approval shows the diff; other groups say that there is none."""
     gap = about(known, "offset(by, target=gap)")
     assert "no decision yet" in cli("review", "show", gap, "--changes").out
     cli("review", "approve", gap, *JANE)
@@ -198,7 +200,9 @@ def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[s
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A hand edit that went wrong stops the command: a word that is no decision, nobody who has looked."""
+    """A wrong hand edit, such as an unknown decision or a missing reviewer, stops the command with
+    its line.
+    """
     cli("review", "approve", next(iter(known)), *JANE)
     file = root / "fault_library/reviews/toycar.yaml"
     good = file.read_text()
@@ -209,7 +213,7 @@ def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: 
 
 
 def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
-    """Without one nothing is asked, and the error names what does without."""
+    """Without a terminal nothing is asked, and the error names the commands that need none."""
     answer = cli("review", "walk", *JANE)
     assert answer.code == 2
     assert "no terminal to ask in" in answer.err
@@ -218,7 +222,7 @@ def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Somebody at a terminal who presses these keys, with these remarks."""
+    """Simulate somebody who presses these keys at a terminal and types these remarks."""
 
     class Tty:
         def __init__(self, stream: Any) -> None:
@@ -243,7 +247,7 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def test_a_walk_asks_group_by_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
-    """a, r, s and q do what they say, another key asks again; each decision is kept at once."""
+    """a, r, s and q do what they say, another key asks again; each decision is saved at once."""
     first, second, third, *_ = known
     keys("axrsq", "good", "")
     answer = cli("review", "walk", *JANE)
@@ -259,7 +263,7 @@ def test_a_walk_asks_group_by_group(
 def test_a_walk_tells_what_somebody_else_says_meanwhile(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing of theirs is lost: the group is shown again with what they said, and asked about again."""
+    """A concurrent decision is kept: the group is shown again with it, and the question is repeated."""
     first, *_ = known
     keys("aaq", "", "")
     ask = typer.getchar
@@ -280,7 +284,7 @@ def test_a_walk_tells_what_somebody_else_says_meanwhile(
 def test_a_walk_ends_with_the_input(
     cli: Cli, root: Path, keys: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-D is an answer as good as q: nothing is decided, and nothing is wrong."""
+    """Ctrl-D works like q: nothing is decided, and the exit code is 0."""
 
     def over() -> str:
         raise EOFError
@@ -293,7 +297,7 @@ def test_a_walk_ends_with_the_input(
 
 
 def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]) -> None:
-    """Groups, states, diffs, values and options are in one file that needs no other; twice the same."""
+    """One self-contained file has all groups, states, diffs, values and options; twice the same bytes."""
     out = tmp_path / "review.html"
     first = next(iter(known))
     cli("review", "approve", first, *JANE)
@@ -317,7 +321,9 @@ def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: 
 
 @pytest.mark.slow
 def test_only_what_is_approved_is_run(cli: Cli, root: Path, tmp_path: Path) -> None:
-    """Refused, with names, numbers and commands, until all is approved; again when a template changes."""
+    """A run is refused, with names, numbers and commands, until all groups are approved; a changed template
+    is refused again.
+    """
     out = tmp_path / "run"
     words = ("run", "small", "--out", out, "--require-reviewed")
     refused = cli(*words)

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 def test_a_shard_is_run_and_merged(cli: Cli, root: Path) -> None:
-    """A share says how much of it is done; `merge` says what it made, and refuses to make it twice."""
+    """A shard reports its progress; `merge` reports the result and refuses to write it twice."""
     ran = cli("run", "small", "--out", "part", "-n", "0", "--shard", "1/2", "--limit", 4)
     assert ran.code == 0, ran.err
     assert "2 of 2 experiments done" in ran.err + ran.out

@@ -12,7 +12,7 @@ Cli = Callable[..., Any]
 
 
 def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
-    """All parts of the analysis that ships are shown, with what was proved, and the picture is written."""
+    """All parts of the shipped analysis are shown, with what was proved, and the diagram is written."""
     answer = cli("--root", CLONE, "stpa", "--svg", "structure.svg")
     assert answer.code == 0, answer.err
     for wanted in (
@@ -31,7 +31,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
 
 
 def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
-    """`--json` is one document with the same parts, and no problem."""
+    """`--json` is one document with the same parts and no problems."""
     answer = cli("--root", CLONE, "stpa", "--json")
     assert answer.json["problems"] == []
     assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]
@@ -43,7 +43,7 @@ def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
 
 @pytest.fixture
 def library(tmp_path: Path) -> Path:
-    """A copy of the library that ships; its target is the clone's."""
+    """A copy of the shipped library; its target is the clone's."""
     library = tmp_path / "fault_library"
     shutil.copytree(CLONE / "fault_library", library)
     (tmp_path / "target").symlink_to(CLONE / "target")
@@ -51,7 +51,7 @@ def library(tmp_path: Path) -> Path:
 
 
 def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> None:
-    """A spec that no causal factor asks for is told with its file; the exit code is 1."""
+    """A spec that no causal factor needs is reported with its file; exit code 1."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -62,7 +62,7 @@ def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> No
 
 
 def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) -> None:
-    """What cannot be read as an analysis is refused with file and line; the exit code is 2."""
+    """An unreadable analysis is refused with file and line; exit code 2."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[UCA2,", "[UCA22,", 1))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -71,7 +71,7 @@ def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) 
 
 
 def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
-    """Without the files the verb says which one is missing; campaigns need none of them."""
+    """Without the files the verb names the missing one; campaigns need none of them."""
     answer = cli("stpa")
     assert answer.code == 2
     assert "no control_structure.yaml" in answer.err
@@ -79,7 +79,7 @@ def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
 
 
 def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path) -> None:
-    """`check` tells the gaps of the hazard analysis among the other problems of the library."""
+    """`check` reports gaps in the hazard analysis among the library's other problems."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[vision_input/blur]", "[vision_input/blurr]"))
     answer = cli("--root", CLONE, "--library", library, "check")
@@ -97,7 +97,7 @@ def test_check_looks_at_the_analysis_too(cli: Cli, library: Path, nowhere: Path)
     ],
 )
 def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str) -> None:
-    """A campaign on contexts that are uncovered, overlap or ask for the unknown is not even planned."""
+    """A campaign is not planned if its contexts leave gaps, overlap or use unknown names."""
     table = root / "fault_library" / "stpa" / "contexts" / "near_far.yaml"
     table.write_text(table.read_text().replace("when: hwt > near_s", new))
     answer = cli("plan", "toy", "--out", "plan")
@@ -107,7 +107,7 @@ def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str)
 
 
 def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:
-    """A folder that is not there is told with the file's name."""
+    """A missing folder is reported with the file's name."""
     answer = cli("--root", CLONE, "stpa", "--svg", "no/such/structure.svg")
     assert answer.code == 2
     assert "no/such/structure.svg: cannot write the file" in answer.err

@@ -1,4 +1,4 @@
-"""What a terminal gets beyond plain text: colours, tables, a progress bar."""
+"""Terminal output beyond plain text: colours, tables, a progress bar."""
 
 import re
 from collections import Counter
@@ -16,7 +16,7 @@ from mutator.execution.phases import duration
 from mutator.mutants.readable_diffs import readable
 from mutator.store.progress import Progress
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 ANSI = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PATCH = """\
@@ -37,33 +37,33 @@ diff --git a/p/a.py b/p/a.py
 
 @pytest.fixture
 def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rich takes what it writes to for a terminal of 120 columns."""
+    """Make Rich treat its output as a terminal of 120 columns."""
     monkeypatch.setenv("FORCE_COLOR", "1")
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.delenv("NO_COLOR", raising=False)
 
 
 def test_a_diff_is_coloured_line_by_line(cli: Cli, root: Path, terminal: None) -> None:
-    """Inserted lines are green, and without the colours the diff is what a pipe gets."""
+    """Inserted lines are green; without the colours the diff equals the piped one."""
     answer = cli("diff", "sensor/silence")
     assert re.search(r"\x1b\[32m\+ +if not _fi.active", answer.out)
     assert "+        if not _fi.active" in ANSI.sub("", answer.out)
 
 
 def test_a_table_fits_the_terminal(cli: Cli, root: Path, terminal: None) -> None:
-    """A table in a terminal is no wider than it, and has a rule under its heads."""
+    """A table is no wider than the terminal and has a rule under its heads."""
     lines = ANSI.sub("", cli("list", "models").out).splitlines()
     assert all(len(line.rstrip()) <= 120 for line in lines)
     assert any(set(line.strip()) == {"─"} for line in lines)
 
 
 def test_json_stays_plain_in_a_terminal(cli: Cli, root: Path, terminal: None) -> None:
-    """A program that asks for JSON gets JSON, whatever it reads it from."""
+    """With --json the output is plain JSON even in a terminal."""
     assert cli("list", "specs", "--json").json["specs"]
 
 
 def notify_all(notify: Callable[[Progress], None]) -> None:
-    """A campaign's progress from begin to end."""
+    """The notifications of a campaign from begin to end."""
     notify(Progress(stage="checks", done=1, total=7))
     counts = Counter(hazard=2, sdc=1)
     run = Progress(stage="experiments", total=60, outcomes=counts)
@@ -72,7 +72,7 @@ def notify_all(notify: Callable[[Progress], None]) -> None:
 
 
 def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """The bar shows how many are done, how fast, the outcomes so far, and the remaining time."""
+    """The bar shows the count, the rate, the outcomes so far, and the remaining time."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     err = ANSI.sub("", capsys.readouterr().err)
@@ -81,7 +81,7 @@ def test_progress_in_a_terminal(capsys: pytest.CaptureFixture[str], terminal: No
 
 
 def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
-    """A log gets a line for each stage, and no more than one every now and then."""
+    """A log gets a line for each stage, and progress lines at intervals."""
     with campaign_progress(Terminal()) as notify:
         notify_all(notify)
     assert capsys.readouterr().err.splitlines() == [
@@ -95,12 +95,12 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
 def test_durations(seconds: float, words: str) -> None:
-    """Times are told in the unit that fits them."""
+    """Durations are printed in a fitting unit."""
     assert duration(seconds) == words
 
 
 def test_a_diff_for_reading_leaves_the_probe_out() -> None:
-    """New files are left out and named; everything else stays as it is."""
+    """New files are left out and named; the rest stays unchanged."""
     text, note = readable(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note
@@ -108,7 +108,7 @@ def test_a_diff_for_reading_leaves_the_probe_out() -> None:
 
 
 def test_each_stage_has_its_name_and_its_own_remaining_time(capsys: pytest.CaptureFixture[str]) -> None:
-    """A log names each stage of a run as it begins, and the time that it takes by itself."""
+    """A log names each stage of a run as it begins, and estimates its remaining time separately."""
     with campaign_progress(Terminal()) as notify:
         for stage in ("plan", "checks", "golden", "proof", "tables", "report"):
             timed = {"done": 7, "total": 23, "remaining_s": 8.0} if stage == "proof" else {}
@@ -136,7 +136,7 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
     ],
 )
 def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
-    """Lines break between words, go on indented, and lose nothing; commands and long words stay whole."""
+    """Lines break between words, continue indented, and lose no text; commands and long words stay whole."""
     assert folded(text, width).split("\n") == lines
 
 
@@ -144,8 +144,9 @@ def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 def test_a_pipe_gets_lines_of_100_columns(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results, remarks and errors are folded to 100 columns, or to COLUMNS; tables and what is to be copied
-    are not."""
+    """Results, remarks and errors are folded to 100 columns, or to COLUMNS; tables and copyable
+    text are not.
+    """
     monkeypatch.delenv("COLUMNS")
     if columns:
         monkeypatch.setenv("COLUMNS", columns)
@@ -166,7 +167,7 @@ def test_a_pipe_gets_lines_of_100_columns(
 
 
 def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """A terminal of 120 columns shows the lines folded to 120."""
+    """In a terminal of 120 columns the lines are folded to 120."""
     Terminal().say(f"{LONG}; or {COMMAND}")
     lines = ANSI.sub("", capsys.readouterr().out).splitlines()
     assert all(len(line) <= 120 for line in lines)
@@ -175,7 +176,7 @@ def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], 
 
 
 def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """However narrow the terminal is, JSON is as it is."""
+    """JSON is not folded, however narrow the terminal is."""
     wide = cli("list", "specs", "--json").out
     monkeypatch.setenv("COLUMNS", "20")
     assert cli("list", "specs", "--json").out == wide

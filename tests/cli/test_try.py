@@ -1,4 +1,4 @@
-"""What needs no run folder: `try` and `generate`, on the toy target."""
+"""The commands that need no run folder: `try` and `generate`, on the toy target."""
 
 import shutil
 from collections.abc import Callable
@@ -7,11 +7,13 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
-    """One fault from a file of one's own: diff, verdict, plot and traces, none of it in the library."""
+    """`try` takes a fault from any file: diff, verdict, plot and traces, with nothing written to
+    the library.
+    """
     shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")
     answer = cli("try", "own.yaml", "--scenario", "A", "--trigger", "2")
     assert answer.code == 0
@@ -22,7 +24,7 @@ def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
 
 
 def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
-    """Where the fault-free run reaches a hazard itself, one line says so, and so does the JSON."""
+    """If the fault-free run reaches a hazard itself, one line says so, and so does the JSON."""
     words = ("try", "sensor/lane", "-s", "A", "--trigger", "1")
     said = "the fault-free run also reaches"
     assert said not in cli(*words).out
@@ -36,7 +38,7 @@ def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
 
 
 def test_try_as_json(cli: Cli, root: Path) -> None:
-    """A program gets verdict, times and paths; the same fault has the same id each time."""
+    """JSON has verdict, times and paths; the same fault always has the same id."""
     words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
     one, two = cli(*words).json, cli(*words).json
     assert one == two
@@ -54,7 +56,7 @@ def test_try_as_json(cli: Cli, root: Path) -> None:
     ],
 )
 def test_what_cannot_be_tried_is_answered(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """A wrong scenario or value is refused with 2 and the choices."""
+    """A wrong scenario or value exits with 2 and lists the choices."""
     answer = cli("try", *words)
     assert answer.code == 2
     assert said in answer.err

@@ -27,7 +27,9 @@ def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
 
 
 def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
-    """It says the same as before, comments elsewhere stay, and those that could not are printed."""
+    """The new manifest says the same, keeps comments elsewhere, and the comments that it cannot keep are
+    printed.
+    """
     text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
     text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
     path.write_text(text.replace("t: now\n", 't: "now  # b"\n'))
@@ -45,7 +47,7 @@ def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
 
 @pytest.mark.parametrize("indent", [None, 1])
 def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | None) -> None:
-    """Where keys do not stand on lines of their own, all is written anew and says the same."""
+    """Where keys share a line the whole manifest is rewritten and says the same."""
     path.write_text(json.dumps(yaml.safe_load(path.read_text()), indent=indent) + "  # all of it\n")
     before = load_manifest(path)
     answer = cli("upgrade", path)
@@ -56,7 +58,7 @@ def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | 
 
 
 def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
-    """A channel that stands in both sections keeps what `compare` says of it."""
+    """A channel in both sections keeps what `compare` says about it."""
     path.write_text(path.read_text().replace("plot:\n", 'plot:\n  gas: {unit: "%"}\n'))
     loaded = load_manifest(path)
     assert cli("upgrade", path).code == 0
@@ -65,7 +67,7 @@ def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
 
 
 def test_line_breaks_and_links_stay(cli, path: Path) -> None:
-    """A file with the line breaks of Windows keeps them, and a link goes on leading to it."""
+    """A file with Windows line breaks keeps them, and a link stays a link."""
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     link = path.with_name("link.yaml")
     link.symlink_to(path.name)
@@ -87,7 +89,7 @@ def test_line_breaks_and_links_stay(cli, path: Path) -> None:
     ],
 )
 def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, message: str) -> None:
-    """What cannot be loaded is not written: the error names what is missing."""
+    """A manifest that cannot be loaded is not rewritten: the error names what is missing."""
     path.write_text(path.read_text().replace(line, ""))
     before = path.read_bytes()
     answer = cli("upgrade", path)
@@ -97,7 +99,7 @@ def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, messa
 
 
 def test_a_value_that_loads_nowhere_stays(cli, path: Path) -> None:
-    """A manifest is checked as when it is used, formulas and placeholders too."""
+    """The result is checked as in use, including formulas and placeholders, before it is written."""
     path.write_text(path.read_text().replace('"{out}", --number', '"{oot}", --number'))
     before = path.read_bytes()
     assert "{oot}" in cli("upgrade", path).err
@@ -105,7 +107,7 @@ def test_a_value_that_loads_nowhere_stays(cli, path: Path) -> None:
 
 
 def test_what_is_no_manifest_is_left_alone(cli, tmp_path: Path) -> None:
-    """A file of another kind is a user's error, and stays as it is."""
+    """A file of another kind is a user's error and stays unchanged."""
     path = tmp_path / "x.yaml"
     path.write_text("schema: campaign/1\n")
     answer = cli("upgrade", path)

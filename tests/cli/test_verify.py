@@ -11,19 +11,21 @@ import pytest
 from mutator.errors import MutatorError
 from mutator.store.series import Index, SeriesFolder
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
-    """Where the run of the first test is kept for the others, and its seal."""
+    """The run of the first test, kept for the others, and its seal."""
     return [tmp_path_factory.mktemp("driven") / "run"]
 
 
 @pytest.fixture
 def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
-    """The seal of the run folder `run`, as `mutator run` prints it. It is driven once: the library that each
-    test has is the same."""
+    """The seal of the run folder `run`, as `mutator run` prints it.
+
+    The folder is run once, since each test has the same library.
+    """
     kept, *seals = driven
     if not seals:
         ran = cli("run", "small", "--out", "run", "-n", "0", "--limit", 4, "--engine", "fork")
@@ -38,7 +40,7 @@ def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
 
 
 def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
-    """The page says what was checked, with which versions, what was drawn, and the seal, on one page."""
+    """One page lists what was checked, the versions, what was drawn, and the seal."""
     found = cli("verify", "run", "--rerun", 2, "--expect", sealed)
     assert (found.code, found.err) == (0, "")
     assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
@@ -51,7 +53,7 @@ def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
 
 
 def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """By `run`, again when nothing is left to do, as JSON, and in the report."""
+    """The seal is printed by `run`, by `run` with nothing left to do, in JSON, and in the report."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -62,7 +64,7 @@ def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
 
 
 def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
-    """Damage is listed, put aside and made good by the command that made the run: the seal is the old one."""
+    """The run's own command lists the damage, moves it aside and repairs it, and the seal is the old one."""
     records, patch = next(Path("run/records").iterdir()), next(Path("run/patches").iterdir())
     golden = next(Path("run/golden").rglob("log.npz"))
     lines = records.read_bytes().splitlines(keepends=True)
@@ -94,7 +96,7 @@ def packed() -> Index:
 
 
 def chunks() -> dict[str, str]:
-    """The files of packed series: those of golden runs, those of experiments, and the index."""
+    """The files of packed series: golden runs, experiments, and the index."""
     (goldens, _), (experiments, _) = packed().chunks
     return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
 
@@ -104,8 +106,11 @@ def chunks() -> dict[str, str]:
 def test_damaged_series_are_told_put_aside_and_made_again(
     cli: Cli, sealed: str, what: str, become: Callable[[Path], None]
 ) -> None:
-    """An audit names the file and what brings its series back: `rerun --trace` does, before and after a
-    repair, which leaves nothing to complain of. The chunk of the golden runs is made again at once."""
+    """An audit names the damaged file and the remedy.
+
+    `rerun --trace` restores the series, before and after a repair, and leaves no complaint. The golden runs'
+    chunk is rebuilt at once.
+    """
     before = {path.name: path.read_bytes() for path in Path("run/series").iterdir()}
     name, *others = packed().entries
     became = Path("run/series") / chunks()[what]
@@ -126,7 +131,7 @@ def test_damaged_series_are_told_put_aside_and_made_again(
             SeriesFolder(Path("run")).read(others[0])
     repaired = cli("verify", "run", "--repair")
     assert repaired.code == 1 and f"repaired: series/{became.name}" in repaired.out
-    if what != "index":  # the one that was driven again can be read
+    if what != "index":  # the rerun one can be read
         left = f"the series of {others[0]} and {len(others) - 1} more cannot be read"
         assert left in " ".join(repaired.out.split())
     assert (Path("run/damaged/series") / became.name).exists() == (become is flip)
@@ -142,7 +147,7 @@ def test_damaged_series_are_told_put_aside_and_made_again(
 
 
 def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> None:
-    """With the command that makes it anew, which does. A plot that is drawn hides it from nobody."""
+    """The audit names the command that restores the series. A drawn plot does not hide the damage."""
     name = next(iter(packed().entries))
     assert cli("show", name, "--run", "run").code == 0
     kept = SeriesFolder(Path("run")).kept(name)
@@ -158,7 +163,9 @@ def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> No
 
 
 def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
-    """Also where every patch is there: of two blocks of an experiment the first one does not count."""
+    """Damage is reported even if every patch exists: the first of an experiment's two blocks does
+    not count.
+    """
     [patches] = Path("run/patches").iterdir()
     data = patches.read_bytes()
     patches.write_bytes(data[:40] + b"?" + data[41:] + data)
@@ -169,7 +176,7 @@ def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
 
 
 def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
-    """The page lists some and counts the rest; JSON has all."""
+    """The page lists some differences and counts the rest; JSON has all."""
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")
@@ -180,7 +187,7 @@ def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
 
 
 def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> None:
-    """With another target no tree can be compared; it says so, and that is no pass."""
+    """With another target no tree can be compared; the audit says so and does not pass."""
     with (root / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     found = cli("verify", "run", "--expect", sealed)
@@ -190,7 +197,7 @@ def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> No
 
 
 def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeypatch: Any) -> None:
-    """Where the target is not in the library, digests and tables are compared all the same."""
+    """If the library lacks the target, digests and tables are still compared."""
     monkeypatch.delenv("MUTATOR_ROOT")
     found = cli("verify", "run", "--json")
     assert found.code == 1
@@ -207,6 +214,6 @@ def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeyp
     ],
 )
 def test_wrong_input(cli: Cli, sealed: str, words: tuple[str, ...], told: str) -> None:
-    """A folder that is none, and a seal that is none, are answered in words."""
+    """A folder that is no run, or text that is no seal, gets a clear error."""
     found = cli(*words)
     assert found.code == 2 and told in found.err

@@ -1,4 +1,4 @@
-"""What a command warns of: faults that can show nothing, and values that no spec declares."""
+"""Warnings: faults without effect, and values that no spec declares."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
+Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, json
 
 
 @pytest.mark.parametrize(
@@ -32,7 +32,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`, gives code, out, err, json
     ],
 )
 def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnings: list[str]) -> None:
-    """A value that changes nothing, and one outside the declared range, is warned of and built."""
+    """A value without effect, or outside the declared range, gets a warning and is built."""
     answer = cli("diff", *words)
     assert answer.code == 0
     assert "+" in answer.out
@@ -41,8 +41,9 @@ def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnin
 
 
 def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> None:
-    """A plan says how many of its experiments have such a value, and which faults these are; with a bound
-    the same value may change something."""
+    """The plan counts experiments with values that change nothing and names the faults; with a bound the same
+    value may have an effect.
+    """
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     listed = spec.read_text().replace(
         "reals_from: {first: [0.0, 0.1], step: 0.8, last: [2.4, 2.5]}", "values: [0, 1]"
@@ -57,7 +58,7 @@ def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> Non
 
 
 def test_a_run_warns_of_triggers_that_never_come(cli: Cli, root: Path) -> None:
-    """Before the experiments a run says how many of them wait in vain, and for what."""
+    """Before the experiments, a run says how many triggers never fire, and which."""
     campaign = root / "fault_library" / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{at_s: 50}, {at_s: 2}]"))

@@ -1,4 +1,4 @@
-"""Campaigns on a foreign target from the first command to the table: what a user meets."""
+"""Campaigns on a foreign target, from the first command to the table, as a user meets them."""
 
 import csv
 import os
@@ -39,7 +39,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, whose checks are known."""
+    """The toy, with cached checks."""
     return toy
 
 
@@ -74,7 +74,9 @@ def finished(finished_once: Finished, tmp_path: Path) -> Path:
 
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
-    """Loops, crashes, exits, greed and mutants that do not compile have a status; none is the harness's."""
+    """Loops, crashes, exits, exhausted memory and mutants that do not compile get a status; none is a harness
+    error.
+    """
     summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")
     found = {row["fault_type"]: (row["status"], row["outcome"]) for row in rows_of(tmp_path / "run")}
@@ -90,7 +92,9 @@ def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
-    """Plan, goldens, patches, records, tables; no scratch; and the target's tree is what it was."""
+    """A run leaves plan, goldens, patches, records and tables, no scratch files, and an unchanged target
+    tree.
+    """
     out, summary, told = finished_once.run, finished_once.summary, finished_once.told
     assert finished_once.after == finished_once.before
     assert {stage.stage for stage in told} == {"plan", "checks", "golden", "experiments", "tables"}
@@ -123,7 +127,7 @@ def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
 
 
 def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
-    """The next command deletes it wherever the harness writes, and touches nothing else."""
+    """The next command deletes half-written files wherever the harness writes, and touches nothing else."""
     places = (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7", "series/.index.js.7")
     left = [finished / place for place in places]
     mine = finished / "report" / "tables" / ".notes"
@@ -136,7 +140,7 @@ def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path
 
 @pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
 def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """A kept patch applies to the target and gives, byte for byte, the files of the mutant that ran."""
+    """A stored patch applied to the target gives, byte for byte, the files of the mutant that ran."""
     row = next(row for row in rows_of(finished) if row["outcome"] == "sdc")
     name = row["experiment_id"]
     tree = tmp_path / "patched"
@@ -153,7 +157,7 @@ def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -
 def test_rerun_gives_the_same_record_and_a_trace(
     toy: Workspace, finished: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """Any experiment can be run again exactly, its trace kept; a changed record would be noticed."""
+    """Any experiment can be rerun exactly and its trace kept; a changed record is noticed."""
     for row in rows_of(finished)[:3]:
         single, same = rerun(toy, finished, row["experiment_id"][:8])
         assert same
@@ -168,7 +172,7 @@ def test_rerun_gives_the_same_record_and_a_trace(
 
 
 def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """An experiment can be run with nothing but a workspace; golden is run too."""
+    """A workspace alone is enough to run an experiment and its golden run."""
     experiment = plan_file.read_all(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
@@ -187,7 +191,7 @@ def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_p
 def test_harness_errors_are_tried_again(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Harness errors make exit code 3 and no outcome; the same command runs just them again."""
+    """Harness errors give exit code 3 and no outcome; the same command runs only those experiments again."""
     execute, hit = ReferenceEngine.execute, []
 
     def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
@@ -213,7 +217,7 @@ def test_harness_errors_are_tried_again(
 def test_a_defect_in_a_worker_is_told(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A chunk that a defect of the harness ends is told of, and leaves the others alone."""
+    """A chunk that a harness defect ends is reported, and the others complete."""
     run, seen = Worker.run, []
 
     def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
@@ -232,7 +236,7 @@ def test_a_defect_in_a_worker_is_told(
 def test_the_users_pytest_is_another_matter(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What the user's environment tells pytest does not reach the campaign, and is there afterwards."""
+    """The user's pytest settings do not reach the campaign, and stay in the environment."""
     told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
     for name, value in told.items():
         monkeypatch.setenv(name, value)
@@ -242,7 +246,7 @@ def test_the_users_pytest_is_another_matter(
 
 
 def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
-    """A scenario with a folder in its name runs like any other."""
+    """A scenario in a subfolder runs like any other."""
     (toy.library / "scenarios" / "more").mkdir()
     shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")
     path = toy.campaign("small")
@@ -252,7 +256,7 @@ def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) ->
 
 
 def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:
-    """A mistake in the campaign, or no approval, leaves nothing behind; a folder that was there stays."""
+    """A mistake in the campaign, or a missing approval, leaves no folder; an existing folder stays."""
     (tmp_path / "old").mkdir()
     for out in (tmp_path / "new", tmp_path / "old"):
         with pytest.raises(MutatorError, match="no campaign"):
@@ -263,7 +267,7 @@ def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path)
 
 
 def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
-    """A run goes on without saying its choices again; other ones, or another text, are refused."""
+    """A run resumes without repeating its options; other options, or other text, are refused."""
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),
@@ -280,7 +284,7 @@ def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
 
 
 def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
-    """A finished run does not pass for one of a target that was edited since."""
+    """A finished run is refused if its target was edited since."""
     with (toy.library.parent / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("# edited\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -321,8 +325,9 @@ os.write(1, (out / "results.csv").read_bytes())
 
 @pytest.mark.parametrize("workers", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_a_full_disk(toy: Workspace, finished: Path, tmp_path: Path, workers: int) -> None:
-    """A disk that fills up stops the campaign with clear words; with room again the same command completes it
-    to the same table, repeating nothing that was finished."""
+    """A full disk stops the campaign with a clear error; with space again the same command completes it to
+    the same table and repeats no finished experiment.
+    """
     disk = tmp_path / "disk"
     disk.mkdir()
     script = f'mount -t tmpfs -o size=6m none "{disk}" && exec "$0" -c "$1" "$2" "{disk}" {workers}'

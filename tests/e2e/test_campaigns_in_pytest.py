@@ -1,4 +1,4 @@
-"""Campaigns as pytest sessions: what a user of pytest meets."""
+"""Campaigns as pytest sessions, as a user of pytest meets them."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
     ],
 )
 def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int, told: str) -> None:
-    """Called as pytest, a mistake is answered in words, with the exit code of its kind and no traceback."""
+    """Under pytest a mistake gets a clear error and the exit code of its kind, without a traceback."""
     root = toy.library.parent
     (root / "newer").mkdir()
     (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
@@ -58,7 +58,7 @@ def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int,
 
 
 def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
-    """The plugin does nothing, and imports nothing of the harness, when no campaign is asked for."""
+    """The plugin does nothing, and imports none of the harness, unless a campaign is requested."""
     test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
     answer = pytest_campaign(toy, "test_it.py")
@@ -67,7 +67,7 @@ def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
 
 
 def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
-    """Without xdist the same items run in the command's own process; a finished run has nothing to do."""
+    """Without xdist the same items run in the command's process; a finished run has nothing to do."""
     words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
     answer = pytest_campaign(toy, *words)
     assert answer.returncode == 0, answer.stdout
@@ -82,7 +82,7 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("given", "used"), [("loadfile", "load"), ("load", "load"), ("no", "no")])
 def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str) -> None:
-    """Chunks have one name for a file: a user's `--dist loadfile` would give all of them to one worker."""
+    """All chunks belong to one file, but `--dist loadfile` must not give all of them to one worker."""
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)
@@ -92,7 +92,7 @@ def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str)
 
 
 class Counting:
-    """Pytest plugin: what was collected, and when."""
+    """Pytest plugin that records what was collected, and when."""
 
     def __init__(self) -> None:
         self.items = 0
@@ -105,7 +105,7 @@ class Counting:
 
 
 def test_collecting_50000_experiments_is_cheap(toy: Workspace, tmp_path: Path) -> None:
-    """2,500 chunks are collected in a moment, and without opening plan, target or library."""
+    """Collecting 2,500 chunks is fast and opens neither plan nor target nor library."""
     begun: Any = SimpleNamespace(
         folder=SimpleNamespace(path=tmp_path / "nowhere"),
         workspace=Workspace(library=tmp_path / "nowhere", templates=tmp_path / "nowhere"),

@@ -1,4 +1,4 @@
-"""The examples: other people's controllers, each from its installed package. Extra `examples`."""
+"""The examples: third-party controllers, each from its installed package. Extra `examples`."""
 
 import csv
 import re
@@ -26,7 +26,7 @@ FORKED = 0.95
 
 @pytest.fixture(scope="module", params=INSTALLED)
 def example(request: pytest.FixtureRequest) -> str:
-    """The name of an example whose packages are installed here."""
+    """An example with its packages installed."""
     name: str = request.param
     for package in (INSTALLED[name], ALSO.get(name, "numpy")):
         if find_spec(package) is None:
@@ -52,13 +52,15 @@ def rows(run: Path) -> list[dict[str, str]]:
 
 
 def test_nothing_is_left_to_do(workspace: Workspace) -> None:
-    """`mutator check` finds nothing: no place is left to fill in, and each fault finds its statement."""
+    """`mutator check` finds nothing: every placeholder is filled, and each fault finds its statement."""
     assert mutator.check_library(workspace) == []
 
 
 def test_every_experiment_ends_well(run: Path) -> None:
-    """No experiment ends by the harness's fault or in time; what crashes, crashes in the controller. Faults
-    do harm, and not all of them do."""
+    """No experiment ends in a harness error or timeout; crashes are the controller's.
+
+    Some faults do harm, some do not.
+    """
     statuses = Counter(row["status"] for row in rows(run))
     assert sum(statuses.values()) >= 40
     assert set(statuses) <= {"ok", "crashed"}
@@ -66,13 +68,13 @@ def test_every_experiment_ends_well(run: Path) -> None:
 
 
 def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
-    """A car that leaves the road hits nothing: it has neither contact speed nor delta-v."""
+    """A car that leaves the road without a contact has neither contact speed nor delta-v."""
     contacts = [(row.get("contact_speed", ""), row.get("delta_v", "")) for row in rows(run)]
     assert all(bool(speed) == bool(delta_v) for speed, delta_v in contacts)
 
 
 def test_nearly_all_are_forked(run: Path) -> None:
-    """Of the experiments that do not crash, at least 95 % are forks of the golden run."""
+    """At least 95 % of the experiments that do not crash are forks of the golden run."""
     ended = {row["experiment_id"] for row in rows(run) if row["status"] == "ok"}
     timings = RunFolder.open(run).timings()
     forked = {name for name in ended if timings[name]["engine"] == RunMode.FORK}
@@ -80,15 +82,16 @@ def test_nearly_all_are_forked(run: Path) -> None:
 
 
 def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
-    """On the reference engine, where each experiment has an interpreter of its own, the results are the same
-    bytes; and so said the proof of the campaign itself."""
+    """The reference engine, with a fresh interpreter for each experiment, gives the same bytes; the
+    campaign's own proof agrees.
+    """
     assert run_campaign(workspace, "first", tmp_path / "run", workers=2, engine="reference").exit_code == 0
     for name in ("results.csv", "plan.csv"):
         assert (tmp_path / "run" / name).read_bytes() == (run / name).read_bytes()
 
 
 def own_lines(folder: Path, suffix: str) -> Counter[str]:
-    """Lines of the files of a kind, but for comments and empty ones."""
+    """Lines of the files of a kind, without comments and empty lines."""
     return counted("\n".join(path.read_text() for path in sorted(folder.rglob(f"*{suffix}"))))
 
 
@@ -106,8 +109,9 @@ def counted(text: str) -> Counter[str]:
 
 @pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
 def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
-    """What an example has beyond the lines that `mutator init` writes for its package is short; so is the
-    scene, which the results do without."""
+    """An example adds few lines to those that `mutator init` writes; the scene, which does not affect
+    results, is short as well.
+    """
     mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
     own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)
     if suffix == ".yaml":

@@ -14,7 +14,7 @@ Cli = Callable[..., tuple[int, str]]
 
 @pytest.fixture
 def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Runs `mutator WORDS...` on the pole; returns the exit code and what was printed."""
+    """Run `mutator WORDS...` on the pole; return the exit code and output."""
     monkeypatch.setenv("MUTATOR_LIBRARY", str(pole.library))
     monkeypatch.setenv("MUTATOR_TEMPLATES", str(pole.templates))
 
@@ -27,8 +27,9 @@ def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureF
 
 
 def test_a_foreign_tree_by_both_engines(cli: Cli, pole: Workspace, tmp_path: Path) -> None:
-    """Both engines come to the same table, the proof holds for every experiment, the folder verifies, an
-    experiment drives again to the same record, and the report has nothing of what the target has not."""
+    """Both engines give the same table, the proof covers every experiment, the folder verifies, a rerun gives
+    the same record, and the report shows only what the target has.
+    """
     tables = {}
     for engine in ("reference", "fork"):
         code, said = cli("run", "upright", "--out", tmp_path / engine, "-n", "0", "--engine", engine)

@@ -1,6 +1,6 @@
-"""Ten forgeries of a finished run, each tried twice: plainly, and with every digest computed anew.
+"""Ten forgeries of a finished run, each tried twice: plain, and with every digest recomputed.
 
-Every reader finds a plain one. One whose digests all fit is found by who knows the seal.
+Every reader finds a plain forgery. The seal reveals one with matching digests.
 """
 
 import json
@@ -44,7 +44,7 @@ def genuine(
     tmp_path_factory: pytest.TempPathFactory,
     copy_toycar: Callable[[Path], Workspace],
 ) -> tuple[Workspace, Path]:
-    """A finished campaign that was forked, so it has a proof; no test writes into it."""
+    """A finished forked campaign, so it has a proof; no test writes into it."""
     place = tmp_path_factory.mktemp("genuine")
     is_toy = request.param == "toy"
     workspace = copy_toycar(place) if is_toy else Workspace.find(root=CLONE)
@@ -56,12 +56,12 @@ def genuine(
 
 @pytest.fixture
 def run(genuine: tuple[Workspace, Path], tmp_path: Path) -> Path:
-    """A copy that a test may forge, with a plot so that `show` need not drive."""
+    """A copy to forge, with a plot so that `show` runs nothing."""
     return Path(shutil.copytree(genuine[1], tmp_path / "run"))
 
 
 def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
-    """A record of a hazard: its segment, its line from 0, its content."""
+    """The record of a hazard: its segment, its line from 0, its content."""
     for path in sorted((run / "records").iterdir()):
         for place, line in enumerate(path.read_text().splitlines()):
             record = json.loads(line)
@@ -71,20 +71,20 @@ def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
 
 
 def rewrite(path: Path, place: int, *lines: str) -> None:
-    """Put these lines in the place of one."""
+    """Replace a line by these lines."""
     old = path.read_text().splitlines()
     path.write_text("".join(f"{line}\n" for line in [*old[:place], *lines, *old[place + 1 :]]))
 
 
 def change(run: Path, **values: Any) -> str:
-    """Change fields of the record of a hazard; its id."""
+    """Change fields of the record of a hazard; return its id."""
     path, place, record = hazardous(run)
     rewrite(path, place, canonical(record | values))
     return str(record["experiment_id"])
 
 
-# The forgeries. Each is what somebody does with an editor; `deep` is what else must be changed for all
-# digests and ids to fit, but for those that `reseal` computes.
+# The forgeries, each made with an editor. `deep` is what else must change for all digests and ids to match,
+# except those that `reseal` computes.
 
 
 def an_outcome(run: Path, deep: bool) -> None:
@@ -174,7 +174,7 @@ def a_plan_condition(run: Path, deep: bool) -> None:
 
 
 def replan(run: Path, changed: Callable[[list[Experiment]], list[Experiment]]) -> None:
-    """Make the plan one of other experiments, and run.json and plan.csv that of this plan."""
+    """Replace the plan by one of other experiments, with matching run.json and plan.csv."""
     plan = load_plan(RunFolder.unverified(run))
     old = list(plan.experiments)
     new = tuple(changed(old))
@@ -237,7 +237,7 @@ forged = pytest.mark.parametrize("forge", FORGERIES, ids=lambda forge: forge.__n
 def cli(
     genuine: tuple[Workspace, Path], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, str]]:
-    """Runs `mutator WORDS...` in the genuine run's workspace; gives exit code and errors."""
+    """Run `mutator WORDS...` in the genuine run's workspace; return exit code and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(genuine[0].library.parent))
 
     def answer(*words: object) -> tuple[int, str]:
@@ -270,7 +270,7 @@ def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
     }
 
 
-# What does not look at the table cannot be misled by it.
+# Commands that do not read the table.
 BLIND = {the_table: ("show", "rerun", "compare", "merge")}
 
 
@@ -278,7 +278,9 @@ BLIND = {the_table: ("show", "rerun", "compare", "merge")}
 def test_a_plain_forgery_is_found_by_every_reader(
     genuine: tuple[Workspace, Path], run: Path, cli: Cli, forge: Callable[[Path, bool], None]
 ) -> None:
-    """The reader ends with an error that names the forged file; only a table is made anew, with a warning."""
+    """The reader exits with an error that names the forged file; a forged table is only rebuilt, with a
+    warning.
+    """
     forge(run, False)
     for reader, words in readers(run, genuine[1]).items():
         if reader in BLIND.get(forge, ()):
@@ -297,7 +299,7 @@ def test_a_plain_forgery_is_found_by_every_reader(
 def test_a_plain_forgery_is_found_by_the_api(
     genuine: tuple[Workspace, Path], run: Path, forge: Callable[[Path, bool], None]
 ) -> None:
-    """So is it in Python; what was only edited in the table is not in the frame."""
+    """The Python API finds it, too; a change made only in the table does not reach the frame."""
     name = hazardous(genuine[1])[2]["experiment_id"]
     forge(run, False)
     if forge is the_table:
@@ -312,7 +314,7 @@ def test_a_plain_forgery_is_found_by_the_api(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    """It is what it says, also copied elsewhere and read-only, and its seal is the one that was printed."""
+    """The genuine run passes, also as a read-only copy elsewhere, and its seal is the printed one."""
     known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -332,8 +334,10 @@ def test_a_forgery_whose_digests_all_fit_is_found_by_the_seal(
     cli: Cli,
     forge: Callable[[Path, bool], None],
 ) -> None:
-    """It opens like any other run, and all that it says of itself fits; it is not the run that the seal
-    stands for. An edited table follows from no record."""
+    """A consistent forgery opens like any other run, but its seal differs from the printed one.
+
+    An edited table follows from no record.
+    """
     known = seal_of(RunFolder.open(genuine[1]))
     forge(run, True)
     if forge is not the_table:

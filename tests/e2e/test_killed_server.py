@@ -1,4 +1,4 @@
-"""A server that is killed: its jobs leave no process, no half of a file, and a run folder that verifies."""
+"""A killed server: its jobs leave no processes and no half-written files, and the run folder verifies."""
 
 import http.client
 import json
@@ -24,7 +24,7 @@ CAMPAIGN = {"kind": "campaign", "campaign": "toy", "name": "new", "limit": 6, "w
 
 @dataclass
 class Server:
-    """`mutator serve` as a process of its own."""
+    """`mutator serve` as a separate process."""
 
     folder: Path
     root: Path
@@ -36,7 +36,7 @@ class Server:
         return cls(folder, root, *started(folder, root))
 
     def restart(self) -> None:
-        """Another server, once this one has ended."""
+        """Start another server after this one has ended."""
         self.process, self.address = started(self.folder, self.root)
 
     @property
@@ -48,7 +48,7 @@ class Server:
         return self.address.partition("token=")[2]
 
     def ask(self, path: str, body: Any = None) -> Any:
-        """What it answers to a page of its own."""
+        """The server's response for one of its own pages."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
         headers = {"Cookie": f"mutator-{self.port}={self.token}", "Content-Type": "application/json"}
         headers |= {"Origin": f"http://127.0.0.1:{self.port}"}
@@ -59,7 +59,7 @@ class Server:
         return json.loads(answer)
 
     def wait_for(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """The newest job once this holds of it."""
+        """Wait until this holds for the newest job."""
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline:
             [job, *_] = self.ask("/api/jobs")["jobs"]
@@ -70,7 +70,7 @@ class Server:
 
 
 def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
-    """A new server, and the address that it prints."""
+    """Start a server; return it and the address that it prints."""
     with (folder / "stderr").open("a") as errors:
         process = subprocess.Popen(
             [sys.executable, "-m", "mutator", "serve", "runs", "--no-browser", "--root", str(root)],
@@ -84,7 +84,7 @@ def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
 
 
 def descendants(pid: int) -> set[int]:
-    """All processes that came of one, in whatever session."""
+    """All descendants of a process, in any session."""
     parents = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -99,7 +99,7 @@ def descendants(pid: int) -> set[int]:
 
 
 def living(pids: set[int]) -> set[int]:
-    """Those that have not ended."""
+    """The processes that are still alive."""
     return {pid for pid in pids if Path(f"/proc/{pid}").exists() and _state(pid) != "Z"}
 
 
@@ -118,13 +118,13 @@ def wait_until_gone(pids: set[int], within_s: float) -> None:
 
 
 def mutator(server: Server, *words: str) -> subprocess.CompletedProcess[str]:
-    """A command on the server's library."""
+    """Run a command on the server's library."""
     command = [sys.executable, "-m", "mutator", *words, "--root", str(server.root)]
     return subprocess.run(command, cwd=server.folder, capture_output=True, text=True, check=False)
 
 
 def check_left(server: Server, run: str) -> None:
-    """No file of the run folder is half written, and all that is there verifies."""
+    """No file of the run folder is half-written, and the whole folder verifies."""
     folder = server.folder / "runs" / run
     assert not [path for path in folder.rglob("*") if is_half_written(path.name)]
     if (folder / "digests.json").exists():
@@ -133,7 +133,7 @@ def check_left(server: Server, run: str) -> None:
 
 
 def kill(server: Server, number: int) -> int:
-    """End the server by a signal, and wait until nothing is left of its jobs; how many processes they had."""
+    """End the server by a signal and wait until its jobs' processes are gone; return how many there were."""
     pids = descendants(server.process.pid)
     server.process.send_signal(number)
     server.process.wait()
@@ -157,7 +157,7 @@ def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Ser
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("stage", ["planning", "experiments", "tables"])
 def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int) -> None:
-    """Whatever it is at, and however the server ends; the same campaign then goes on to its end."""
+    """A campaign ends with its server at any stage and signal; the same campaign then completes."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith(stage) or bool(job["ended"]))
     assert kill(server, number)
@@ -170,14 +170,14 @@ def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plot", "film", "still", "report", "rerun"])
 def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) -> None:
-    """A server that is killed at any moment of such a job leaves the run folder as it was, or all of it."""
+    """A server killed at any moment of such a job leaves the run folder unchanged or complete."""
     done = mutator(server, "run", "toy", "--out", "runs/new", "--limit", "6", "-n", "2")
     assert done.returncode == 0, done.stdout + done.stderr
     ids = [line.split(",")[0] for line in (server.folder / "runs/new/plan.csv").read_text().splitlines()[1:]]
     order = {"kind": kind, "run": "new"}
     order |= {} if kind == "report" else {"experiment": ids[0]}
     order |= {"t": 2.0} if kind == "still" else {}
-    for _ in range(2):  # the second finds warm caches, as those do that are killed
+    for _ in range(2):  # the second run has warm caches, as the killed ones do
         began = time.monotonic()
         server.ask("/api/jobs", order)
         ended = server.wait_for(lambda job: bool(job["ended"]))
@@ -194,7 +194,9 @@ def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) ->
 
 @pytest.mark.slow
 def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
-    """All that it started is gone before it is told as ended, and the server goes on with the next one."""
+    """All processes of a cancelled job are gone before it is reported as ended, and the server continues with
+    the next one.
+    """
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith("experiments"))
     pids = descendants(server.process.pid)

@@ -1,5 +1,6 @@
-"""A command that is killed between two of its writes, whichever they are, leaves a folder that opens and that
-the same command finishes as if nothing had been."""
+"""A command killed between any two writes leaves a folder that opens, and the same command finishes it as if
+undisturbed.
+"""
 
 import shutil
 from collections.abc import Callable
@@ -20,12 +21,14 @@ RENAMES = ((Path, "replace"), (Path, "rename"), (shutil, "rmtree"))
 
 
 class Killed(BaseException):
-    """The process is gone."""
+    """Stands for the end of the process."""
 
 
 class Death:
-    """Lets so many changes of names in a run folder happen, and none after them: files appear by being
-    renamed. What only scratch is concerned with is not counted."""
+    """Allow this many renames in a run folder, and fail all later ones: files appear by being renamed.
+
+    Renames of scratch files do not count.
+    """
 
     def __init__(self, run: Path, after: int, patch: pytest.MonkeyPatch) -> None:
         self.left, self._run = after, run
@@ -46,14 +49,14 @@ class Death:
 
 
 def run(workspace: Workspace, out: Path) -> str | None:
-    """Run two experiments of the toy campaign, or go on with them; the seal."""
+    """Run two experiments of the toy campaign, or resume them; return the seal."""
     summary = run_campaign(workspace, "small", out, choices=CHOICES, engine="reference")
     assert summary.exit_code == 0
     return summary.seal
 
 
 def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str | None, bytes]) -> bool:
-    """Kill a run after so many renames, look at the folder, go on; whether it was killed at all."""
+    """Kill a run after this many renames, check the folder and resume; return whether it was killed."""
     with pytest.MonkeyPatch.context() as patch:
         death = Death(out, after, patch)
         with suppress(Killed, AssertionError):
@@ -66,7 +69,7 @@ def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str 
 
 @pytest.fixture
 def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
-    """Seal and table of a run that nobody killed. Its checks are in the cache then."""
+    """Seal and table of an undisturbed run. Its checks are then cached."""
     out = tmp_path / "undisturbed"
     found = run(toy, out)
     assert found == seal_of(RunFolder.open(out)) is not None
@@ -76,7 +79,7 @@ def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
 def test_kills_between_two_writes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
 ) -> None:
-    """While it is planned, while checks are put in place, and while it is finished."""
+    """Kills during planning, while checks are installed, and while the run is finished."""
     for after in (5, 8, 12):
         assert check_kill(toy, tmp_path / str(after), after, undisturbed)
 
@@ -85,7 +88,7 @@ def test_kills_between_two_writes(
 def test_every_kill_between_two_writes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
 ) -> None:
-    """Before the first write, before the second, and so on, to the end."""
+    """Kills before the first write, before the second, and so on."""
     after = 0
     while check_kill(toy, tmp_path / str(after), after, undisturbed):
         after += 1

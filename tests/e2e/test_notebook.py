@@ -10,7 +10,7 @@ NOTEBOOK = Path(__file__).parents[2] / "docs" / "tutorial" / "from-fault-to-comp
 
 
 def test_the_notebook_is_kept_without_outputs() -> None:
-    """What the cells gave on somebody's machine is not in the repository."""
+    """The repository's notebook has no outputs."""
     notebook = nbformat.read(NOTEBOOK, as_version=4)
     nbformat.validate(notebook)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
@@ -20,7 +20,7 @@ def test_the_notebook_is_kept_without_outputs() -> None:
 
 @pytest.mark.slow
 def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every cell runs from fault to comparison, plots are pictures, all experiments have a result."""
+    """Every cell runs, from fault to comparison; plots are images, and all experiments have a result."""
     monkeypatch.setenv("MUTATOR_ROOT", str(NOTEBOOK.parents[2]))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     notebook = nbformat.read(NOTEBOOK, as_version=4)

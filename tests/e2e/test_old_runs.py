@@ -1,6 +1,6 @@
-"""Run folders of earlier versions: they open, compare, export, report and show; they are not run on.
+"""Run folders of earlier versions: they open, compare, export, report and show, but do not resume.
 
-tests/fixtures/ has one folder for each schema of run folders, with the library and target it was made of.
+tests/fixtures/ has one folder for each run-folder schema, with the library and target that made it.
 """
 
 import json
@@ -23,14 +23,14 @@ from mutator.workspace import Workspace
 
 FIXTURES = sorted((Path(__file__).parents[1] / "fixtures").glob("run-*"))
 EXPERIMENTS = 12
-KEPT = "07bbcc0632ee6107"  # whose trace is in every fixture
+KEPT = "07bbcc0632ee6107"  # every fixture has its trace
 
 Cli = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture(scope="module", params=FIXTURES, ids=lambda path: path.name)
 def fixture(request: pytest.FixtureRequest) -> Path:
-    """A fixture, which no test may write to."""
+    """A fixture; no test may write to it."""
     path: Path = request.param
     return path
 
@@ -43,7 +43,7 @@ def place(fixture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def fresh(place: Path) -> Path:
-    """The same campaign of the same library, run by the code of today."""
+    """The same campaign of the same library, run by the current code."""
     workspace = Workspace.find(root=place / "toy")
     out = place / "fresh"
     assert run_campaign(workspace, "small", out, engine="reference").exit_code == 0
@@ -52,7 +52,7 @@ def fresh(place: Path) -> Path:
 
 @pytest.fixture
 def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Runs `mutator WORDS...` where the fixture's library is; gives exit code, output and errors."""
+    """Run `mutator WORDS...` with the fixture's library; return exit code, output and errors."""
     monkeypatch.chdir(place)
     monkeypatch.setenv("MUTATOR_ROOT", str(place / "toy"))
 
@@ -68,8 +68,7 @@ LATER = {"fault_tolerant_time", "manifest_to_hazard"}  # columns that old runs l
 
 
 def assert_same_cells(new: Path, old: Path) -> None:
-    """Equal tables, but for columns that came later, and those of a car that this target is not, which
-    version 0.1 left empty."""
+    """Equal tables, except newer columns and the car columns that version 0.1 left empty for this target."""
     today, then = (pd.read_csv(path, dtype=str, keep_default_na=False) for path in (new, old))
     assert {*today.columns} - {*then.columns} <= LATER
     shared = [column for column in today.columns if column in then.columns or column not in LATER]
@@ -79,14 +78,14 @@ def assert_same_cells(new: Path, old: Path) -> None:
 
 
 def test_there_is_one_for_each_schema() -> None:
-    """A run folder's schema never rises without a fixture of the new one beside those of the old."""
+    """Every run-folder schema has a fixture."""
     schemas = [RunFolder.open(path / "small").head["schema"] for path in FIXTURES]
     assert [path.name.replace("-", "/") for path in FIXTURES] == schemas
     assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA
 
 
 def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
-    """Plan, records, results and patches are read; each id follows from its content as it did then."""
+    """Plan, records, results and patches can be read, and each id still follows from its content."""
     run = load_run(place / "small", workspace=place / "toy")
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
@@ -97,7 +96,7 @@ def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
 
 
 def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
-    """Today's code gives the same plan, ids, result rows and trace digests."""
+    """The current code gives the same plan, ids, result rows and trace digests."""
     old, new = RunFolder.open(place / "small"), RunFolder.open(fresh)
     assert new.head["plan"] == old.head["plan"]
     assert [*plan_file.ids(new.path)] == [*plan_file.ids(old.path)]
@@ -108,7 +107,7 @@ def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
 
 
 def test_it_says_whether_it_can_be_verified(cli: Cli, place: Path) -> None:
-    """Runs of before there were digests are marked wherever they are shown; later ones have a seal."""
+    """Runs from before digests are marked wherever they are shown; later ones have a seal."""
     old = is_old(place / "small")
     run = load_run(place / "small")
     assert (run.verifiable, run.seal is None, "not verifiable" in repr(run)) == (not old, old, old)
@@ -127,7 +126,7 @@ def is_old(run: Path) -> bool:
 
 
 def test_it_compares(cli: Cli, fresh: Path) -> None:
-    """Compared with itself and with a fresh run, whichever comes first, nothing changed."""
+    """Compared with itself and with a fresh run, in either order, nothing changed."""
     for one, other in (("small", "small"), ("small", "fresh"), ("fresh", "small")):
         code, out, err = cli("compare", one, other, "--fail-on", "worse,new-hazard,unmatched")
         assert code == 0, err
@@ -136,7 +135,7 @@ def test_it_compares(cli: Cli, fresh: Path) -> None:
 
 @pytest.mark.parametrize("format", list(Format))
 def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> None:
-    """Every format is written, with every experiment in it; MCAP with those that have series or traces."""
+    """Every format is written with every experiment; MCAP with those that have series or traces."""
     file = place / f"export-{format.value}"
     code, _, err = cli("export", "small", "--format", format.value, "--out", file)
     assert code == 0, err
@@ -148,7 +147,7 @@ def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> Non
         assert file.read_text().count("<testcase ") == EXPERIMENTS
     elif format is Format.MCAP:
         written = {path.stem for path in file.iterdir()}
-        has_series = (fixture / "small" / "series").is_dir()  # in `place` other tests may have made some
+        has_series = (fixture / "small" / "series").is_dir()  # other tests may have made some in `place`
         assert KEPT in written and len(written) == (EXPERIMENTS if has_series else 1)
     else:
         mutants = json.loads(file.read_text())["files"]["toycar/sensing.py"]["mutants"]
@@ -156,7 +155,7 @@ def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> Non
 
 
 def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
-    """The report is written anew; the results are made again from the records, cell for cell."""
+    """The report is written and the results are rebuilt from the records, cell for cell."""
     shutil.copytree(place / "small", copy := place / "reported")
     for derived in ("results.csv", "results.parquet", "timings.parquet"):
         (copy / derived).unlink()
@@ -168,7 +167,7 @@ def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
 
 
 def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
-    """Its diff, verdict and plot are those that were kept: nothing is driven."""
+    """Diff, verdict and plot are the stored ones; nothing is run."""
     code, out, err = cli("show", KEPT, "--run", "small", "--json")
     assert code == 0, err
     shown = json.loads(out)
@@ -177,7 +176,7 @@ def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
 
 
 def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
-    """The decisions of then, three of them in two groups each, still approve what is injected."""
+    """The old decisions, three of them in two groups each, still approve what is injected."""
     code, out, err = cli("review", "list", "--campaign", "small", "--json")
     assert code == 0, err
     approved = json.loads((place / "small" / "reviewed.json").read_text())["groups"]
@@ -185,7 +184,7 @@ def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
 
 
 def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another version of mutator, and other sources, are refused by name, and nothing is written."""
+    """Another mutator version or other sources are refused by name, and nothing is written."""
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
@@ -208,8 +207,7 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
-    """What may become of a file: a flipped bit, an end that is lost, bytes that are zero, lines that are
-    dropped, doubled or swapped."""
+    """Damage to a file: a flipped bit, a lost end, zero bytes, dropped, doubled or swapped lines."""
     place = draw.randrange(len(data) or 1)
     yield data[:place] + bytes([(data[place] if data else 0) ^ 1 << draw.randrange(8)]) + data[place + 1 :]
     yield data[:place]
@@ -227,7 +225,7 @@ READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch",
 
 
 def test_a_damaged_one_never_ends_in_a_traceback(cli: Cli, place: Path) -> None:
-    """Whatever becomes of whichever file, readers answer in words, or with what is right."""
+    """Readers of a damaged folder give a clear error or correct output, never a traceback."""
     shutil.copytree(place / "small", copy := place / "damaged")
     draw = random.Random(place.name)
     files = sorted({path for pattern in READ for path in copy.rglob(pattern) if "report" not in path.parts})

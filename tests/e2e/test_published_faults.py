@@ -1,4 +1,4 @@
-"""The faults that were measured on the original openpilot, put into ours on the original's plant."""
+"""The faults measured on the original openpilot, injected into our controller on the original's plant."""
 
 import csv
 from pathlib import Path
@@ -49,7 +49,9 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, s
 def test_hazards_and_alerts_are_those_of_the_original(
     rows: dict[str, list[dict[str, str]]], variant: str
 ) -> None:
-    """The same kinds of hazards and alerts; as many hazards but for two, since the values are drawn anew."""
+    """The kinds of hazards and alerts are the same; hazard counts differ by at most two, since the values are
+    drawn again.
+    """
     runs, hazards, kind, alerts, t_alert = ORIGINAL[variant]
     found = rows[variant]
     assert len(found) == runs
@@ -61,8 +63,8 @@ def test_hazards_and_alerts_are_those_of_the_original(
         assert float(found[0]["t_alert"]) == pytest.approx(t_alert, abs=0.05)
 
 
-# The lanes of the original's simulator are swapped. Source: its runs of the authors' files 14 (value 1) and
-# 16 (value 2); the campaign's first right lane and second large steering error come next to these.
+# The original's simulator swaps the lanes. Source: its runs of the authors' files 14 (value 1) and 16 (value
+# 2); the campaign's first right lane and second large steering error are closest to these.
 SWAPPED = {
     ("path_model", "right", "-2.01"): {"t_h1": 14.79, "t_h3": 11.75, "t_alert": 7.745},
     ("steer", "angle", "-32.89"): {"t_h3": 13.0},
@@ -70,7 +72,7 @@ SWAPPED = {
 
 
 def test_faults_that_see_the_swapped_lanes(tmp_path: Path) -> None:
-    """A right lane that drifts and a steering angle that is off do what they did there, within 0.1 s."""
+    """A drifting right lane and a steering-angle offset act as in the original, within 0.1 s."""
     workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
     values = " or ".join(
         f'(fault_type == "{kind}" and variant == "{variant}" and value == {value})'

@@ -1,4 +1,4 @@
-"""The gate of the how-to: a version of a controller that is worse is refused, the same one is not."""
+"""The gate of the how-to refuses a worse controller version and passes the same one."""
 
 import os
 import re
@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def root(tmp_path: Path) -> Path:
-    """The toy with the page's script, a copy of its controller, and one that keeps to the right."""
+    """The toy with the page's script, a copy of its controller, and a version that keeps to the right."""
     toy = CLONE / "tests" / "toy"
     ignored = shutil.ignore_patterns("__pycache__", "hostile")
     shutil.copytree(toy / "fault_library", tmp_path / "fault_library", ignore=ignored)
@@ -34,7 +34,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
-    """The script on two trees; `mutator` is that of this interpreter."""
+    """Run the script on two trees, with this interpreter's `mutator`."""
     folder = root / "bin"
     folder.mkdir(exist_ok=True)
     command = folder / "mutator"
@@ -53,7 +53,7 @@ def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_worse_version_is_refused(root: Path) -> None:
-    """Its newly hazardous faults are named and it ends with 1; the same version passes."""
+    """The gate names the newly hazardous faults and exits with 1; the same version passes."""
     refused = gate(root, "tree", "worse")
     assert refused.returncode == 1, refused.stderr
     named = [line for line in refused.stderr.splitlines() if line.startswith("error: ")]

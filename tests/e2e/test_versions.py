@@ -1,4 +1,4 @@
-"""A run goes on with the Python and packages it began with, or says that it did not."""
+"""A run resumes with the Python and packages it began with, or reports the difference."""
 
 import json
 import os
@@ -45,7 +45,7 @@ class OnePiece:
 
 @pytest.fixture
 def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Runs `mutator WORDS...`; gives exit code, output and errors."""
+    """Run `mutator WORDS...`; return exit code, output and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
 
     def run(*words: object) -> tuple[int, str, str]:
@@ -58,7 +58,7 @@ def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFi
 
 @pytest.fixture
 def half(toy: Workspace, tmp_path: Path, python: Callable[[str], None]) -> Path:
-    """A run folder of which Python 3.11.7 has driven two experiments; now it is Python 3.12.1."""
+    """A run folder in which Python 3.11.7 has run two experiments; the current version is 3.12.1."""
     out = tmp_path / "half"
     python("3.11.7")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 2
@@ -74,7 +74,7 @@ def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
 
 @pytest.fixture
 def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the fault-free runs that are driven."""
+    """Names of the fault-free runs that are run."""
     names: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -88,7 +88,7 @@ def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def other_digits(execute: Execute) -> Execute:
-    """What runs runs on a machine that computes otherwise: each record of the target's ends in a blank."""
+    """Make each of the target's records end in a blank, as if this machine computed differently."""
 
     def run(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
         done = execute(self, job, folder)
@@ -104,7 +104,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
 
 
 def test_another_python_is_refused(cli: Cli, half: Path) -> None:
-    """Exit code 2, both versions named, what to do said; nothing is driven and nothing is written."""
+    """Exit code 2 with both versions and the remedy; nothing is run or written."""
     before = contents(half)
     code, _, err = cli("run", "small", "--out", half, "-n", "0")
     assert code == 2
@@ -115,8 +115,9 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 def test_another_python_is_accepted_and_noted(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
-    """With the option the run is finished, its fault-free runs are driven again and agree, its results are
-    those of an undisturbed run; run.json, the report and `show` say who drove what."""
+    """With the option, the fault-free runs are repeated and agree, and the results are those of an
+    undisturbed run. run.json, the report and `show` say which version ran what.
+    """
     before = len(driven)
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
     assert code == 0, err
@@ -134,11 +135,11 @@ def test_another_python_is_accepted_and_noted(
     for version, name in {version: name for name, version in by.items()}.items():  # one of each
         code, out, _ = cli("show", name, "--run", half, "--no-plot")
         assert code == 0 and f"run with: {version}, " in out
-    assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to drive
+    assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to run
 
 
 def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the fault-free runs come out otherwise, accepting does not help, and nothing is written."""
+    """If the fault-free runs differ, the option does not help, and nothing is written."""
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
@@ -149,7 +150,7 @@ def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch:
 def test_pytest_refuses_and_accepts_as_the_command_does(
     toy: Workspace, half: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Called as pytest, a session has the same option and the same exit code."""
+    """Under pytest a session has the same option and exit code."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     plain = ["-c", os.devnull, "-p", "no:cacheprovider", "--noconftest", "--rootdir", str(half)]
     words = [*plain, "--disable-plugin-autoload", "-p", "mutator"]
@@ -163,7 +164,7 @@ def test_pytest_refuses_and_accepts_as_the_command_does(
 def test_another_machine_drives_the_golden_runs_again(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
 ) -> None:
-    """On another processor a run goes on without a word if the fault-free runs agree, and not otherwise."""
+    """On another processor a run resumes silently if the fault-free runs agree, and is refused otherwise."""
     out = tmp_path / "run"
     run_campaign(toy, "small", out, distributor=OnePiece())
     assert sorted(driven) == ["a-A", "a-A+alone", "b-A", "b-A+alone"]
@@ -189,7 +190,7 @@ Shard = Callable[..., Path]
 def shard(
     toy: Workspace, tmp_path: Path, python: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> Shard:
-    """Runs one of two shards on a machine of its own, with a Python of this version."""
+    """Run one of two shards on a separate machine, with a Python of this version."""
 
     def run(number: int, version: str = "3.11.7") -> Path:
         python(version)
@@ -202,7 +203,7 @@ def shard(
 
 
 def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
-    """Exit code 2 with the list; accepted, the merged run has the stretches of both, and says so."""
+    """Exit code 2 with the list; if accepted, the merged run keeps and lists the stretches of both."""
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
     code, _, err = cli(*words)
     assert code == 2 and "part2: not run as " in err and PYTHONS in err and "--accept-versions" in err
@@ -220,12 +221,12 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
 def test_shards_of_other_machines_are_merged(
     cli: Cli, shard: Shard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Processors may differ: that the fault-free runs agree is enough, and that they do not is an error."""
+    """Shards from different processors merge if their fault-free runs agree; a difference is an error."""
     one = shard(1)
     assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
     shutil.rmtree(tmp_path / "part2")
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
-    shutil.rmtree(caches.of_checks())  # the machine is another one now
+    shutil.rmtree(caches.of_checks())  # simulate another machine
     code, _, err = cli("merge", one, shard(2), "--out", tmp_path / "other")
     assert code == 1 and "the golden run A is another one" in err
 
@@ -242,7 +243,7 @@ def _other_pythons() -> Iterator[str]:
 
 @pytest.mark.slow
 def test_two_real_pythons(toy: Workspace, tmp_path: Path) -> None:
-    """A folder begun by this Python is refused by another one, with the list, and goes on if accepted."""
+    """Another Python refuses the folder with the list of differences, and resumes it if accepted."""
     python = next(_other_pythons(), None)
     if python is None:
         pytest.skip("there is no second Python")

@@ -1,4 +1,4 @@
-"""Disturbed pictures in the closed loop: each effect at each level, seen by either detector."""
+"""Disturbed frames in the closed loop: each effect at each level, with either detector."""
 
 import csv
 from collections import Counter
@@ -23,7 +23,7 @@ def workspace() -> Workspace:
 
 
 def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
-    """How many levels of each fault type led out of the lane; every run must have ended well."""
+    """The number of levels of each fault type that led out of the lane; every run must have ended well."""
     summary = run_campaign(workspace, f"vision_levels_{detector}", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 69)
     rows = list(csv.DictReader((out / "results.csv").open()))
@@ -32,7 +32,9 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_levels(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow, contrast mislead the published detector, fog and blur do not; the other one sees more."""
+    """Rain, snow and contrast mislead the published detector, fog and blur do not; the other detector is more
+    robust.
+    """
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
     assert all(paper[name] > 0 for name in ("rain", "snow", "contrast"))
@@ -44,7 +46,7 @@ def test_levels(workspace: Workspace, tmp_path: Path) -> None:
 def test_the_cache_of_pictures_changes_nothing(
     workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A campaign that finds no pictures in the cache, and one that finds them, come to the same bytes."""
+    """A campaign gives the same bytes with a cold and a warm cache of frames."""
     cache = tmp_path / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     runs = [tmp_path / "cold", tmp_path / "warm"]

@@ -1,4 +1,4 @@
-"""sdist and wheel, built by the standard front end, installed and used where there is no clone."""
+"""sdist and wheel, built by the standard front end, installed and used outside a clone."""
 
 import json
 import os
@@ -23,7 +23,7 @@ CHAFF = ("radar/chaff", "--scenario", "S1", "--trigger", "C2", "--value", "40")
 
 
 def call(*words: object, here: Path) -> str:
-    """Run a command in a folder and give its output; what it says goes into a failure's message."""
+    """Run a command in a folder and return its output, which also goes into a failure's message."""
     settings = ("MUTATOR_", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
     done = subprocess.run(
@@ -40,7 +40,7 @@ def call(*words: object, here: Path) -> str:
 
 @pytest.fixture(scope="module")
 def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the clone, for a build leaves files in it."""
+    """A copy of the clone, because a build leaves files in it."""
     copy = tmp_path_factory.mktemp("copy") / "clone"
     strangers = shutil.ignore_patterns(".*", "build", "dist", "runs", "*.egg-info")
     return Path(shutil.copytree(CLONE, copy, ignore=strangers))
@@ -53,7 +53,7 @@ def files(wheel: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def built(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the sdist of the clone, and the wheel that was made from it."""
+    """A folder with the clone's sdist and the wheel built from it."""
     out = tmp_path_factory.mktemp("built")
     call(sys.executable, "-m", "build", "--outdir", out, clone, here=out)
     return out
@@ -66,7 +66,7 @@ def wheel(built: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The interpreter of a fresh environment with the wheel and what it requires."""
+    """The interpreter of a fresh environment with the wheel and its requirements."""
     home = tmp_path_factory.mktemp("environment")
     call(sys.executable, "-m", "venv", home, here=home)
     python = home / "bin" / "python"
@@ -76,7 +76,7 @@ def python(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def elsewhere(tmp_path: Path) -> Path:
-    """An empty folder that no clone is above."""
+    """An empty folder outside any clone."""
     assert not any((folder / "fault_library").exists() for folder in tmp_path.parents)
     return tmp_path
 
@@ -84,7 +84,7 @@ def elsewhere(tmp_path: Path) -> Path:
 def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
     clone: Path, built: Path, wheel: Path, tmp_path: Path
 ) -> None:
-    """The sdist has all that a wheel needs, and nothing that an earlier build left gets into one."""
+    """The sdist has everything that a wheel needs, and leftovers of earlier builds stay out of it."""
     stale = clone / "build" / "lib" / "mutator" / "stale.py"
     stale.parent.mkdir(parents=True, exist_ok=True)
     stale.touch()
@@ -102,7 +102,9 @@ def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
 
 
 def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
-    """The package, its data and the archive; no test, no bytecode, nothing of the controller to import."""
+    """The wheel has the package, its data and the archive, but no tests, bytecode or importable
+    controller.
+    """
     found = files(wheel)
     tops = {name.partition("/")[0] for name in found}
     assert tops == {"mutator", *(top for top in tops if top.endswith(".dist-info"))}
@@ -118,7 +120,7 @@ def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
 
 
 def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhere: Path) -> None:
-    """`import selfdrive` fails in an environment with the wheel; after a use there is no bytecode of it."""
+    """`import selfdrive` fails in an environment with the wheel, and use leaves no bytecode of it."""
     code = "import importlib.util; print(importlib.util.find_spec('selfdrive'))"
     assert call(python, "-c", code, here=elsewhere) == "None\n"
     mutator = python.with_name("mutator")
@@ -130,7 +132,9 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
 
 
 def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
-    """The library is listed, one fault is tried, a campaign is run: the same experiments as in the clone."""
+    """In an empty folder the library is listed, one fault is tried, and a campaign runs the same experiments
+    as in the clone.
+    """
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
     assert [spec["name"] for spec in listed["specs"]] == [spec.name for spec in workspace.specs()]
@@ -148,7 +152,7 @@ def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) ->
 
 
 def test_what_is_edited_in_a_new_library_is_what_runs(python: Path, elsewhere: Path) -> None:
-    """`mutator init`, an edit of a template and of a spec, and `mutator try` there shows and drives both."""
+    """After `mutator init`, `mutator try` shows and runs the edited template and spec."""
     mutator = python.with_name("mutator")
     call(mutator, "init", "mine", here=elsewhere)
     mine = elsewhere / "mine"
