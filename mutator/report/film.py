@@ -1,4 +1,4 @@
-"""An experiment to watch: its two runs driven again with a film, shown by the target's own command."""
+"""Films an experiment: reruns both of its runs with a film, and renders it with the target's own command."""
 
 import json
 import os
@@ -25,7 +25,7 @@ EVENTS_SCHEMA = "film-events/1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """A file that is wanted: a still picture of time `t` (s), or a video. Its name says the format."""
+    """A file to write: a still at time `t` (s), or a video. The suffix is the format."""
 
     out: Path  #: file to write; its suffix is the format
     t: float | None = None  #: time of a still in s; None: a video
@@ -33,21 +33,22 @@ class Shot:
 
 @dataclass(frozen=True, slots=True)
 class Filming:
-    """Films of experiments of a run."""
+    """Films the experiments of a run."""
 
     workspace: Workspace
     folder: RunFolder
     target: TargetManifest
-    filmed: TargetManifest  # the same, its runs leaving a film
+    filmed: TargetManifest  # the same target, with runs that leave a film
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
-        """Of a run folder; MutatorError for a target that cannot be filmed, or is no longer the run's."""
+        """The films of a run folder; MutatorError if the target cannot be filmed or has changed since the
+        run."""
         manifest = manifest_of(workspace, folder)
         return cls(workspace, folder, manifest, manifest.filming())
 
     def golden(self, experiment: Experiment, out: Path) -> Path:
-        """Drive the golden run of an experiment into the folder `out`, for several films."""
+        """Run the golden run of an experiment into the folder `out`, for several films."""
         return run_golden(self.workspace, self.filmed, experiment, out, limits=self.folder.limits)
 
     def take(
@@ -58,10 +59,10 @@ class Filming:
         *,
         golden: Path | None = None,
     ) -> bool:
-        """Drive an experiment's golden (unless given) and faulty run again and write `shots` of them.
+        """Rerun an experiment's golden (unless given) and faulty run and write `shots` of them.
 
-        Says whether the new record is the one that is `known` (true if there is none yet). MutatorError for
-        a faulty run that left no film, and with what the target's command complains of.
+        Returns whether the new record equals `known` (true if there is none yet). MutatorError if the faulty
+        run left no film, and for errors of the target's command.
         """
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
@@ -76,7 +77,7 @@ class Filming:
             if not (single.faulty / FILM).is_dir():
                 raise MutatorError(
                     f"the faulty run left no film: {record.status.value}, {record.detail}",
-                    remedy="choose an experiment that drives",
+                    remedy="choose an experiment that runs",
                 )
             events = scratch / "events.json"
             names = hazards_in_words(self.workspace, self.target)
@@ -92,8 +93,7 @@ class Filming:
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
-    """Each hazard in a few words: as the manifest says how it is found; where that says nothing, as the
-    hazard analysis does, up to the first bracket."""
+    """A short text for each hazard: the manifest's, or else the hazard analysis's up to the first bracket."""
     known = workspace.hazards()
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
@@ -119,9 +119,9 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
 
 
 def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], shot: Shot) -> None:
-    """Have the target's command write one file; `folder` is for scratch."""
+    """Write one file with the target's command; `folder` is for scratch."""
     film = manifest.film
-    assert film is not None  # it has been taken
+    assert film is not None  # already taken
     tree = manifest.root
     if manifest.overlay is not None:
         tree = folder / "tree"
@@ -139,8 +139,8 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         check=False,
     )
     if done.returncode != 0 or not made.is_file():
-        said = done.stderr.strip().splitlines() or ["it said nothing"]
+        said = done.stderr.strip().splitlines() or ["no message"]
         complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
-    with half_written(out) as temporary:  # a film takes a while, and may be stopped
+    with half_written(out) as temporary:  # a film takes a while and may be interrupted
         shutil.copyfile(made, temporary)

@@ -1,4 +1,4 @@
-"""Pictures of a run as soon as it is done: of the worst few experiments of those that see pictures."""
+"""Stills of a finished run: of the worst few experiments whose controller sees pictures."""
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -17,17 +17,16 @@ from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.workspace import Workspace
 
-MOST, ONE_IN = 10, 20  # at most so many experiments, and one of so many that are planned
-BUDGET_S = 120.0  # after which no other experiment is begun
+MOST, ONE_IN = 10, 20  # maximum of experiments, absolute and as a share of the plan
+BUDGET_S = 120.0  # no experiment starts after this
 
 Notify = Callable[[Progress], None]
 
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
-    """Take the pictures of a run that are not there yet, `workers` experiments at a time; none is begun after
-    `BUDGET_S`.
+    """Take the run's missing stills, `workers` experiments at a time; none starts after `BUDGET_S`.
 
-    Returns why the first one that has no pictures has none; empty if there is no such.
+    Returns why the first experiment without stills has none; empty if there is none.
     """
     manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
@@ -50,13 +49,13 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
             same = filming.take(experiments[name], records[name], due[name], golden=golden.result())
         except MutatorError as error:
             return f"{name}: {error}"
-        return "" if same else f"{name}: driven again it is not what the campaign found"
+        return "" if same else f"{name}: the rerun differs from the campaign's result"
 
     pool = ThreadPoolExecutor(max(1, workers))
     with ScratchFolder("mutator-stills-") as scratch:
         try:
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
-            # submitted first: a film then never waits for a golden run that no thread is driving
+            # submitted first, so that no film waits for a golden run that no thread runs
             goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = Pace("pictures", len(found))
@@ -78,8 +77,8 @@ def _due(
     experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, list[Shot]]:
-    """The pictures that are not there yet, by experiment, the worst first: at the activation, the first alert
-    and the first hazard of the worst experiments that see `pictures`."""
+    """The missing stills by experiment, worst first: at activation, first alert and first hazard of the worst
+    experiments that see `pictures`."""
     seeing = set(pictures)
     texts = Results.of_run(folder.path).texts()
     moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()
@@ -98,7 +97,7 @@ def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot
 
 
 def _times(record: Record) -> Iterable[float]:
-    """When the fault became active, and when the first alert and the first hazard came."""
+    """Times of the activation, the first alert and the first hazard."""
     if record.activation:
         yield record.activation.first
     for events in (record.alerts, record.hazards):
