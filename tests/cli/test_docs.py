@@ -43,6 +43,7 @@ WORKED_THROUGH = [
     TUTORIAL.with_name("your-own-controller.md"),
     TUTORIAL.with_name("tour-safety-engineer.md"),
     TUTORIAL.with_name("tour-controller-developer.md"),
+    TUTORIAL.with_name("tour-researcher.md"),
     COMPARISON,
     *sorted(set(HOW_TO.glob("add-a-*.md")) - {HOW_TO / "add-a-study.md"}),  # test_studies runs its code
     *EXAMPLES,

@@ -1,4 +1,4 @@
-"""The notebook of the tutorial."""
+"""The notebooks of the tutorials."""
 
 from pathlib import Path
 
@@ -6,12 +6,27 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 
-NOTEBOOK = Path(__file__).parents[2] / "docs" / "tutorial" / "from-fault-to-comparison.ipynb"
+TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorial"
+COMPARISON = TUTORIALS / "from-fault-to-comparison.ipynb"
+RESEARCH = TUTORIALS / "tour-researcher.ipynb"
 
 
-def test_the_notebook_is_kept_without_outputs() -> None:
-    """The repository's notebook has no outputs."""
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
+def run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int]:
+    """Run every cell in `folder`; returns the text that was shown, and the number of plots."""
+    monkeypatch.setenv("MUTATOR_ROOT", str(TUTORIALS.parents[1]))
+    monkeypatch.setenv("TMPDIR", str(folder))
+    notebook = nbformat.read(path, as_version=4)
+    NotebookClient(notebook, timeout=900, kernel_name="python3").execute(cwd=str(folder))
+    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
+    assert not [output for output in outputs if output.get("name") == "stderr"]
+    plots = [output for output in outputs if "image/png" in output.get("data", {})]
+    return "\n".join(output.get("data", {}).get("text/plain", "") for output in outputs), len(plots)
+
+
+@pytest.mark.parametrize("path", [COMPARISON, RESEARCH], ids=lambda path: path.stem)
+def test_notebooks_are_kept_without_outputs(path: Path) -> None:
+    """The repository's notebooks have no outputs."""
+    notebook = nbformat.read(path, as_version=4)
     nbformat.validate(notebook)
     code = [cell for cell in notebook.cells if cell.cell_type == "code"]
     assert len(code) >= 10
@@ -19,16 +34,22 @@ def test_the_notebook_is_kept_without_outputs() -> None:
 
 
 @pytest.mark.slow
-def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_comparison_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every cell runs, from fault to comparison; plots are images, and all experiments have a result."""
-    monkeypatch.setenv("MUTATOR_ROOT", str(NOTEBOOK.parents[2]))
-    monkeypatch.setenv("TMPDIR", str(tmp_path))
-    notebook = nbformat.read(NOTEBOOK, as_version=4)
-    NotebookClient(notebook, timeout=900, kernel_name="python3").execute(cwd=str(tmp_path))
-    outputs = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
-    pictures = [output for output in outputs if "image/png" in output.get("data", {})]
-    assert len(pictures) == 2
-    shown = "\n".join(output.get("data", {}).get("text/plain", "") for output in outputs)
+    shown, plots = run(COMPARISON, tmp_path, monkeypatch)
+    assert plots == 2
     assert "8 of 8 experiments of paper, as_described" in shown
     assert "8 of 8 experiments of paper, as_coded" in shown
-    assert not [output for output in outputs if output.get("name") == "stderr"]
+
+
+@pytest.mark.slow
+def test_the_research_notebook_gives_the_answer_of_its_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The notebook shows the effect and interval that the tour prints, and its audit finds no difference."""
+    shown, plots = run(RESEARCH, tmp_path, monkeypatch)
+    assert plots == 2
+    page = (TUTORIALS / "tour-researcher.md").read_text(encoding="utf-8")
+    [effect] = [line for line in page.splitlines() if line.startswith("difference ")]
+    assert f"{effect}: not enough data" in shown
+    assert "(True, " in shown
