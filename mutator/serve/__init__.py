@@ -1,5 +1,5 @@
-"""The pages of reports, comparisons and reviews from a local server, with decisions and jobs.
+"""A local server for the pages of reports, comparisons and reviews, with decisions and jobs.
 
-The server shows what `report`, `comparison` and `review` make, and starts the command line for what takes
-long; nothing is worked out here. Needs the extra `serve`.
+It shows pages made by `report`, `comparison` and `review`, and starts the command line for long work. It
+needs the extra `serve`.
 """

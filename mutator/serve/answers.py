@@ -1,4 +1,4 @@
-"""What is answered: files, JSON, and errors. None tells where on the disk things lie."""
+"""Responses: files, JSON and errors, all without paths on the disk."""
 
 import os
 import re
@@ -22,7 +22,7 @@ _KINDS = {
     ".gif": "image/gif",
     ".html": "text/html; charset=utf-8",
     ".jpg": "image/jpeg",
-    ".js": "application/javascript",  # without an encoding: of series each byte is a character
+    ".js": "application/javascript",  # without an encoding: in series, each byte is a character
     ".md": "text/plain; charset=utf-8",
     ".mp4": "video/mp4",
     ".png": "image/png",
@@ -32,7 +32,7 @@ _FOLDERS = re.compile(r"(?<![\w.~-])/(?!dev/null)(?:[^/\s'\"`]+/)+")
 
 
 class OpenFile(FileResponse):
-    """Sends a file by its descriptor, which it closes."""
+    """Sends a file by its descriptor, and closes it."""
 
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor = descriptor
@@ -47,20 +47,20 @@ class OpenFile(FileResponse):
 
 
 def kind_of(name: str) -> str:
-    """The media type of a file that is served."""
+    """Return the media type of a file."""
     return _KINDS[Path(name).suffix]
 
 
 def without_places(text: str) -> str:
-    """The text with the last part alone of each absolute path; below the current folder, with the rest."""
+    """Shorten absolute paths in a text to their last part, or to the part below the current folder."""
     for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
-            text = text.replace(f"{folder}/", instead)  # their names may have blanks
+            text = text.replace(f"{folder}/", instead)  # names may contain spaces
     return _FOLDERS.sub("", text)
 
 
 def error_facts(error: MutatorError) -> dict[str, Any]:
-    """An error for JSON."""
+    """Return an error as JSON data."""
     place = error.where or error.argument
     parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
     facts: dict[str, Any] = {name: without_places(text) if text else None for name, text in parts.items()}
@@ -70,7 +70,7 @@ def error_facts(error: MutatorError) -> dict[str, Any]:
 
 
 def on_error(request: Request, error: Exception) -> Response:
-    """The answer to a request that cannot be granted: JSON for scripts, a page for people."""
+    """Return the response to a failed request: JSON for scripts, a page for people."""
     known = _known(error)
     status = 404 if isinstance(known, Absent) else 400
     if isinstance(error, HTTPException):

@@ -1,4 +1,4 @@
-"""What scripts of the pages ask for, and send: JSON."""
+"""The JSON interface for the pages' scripts."""
 
 from urllib.parse import parse_qsl
 
@@ -22,11 +22,11 @@ class ReviewApi:
         self._reviews, self._runs = reviews, runs
 
     def told(self, request: Request) -> Response:
-        """What was said of each group."""
+        """Return the decisions on each group."""
         return JSONResponse(self._reviews.told(asked(self._reviews, request)))
 
     def decide(self, request: Request, body: bytes) -> Response:
-        """Decisions, remarks and flags: all of them or none."""
+        """Save decisions, remarks and flags: all or none."""
         chosen, wanted = asked(self._reviews, request), Decisions.model_validate_json(body)
         try:
             return JSONResponse(self._reviews.decide(chosen, wanted))
@@ -34,27 +34,27 @@ class ReviewApi:
             return JSONResponse({"conflict": moved.got, "groups": moved.groups}, 409)
 
     def changes(self, request: Request) -> Response:
-        """What has changed of a group since it was approved."""
+        """Return what has changed in a group since its approval."""
         found = self._reviews.changes(asked(self._reviews, request), request.path_params["group"])
         return JSONResponse({"changes": found})
 
     def typical(self, request: Request) -> Response:
-        """What became of a group in a run; null where the run has none of it."""
+        """Return a group's results in a run; null if the run does not have the group."""
         run = self._runs.folder(request.query_params.get("run", ""))
         chosen = asked(self._reviews, request)
         return JSONResponse(self._reviews.typical(chosen, request.path_params["group"], run))
 
     def levels(self, request: Request) -> Response:
-        """The levels that there are pictures of."""
+        """Return the levels that have frames."""
         chosen = asked(self._reviews, request)
         return JSONResponse({"levels": self._reviews.levels(chosen, request.path_params["group"])})
 
     def before(self, request: Request) -> Response:
-        """A picture before a group's effect."""
+        """Return a frame before a group's effect."""
         return self._picture(request, after=False)
 
     def after(self, request: Request) -> Response:
-        """The same after it."""
+        """Return the frame after the effect."""
         return self._picture(request, after=True)
 
     def _picture(self, request: Request, *, after: bool) -> Response:
@@ -70,19 +70,19 @@ class JobApi:
         self._desk, self._jobs = desk, jobs
 
     def told(self, _: Request) -> Response:
-        """All jobs."""
+        """Return all jobs."""
         return JSONResponse({"jobs": [job.told() for job in self._jobs.all()]})
 
     def submit(self, _: Request, body: bytes) -> Response:
-        """A new job."""
+        """Start a job."""
         return JSONResponse({"id": self._jobs.submit(self._desk.work(body)).id}, 201)
 
     def log(self, request: Request) -> Response:
-        """What a job printed."""
+        """Return the output of a job."""
         return JSONResponse({"log": self._jobs.get(request.path_params["job"]).text})
 
     def cancel(self, request: Request, _: bytes) -> Response:
-        """The end of a job."""
+        """Cancel a job."""
         try:
             self._jobs.cancel(request.path_params["job"])
         except Ended as err:
@@ -91,16 +91,16 @@ class JobApi:
 
 
 def asked(reviews: Reviews, request: Request) -> Selection:
-    """Which groups an address asks for; MutatorError for words that it does not know."""
+    """Return the selection of groups in an address; MutatorError for unknown parameters."""
     given = parse_qsl(request.url.query, keep_blank_values=True)
     if len(given) > _MOST_WORDS:
-        raise MutatorError(f"{len(given)} words in the address", expected=f"at most {_MOST_WORDS}")
+        raise MutatorError(f"{len(given)} parameters in the address", expected=f"at most {_MOST_WORDS}")
     if strange := [name for name, _ in given if name not in ("campaign", "spec", "run")]:
         raise MutatorError(
-            f"'{strange[0]}' in the address", expected="campaign, or spec, which may be repeated"
+            f"'{strange[0]}' in the address", expected="campaign or spec; spec may be repeated"
         )
     campaigns = [value for name, value in given if name == "campaign"]
     specs = [value for name, value in given if name == "spec"]
     if len(campaigns) > 1:
-        raise MutatorError("several campaigns in the address", expected="one")
+        raise MutatorError("several campaigns in the address", expected="one campaign")
     return reviews.selection(request.path_params["target"], campaigns[0] if campaigns else None, specs)

@@ -1,4 +1,4 @@
-"""The application: which address is answered by what."""
+"""The application, with its routes."""
 
 import re
 from collections.abc import AsyncIterator, Awaitable, Callable
@@ -33,7 +33,7 @@ Answer = Callable[[Request], Awaitable[Response]]
 
 @dataclass(kw_only=True)
 class Site:
-    """What is served: a library, runs, jobs, so many of these at once."""
+    """The content of the server: a library, runs, and jobs, `at_once` in parallel."""
 
     workspace: Workspace
     runs: Runs
@@ -48,7 +48,7 @@ class Site:
         self.jobs = Jobs(self.at_once, self._report_at)
 
     def told_runs(self) -> list[dict[str, Any]]:
-        """All runs in short, in the order of their folders."""
+        """Return a summary of each run, in the order of the folders."""
         return [told(key, path) for key, path in self.runs.folders().items()]
 
     def _report_at(self, work: Work) -> str | None:
@@ -57,7 +57,7 @@ class Site:
 
 
 def application(site: Site) -> Starlette:
-    """The application, without the checks of `security`; its end ends the jobs."""
+    """Return the application without the checks of `security`; its shutdown ends the jobs."""
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
@@ -87,7 +87,7 @@ def application(site: Site) -> Starlette:
 
 
 def _quick(answer: Callable[[Request], Response]) -> Answer:
-    """An answer that is worked out in a thread of its own, so that others need not wait."""
+    """Compute the response in a separate thread, so that others need not wait."""
 
     async def answered(request: Request) -> Response:
         return await run_in_threadpool(answer, request)
@@ -96,12 +96,12 @@ def _quick(answer: Callable[[Request], Response]) -> Answer:
 
 
 def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
-    """The same, of a request that brings JSON."""
+    """The same for a request with a JSON body."""
 
     async def answered(request: Request) -> Response:
         kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         if kind != "application/json":
-            raise HTTPException(415, "not of the type application/json")
+            raise HTTPException(415, "the type is not application/json")
         return await run_in_threadpool(answer, request, await request.body())
 
     return answered
@@ -146,7 +146,7 @@ def _pages(site: Site) -> list[Route]:
 
 
 def _own(request: Request) -> Response:
-    """CSS and JavaScript that ship with mutator."""
+    """Return CSS and JavaScript that ship with mutator."""
     name = request.path_params["name"]
     if name not in (*assets(".js"), *assets(".css")):
         raise Absent("no such file")

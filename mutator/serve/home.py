@@ -1,4 +1,4 @@
-"""The first page, what its forms offer, and the page of an error."""
+"""The first page, the choices in its forms, and the error page."""
 
 from collections.abc import Mapping, Sequence
 from importlib.resources import files
@@ -10,22 +10,22 @@ from jinja2 import Environment, StrictUndefined
 from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
-_MOST_PAIRS = 20  # of runs, that the page offers to compare
+_MOST_PAIRS = 20  # of runs offered for comparison
 
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]]) -> str:
-    """The first page: runs, comparisons, reviews."""
+    """Return the first page: runs, comparisons, reviews."""
     return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=tuple(workspace.targets))
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
-    """A page that says what is wrong."""
+    """Return the page of an error."""
     return _rendered("error.html", **facts)
 
 
 def offered(workspace: Workspace) -> dict[str, Any]:
-    """What there is to choose from: faults, scenarios, triggers, campaigns. What cannot be read is left out,
-    and told as a `problem`."""
+    """Return the choices: faults, scenarios, triggers, campaigns. What cannot be read is reported as
+    `problem`."""
     names = ("targets", "scenarios", "campaigns")
     found: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
     found |= {"specs": [], "contexts": [], "readings": [], "problem": None}
@@ -45,7 +45,7 @@ def offered(workspace: Workspace) -> dict[str, Any]:
 
 
 def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Runs of one campaign and target that follow each other, for a comparison."""
+    """Return pairs of consecutive runs of one campaign and target, for comparison."""
     latest: dict[tuple[str, str], str] = {}
     pairs = []
     for run in runs:

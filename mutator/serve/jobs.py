@@ -1,4 +1,4 @@
-"""Jobs: command lines that run one after the other beside the server, and are told of until it ends."""
+"""Jobs: command lines that the server queues, runs and reports on until it ends."""
 
 import os
 import queue
@@ -22,17 +22,17 @@ from mutator.store.progress import Tail
 _KEEPER = "mutator.serve.keeper"
 _COLUMNS = "200"  # of a job's lines: pages fold them
 _LOG_BYTES = 100_000  # of a job, the last ones
-_MOST_JOBS = 200  # that are told of; of those that ended, the newest
+_MOST_JOBS = 200  # kept; of those that ended, the newest
 _MOST_WAITING = 50
 _NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
 _STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # of a terminal
 _COUNT = re.compile(r"^([a-z ]+) (\d+)/(\d+)(?:,|$)")
 _TRIED = re.compile(r"^experiment +([0-9a-f]{16})$", re.MULTILINE)
-_END_S = 30.0  # for jobs to end, once the server does
+_END_S = 30.0  # for jobs to end after the server
 
 
 class State(StrEnum):
-    """How far a job is."""
+    """The state of a job."""
 
     QUEUED = "queued"
     RUNNING = "running"
@@ -42,12 +42,12 @@ class State(StrEnum):
 
 
 class Ended(MutatorError):
-    """The job has ended: there is nothing to cancel."""
+    """The job has already ended and cannot be cancelled."""
 
 
 @dataclass(kw_only=True)
 class Job:
-    """A command line that was asked for, and what came of it so far."""
+    """A command line, with its progress and result."""
 
     id: str
     work: Work
@@ -58,11 +58,11 @@ class Job:
     started: datetime | None = None
     ended: datetime | None = None
     log: bytearray = field(default_factory=bytearray)
-    tail: Tail | None = None  # of the records of a campaign that is at its experiments
-    hold: int | None = None  # the writing end of the pipe that its keeper watches
+    tail: Tail | None = None  # of the records of a campaign that runs its experiments
+    hold: int | None = None  # the writing end of the pipe to its keeper
 
     def told(self) -> dict[str, Any]:
-        """The job for JSON."""
+        """Return the job as JSON data."""
         order = self.work.order
         if self.tail is not None and self.state is State.RUNNING:
             now = self.tail.poll()
@@ -76,11 +76,11 @@ class Job:
 
     @property
     def text(self) -> str:
-        """What it printed, without control characters and without places on the disk."""
+        """The output, without control characters and paths on the disk."""
         return _plain(self.log)
 
     def hear(self, line: bytes) -> None:
-        """Take a line that it printed."""
+        """Process one line of output."""
         self.log += line
         del self.log[:-_LOG_BYTES]
         text = _plain(line).strip()
@@ -94,7 +94,7 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a server, so many at once. `report_at` says where the result of work is to be seen."""
+    """The jobs of a server. `at_once` run in parallel; `report_at` returns the address of their result."""
 
     def __init__(self, at_once: int, report_at: Callable[[Work], str | None]) -> None:
         self._jobs: dict[str, Job] = {}
@@ -108,10 +108,12 @@ class Jobs:
             thread.start()
 
     def submit(self, work: Work) -> Job:
-        """Put a job into the queue; MutatorError when too many wait."""
+        """Queue a job; MutatorError if too many are waiting."""
         with self._lock:
             if sum(job.state is State.QUEUED for job in self._jobs.values()) >= _MOST_WAITING:
-                raise MutatorError(f"{_MOST_WAITING} jobs wait", remedy="wait for them, or cancel some")
+                raise MutatorError(
+                    f"{_MOST_WAITING} jobs are waiting", remedy="wait for them, or cancel some"
+                )
             self._count += 1
             job = Job(id=str(self._count), work=work)
             self._jobs[job.id] = job
@@ -121,19 +123,19 @@ class Jobs:
         return job
 
     def all(self) -> list[Job]:
-        """The jobs, newest first."""
+        """Return the jobs, newest first."""
         with self._lock:
             return [*reversed(self._jobs.values())]
 
     def get(self, name: str) -> Job:
-        """The job with that id; Absent if there is none."""
+        """Return the job with this id; Absent if there is none."""
         with self._lock:
             if name in self._jobs:
                 return self._jobs[name]
         raise Absent(f"no job '{name}'", expected="the id of a job of this server")
 
     def cancel(self, name: str) -> None:
-        """End a job, with all that it started; Ended for one that has ended."""
+        """Cancel a job with all its processes; raises Ended if it has already ended."""
         job = self.get(name)
         with self._lock:
             if job.ended:
@@ -141,7 +143,7 @@ class Jobs:
             self._cancel(job)
 
     def close(self) -> None:
-        """End all jobs, and wait until nothing of them is left."""
+        """End all jobs, and wait until all their processes are gone."""
         with self._lock:
             self._closed = True
             for job in self._jobs.values():
@@ -161,14 +163,14 @@ class Jobs:
             job.hold = None
 
     def _work(self) -> None:
-        """Do one job after the other."""
+        """Run jobs one after another."""
         while (job := self._waiting.get()) is not None:
             process = self._started(job)
             if process is not None:
                 self._follow(job, process)
 
     def _started(self, job: Job) -> subprocess.Popen[bytes] | None:
-        """The job's process; None for a job that was cancelled or cannot be started."""
+        """Start the job's process; None if the job was cancelled or cannot start."""
         with self._lock:
             if job.state is not State.QUEUED or self._closed:
                 return None
@@ -181,7 +183,7 @@ class Jobs:
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.PIPE,
                     stderr=subprocess.STDOUT,
-                    start_new_session=True,  # Ctrl-C is the server's to answer
+                    start_new_session=True,  # only the server handles Ctrl-C
                 )
             except OSError as err:
                 os.close(job.hold)
@@ -194,7 +196,7 @@ class Jobs:
             return process
 
     def _follow(self, job: Job, process: subprocess.Popen[bytes]) -> None:
-        """Take what the job prints until it ends."""
+        """Read the job's output until it ends."""
         assert process.stdout is not None
         with process.stdout as said:
             for line in iter(lambda: said.readline(_LOG_BYTES), b""):
@@ -214,7 +216,7 @@ class Jobs:
                 job.hold = None
 
     def _result(self, job: Job) -> str | None:
-        """The page that shows what came of a job."""
+        """Return the page that shows the result of a job."""
         if job.work.order.kind == "try":
             tried = _TRIED.search(job.text)
             return f"/{TRIES}/{tried[1]}/plot.svg" if tried and "\nplot: " in job.text else None
@@ -222,20 +224,20 @@ class Jobs:
 
 
 def _plain(data: bytes | bytearray) -> str:
-    """Printable text without places on the disk."""
+    """Return printable text without paths on the disk."""
     text = without_places(_STYLES.sub("", data.decode("utf-8", "replace")))
     return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 
 def _news(job: Job) -> str:
-    """The line that says what came of it, else the last one."""
+    """Return the line with the result, or else the last line."""
     lines = job.text.splitlines()
     told = [line for line in lines if line.startswith(_NEWS)]
     return (told or [job.message])[-1]
 
 
 def _complaint(job: Job) -> str:
-    """What it complained of, if it did, else the last line that it printed."""
+    """Return the error in the output, if any, or else its last line."""
     lines = job.text.splitlines()
     errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
     differs = [line for line in lines if line.startswith("DIFFERS")]

@@ -1,9 +1,9 @@
-"""Keeps a job: runs the command line as a child, and lets nothing of it outlive the server.
+"""Runs a job as a child process, and lets no part of it outlive the server.
 
-`python -m mutator.serve.keeper FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe whose
-other end the server alone holds. Once that is closed, by the server or because it was killed, the command is
-asked to end; what is left after a while is killed, with all that came of it. Should the keeper itself be
-killed, the kernel kills the command.
+`python -m mutator.serve.keeper FD WORDS...` runs `mutator WORDS...`. FD is the reading end of a pipe; only
+the server holds the other end. When that end closes, because the server closes it or is killed, the keeper
+asks the command to end, and later kills what is left with its descendants. If the keeper itself is killed,
+the kernel kills the command.
 """
 
 import os
@@ -11,11 +11,11 @@ import sys
 
 from mutator.engines.in_target import guard
 
-PATIENCE_S = 20.0  # for a command to end in order: workers, scratch, half-written files
+PATIENCE_S = 20.0  # for a command to clean up workers, scratch and half-written files
 
 
 def main() -> int:
-    """Run the command; its exit code, or 128 and the number of the signal that ended it."""
+    """Run the command; returns its exit code, or 128 plus the number of the signal that ended it."""
     caller = int(sys.argv[1])
     ended = guard.fork(caller, patience_s=PATIENCE_S)
     if ended is None:

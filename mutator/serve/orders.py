@@ -1,7 +1,6 @@
-"""What a job may be asked to do, checked as the command line checks it, and the command line that does it.
+"""Checks requests for jobs like the command line does, and builds their command lines.
 
-A name must be one of the library's, an id one of a run's plan; nothing that is asked for is a path, or begins
-like an option.
+A name must be in the library, and an id in a run's plan. No value is a path or looks like an option.
 """
 
 import math
@@ -30,7 +29,7 @@ def _plain(text: str) -> str:
     return text
 
 
-TRIES = "try"  # folder of single tries, beside the runs
+TRIES = "try"  # folder of single tries, next to the runs
 Text = Annotated[str, Field(max_length=500), AfterValidator(_plain)]
 ExperimentId = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 Seed = Annotated[int, Field(ge=0, lt=2**63)]
@@ -38,7 +37,7 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class Rerun(StrictModel):
-    """Drive an experiment again; with `plot`, keep its exact plot and series."""
+    """Rerun an experiment; with `plot`, keep its exact plot and series."""
 
     kind: Literal["rerun", "plot"]
     run: Text
@@ -54,7 +53,7 @@ class Film(StrictModel):
 
 
 class Still(StrictModel):
-    """A picture of that film, at `t` s."""
+    """Take one frame of that film, at `t` s."""
 
     kind: Literal["still"]
     run: Text
@@ -63,14 +62,14 @@ class Still(StrictModel):
 
 
 class Report(StrictModel):
-    """Write the report of a run anew."""
+    """Rewrite the report of a run."""
 
     kind: Literal["report"]
     run: Text
 
 
 class Try(StrictModel):
-    """Put one fault in and drive once."""
+    """Inject one fault and run it once."""
 
     kind: Literal["try"]
     spec: Text
@@ -84,7 +83,7 @@ class Try(StrictModel):
 
 
 class Campaign(StrictModel):
-    """Run a part of a campaign into the new folder `name`."""
+    """Run part of a campaign in the new folder `name`."""
 
     kind: Literal["campaign"]
     campaign: Text
@@ -101,24 +100,24 @@ _ORDERS: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """What a job does: the `words` of its command line. `folder` is the run folder that it is about."""
+    """A checked request: the `words` of its command line, and its run `folder`."""
 
     order: Order
     title: str
     words: tuple[str, ...]
     folder: Path | None = None
-    result: str | None = None  # the page that shows what came of it
+    result: str | None = None  # the page with the result
 
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """Takes orders for a library and the runs that are served."""
+    """Checks requests for a library and the served runs."""
 
     workspace: Workspace
     runs: Runs
 
     def work(self, body: bytes) -> Work:
-        """What is asked for in JSON; MutatorError or ValidationError for what cannot be done."""
+        """Check a request in JSON; MutatorError or ValidationError if it is invalid."""
         order = _ORDERS.validate_json(body)
         makers: dict[type[Any], Callable[[Any], Work]] = {
             Rerun: self._rerun,
@@ -149,7 +148,9 @@ class Desk:
         folder = self._folder(order.run)
         if order.experiment not in plan_file.ids(folder):
             raise MutatorError(
-                f"no experiment '{order.experiment}'", where=order.run, expected="the id of one of the run"
+                f"no experiment '{order.experiment}'",
+                where=order.run,
+                expected="the id of an experiment in the run",
             )
         return Work(
             order=order,
@@ -213,7 +214,8 @@ class Desk:
         )
 
     def _check_trigger(self, text: str, target: str | None) -> None:
-        """As `try` reads it: a context, a time in s, `always`, or a condition over what is observed."""
+        """Check a trigger as `try` does: a context, a time in s, `always`, or a condition on observed
+        values."""
         tables = map(self.workspace.context_table, self.workspace.context_tables)
         names = {
             name for table in tables for row in table.rows for name in (row.id, f"{table.name}/{row.id}")
@@ -230,13 +232,13 @@ class Desk:
             raise MutatorError(f"'{text}'", where="trigger", expected="a time in s")
 
     def _folder(self, key: str) -> Path:
-        """The run folder with that key, which a command may write into."""
+        """Return the run folder with this key; a command may write to it."""
         folder = self.runs.folder(key)
         check_no_links(folder)
         return folder
 
     def _new(self, name: str) -> Path:
-        """A folder beside the runs."""
+        """Return a folder next to the runs."""
         folder = self.runs.new / name
         if folder.is_symlink():
             raise MutatorError(f"a link, {name}", expected="a new folder", remedy="choose another name")
@@ -245,14 +247,14 @@ class Desk:
         return folder.resolve()
 
     def _place(self) -> list[str]:
-        """The options that name this very library."""
+        """Return the options that name this library."""
         place = self.workspace
         options = {"--library": place.library, "--templates": place.templates, "--target": place.target}
         return _options(options)
 
 
 def _options(given: dict[str, Any]) -> list[str]:
-    """Options with their values, each in one word: no value is taken for an option."""
+    """Join options and values, so that no value is taken for an option."""
     return [f"{name}={value}" for name, value in given.items() if value is not None]
 
 

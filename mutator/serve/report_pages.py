@@ -1,4 +1,4 @@
-"""Reports and comparisons of the runs that are served, made anew where they are out of date."""
+"""Reports and comparisons of the served runs, rebuilt when outdated."""
 
 import os
 import threading
@@ -24,11 +24,11 @@ _STYLES = b'<link rel="stylesheet" href="/assets/served.css">\n</head>'
 _SCRIPT = b"""<script src="/assets/jobs.js" defer></script>
 <script src="/assets/served.js" defer></script>
 </body>"""
-_MOST_COMPARED = 4  # comparisons that are remembered
+_MOST_COMPARED = 4  # cached comparisons
 
 
 class Shown:
-    """Files of the runs, and pages that are made of them; one at a time."""
+    """Files of the runs, and pages made from them, one at a time."""
 
     def __init__(self, workspace: Workspace, runs: Runs) -> None:
         self._workspace, self._runs = workspace, runs
@@ -36,7 +36,7 @@ class Shown:
         self._compared: dict[tuple[str, str], dict[str, bytes]] = {}
 
     def file(self, key: str, name: str) -> Response:
-        """A file of a run; Absent for one that is not served."""
+        """Open a file of a run; Absent for one that is not served."""
         run = self._runs.folder(key)
         if name in (REPORT, _STUDY):
             return self._page(run, name)
@@ -45,7 +45,7 @@ class Shown:
         return OpenFile(open_in_run(run, name), name)
 
     def comparison(self, a: str, b: str, name: str) -> Response:
-        """A file of the comparison of two runs; MutatorError where they cannot be compared."""
+        """Open a file of a comparison of two runs; MutatorError if they cannot be compared."""
         folders = [self._runs.folder(key) for key in (a, b)]
         with self._making:
             first, second = (digest(Results.up_to_date(folder).csv()) for folder in folders)
@@ -76,7 +76,7 @@ class Shown:
         }
 
     def _alerts(self, run: Path) -> str:
-        """Which alerts the golden runs have, too; nothing where that cannot be told here."""
+        """Return which alerts the golden runs also raise; empty if not known here."""
         folder = RunFolder.open(run)
         try:
             return own_alerts(fault_free_runs(folder, self._workspace.manifest(folder.head["target"])))
@@ -85,8 +85,8 @@ class Shown:
 
 
 def _series(run: Path, name: str) -> bytes:
-    """A file of series. It is a script, so it is served only if it is what `write_script` makes of the data
-    in it: nothing but a call with one string."""
+    """Open a file of series. It is a script, so it must equal the output of `write_script` for its data: a
+    call with one string."""
     data = _read(open_in_run(run, name))
     path = run / name
     try:
@@ -94,7 +94,7 @@ def _series(run: Path, name: str) -> bytes:
             return data
     except MutatorError:
         pass
-    raise Absent("no such file", expected="series, as a run writes them")
+    raise Absent("no such file", expected="series in the form that runs write")
 
 
 def _read(descriptor: int) -> bytes:

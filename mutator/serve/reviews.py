@@ -1,4 +1,4 @@
-"""Reviews: the groups of a target as they are now, and decisions that are written as they are made."""
+"""Reviews: the current groups of a target, and decisions, which are saved at once."""
 
 import os
 import threading
@@ -22,14 +22,14 @@ from mutator.serve.runs import Absent
 from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
-_MOST_KEPT = 8  # selections whose groups are remembered
+_MOST_KEPT = 8  # selections with cached groups
 _SKIPPED = {"reviews", "__pycache__", ".git", "runs"}
 Short = Annotated[str, Field(max_length=2000)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """Which groups a page shows: all of a target's, those of some specs, or those of a campaign."""
+    """The groups on a page: all of a target, or those of some specs or of a campaign."""
 
     target: str
     campaign: str | None = None
@@ -37,7 +37,7 @@ class Selection:
 
     @property
     def options(self) -> list[str]:
-        """The options of `mutator review` that select the same."""
+        """The options of `mutator review` for the same selection."""
         if self.campaign:
             return ["--campaign", self.campaign]
         return ["--manifest", self.target, *(word for spec in self.specs for word in ("--spec", spec))]
@@ -50,8 +50,8 @@ class _ChangeModel(StrictModel):
 
 
 class Decisions(StrictModel):
-    """What a page sends. `seen` has the revision of each group as the page has it; `digests` say which diffs
-    it shows; nothing is approved or rejected without."""
+    """Changes that a page sends. `seen` has the revision of each group on the page, and `digests` identify
+    the diffs that it shows; without them, nothing is approved or rejected."""
 
     changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
     by: Short
@@ -60,7 +60,7 @@ class Decisions(StrictModel):
 
 
 class Moved(MutatorError):
-    """What was decided about is not what is there now; `groups` are those, as they are now."""
+    """The groups have changed since the page was loaded; `groups` has their current state."""
 
     def __init__(self, got: str, groups: dict[str, Any]) -> None:
         super().__init__(got)
@@ -68,8 +68,8 @@ class Moved(MutatorError):
 
 
 class Reviews:
-    """The reviews of a library. Groups are made when they are first asked for, and again when a file that
-    they follow from has changed."""
+    """The reviews of a library. Groups are built on first use, and again when a file that they depend on has
+    changed."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
@@ -78,11 +78,11 @@ class Reviews:
 
     @property
     def reviewer(self) -> str:
-        """Who works here, as git knows; empty if it does not."""
+        """Git's user.name; empty if it is not set."""
         return user_name(self.workspace) or ""
 
     def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
-        """What an address asks for; Absent for a target or campaign that the library does not have."""
+        """Return the selection of an address; Absent for an unknown target or campaign."""
         if target not in self.workspace.targets:
             raise Absent(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
@@ -93,11 +93,11 @@ class Reviews:
             raise MutatorError("a campaign together with specs", expected="one or the other")
         for spec in specs:
             if spec.endswith((".yaml", ".yml")):
-                raise Absent(f"no spec '{spec}'", expected="a name of the library's, or a pattern over them")
+                raise Absent(f"no spec '{spec}'", expected="the name of a spec in the library, or a pattern")
         return Selection(target=target, campaign=campaign, specs=tuple(specs))
 
     def groups(self, chosen: Selection) -> tuple[Group, ...]:
-        """The groups of a selection as they are now."""
+        """Return the current groups of a selection."""
         with self._making:
             stamp = self._stamp(chosen.target)
             if (made := self._made.pop(chosen, None)) is None or made[0] != stamp:
@@ -108,14 +108,14 @@ class Reviews:
             return made[1]
 
     def group(self, chosen: Selection, name: str) -> Group:
-        """One of them, by its whole id; Absent if there is none."""
+        """Return one group by its full id; Absent if there is none."""
         found = next((group for group in self.groups(chosen) if group.id == name), None)
         if found is None:
-            raise Absent(f"no group '{name}'", expected="the id of one that the page shows")
+            raise Absent(f"no group '{name}'", expected="the id of a group on the page")
         return found
 
     def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]]) -> str:
-        """The page of a selection; `runs` are those of its target."""
+        """Return the page of a selection; `runs` are those of its target."""
         review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
         served = {
             "target": chosen.target,
@@ -127,20 +127,20 @@ class Reviews:
         return page_html(review, review.in_turn(groups), chosen.options, served)
 
     def told(self, chosen: Selection) -> dict[str, Any]:
-        """What was said of each group."""
+        """Return the decisions on each group."""
         review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
 
     def decide(self, chosen: Selection, wanted: Decisions) -> dict[str, Any]:
-        """Make the changes, or none of them; Moved where others have said something, or a diff is another."""
+        """Save all changes or none; raises Moved if others changed a group, or if a diff differs."""
         known = {group.id: group for group in self.groups(chosen)}
         if strangers := [one.group for one in wanted.changes if one.group not in known]:
-            raise Absent(f"no group '{strangers[0]}'", expected="the id of one that the page shows")
+            raise Absent(f"no group '{strangers[0]}'", expected="the id of a group on the page")
         if unseen := [one.group for one in wanted.changes if one.group not in wanted.seen]:
-            raise MutatorError(f"group {unseen[0]} without what was seen", where="seen")
+            raise MutatorError(f"no seen revision for group {unseen[0]}", where="seen")
         decided = [one.group for one in wanted.changes if one.kind in (Kind.APPROVE, Kind.REJECT)]
         if blind := [name for name in decided if name not in wanted.digests]:
-            raise MutatorError(f"group {blind[0]} without the diff that was seen", where="digests")
+            raise MutatorError(f"no digest of the diff seen for group {blind[0]}", where="digests")
         touched = [known[name] for name in dict.fromkeys(one.group for one in wanted.changes)]
         self._refuse_others(chosen, touched, wanted.digests)
         changes = [
@@ -155,27 +155,27 @@ class Reviews:
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
 
     def changes(self, chosen: Selection, name: str) -> str:
-        """What has changed of a group since it was approved, as a diff."""
+        """Return what has changed in a group since its approval, as a diff."""
         return load_review(self.workspace, chosen.target).changes(self.group(chosen, name))
 
     def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
-        """A picture of what the group does to one, as a JPEG file; Absent where there is none."""
+        """Return a frame with the group's effect, as a JPEG file; Absent if there is none."""
         manifest = self.workspace.manifest(chosen.target)
         found = pictures.of_group(self.workspace, manifest, self.group(chosen, name), level)
         if found is None:
             raise Absent(
-                "no such picture", expected=f"a level ({', '.join(pictures.LEVELS)}) that the group has"
+                "no such picture", expected=f"one of the group's levels ({', '.join(pictures.LEVELS)})"
             )
         return found[after]
 
     def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
-        """The levels that there are pictures of, each with its value in words; none of other groups."""
+        """Return the levels that have frames, with their values as text; empty for other groups."""
         manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
         found = pictures.of_groups(self.workspace, manifest, [group]).get(name)
         return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
 
     def typical(self, chosen: Selection, name: str, run: Path) -> dict[str, Any] | None:
-        """What became of the group in a run; None where the run has none of it."""
+        """Return the group's results in a run; None if the run does not have the group."""
         folder, group = RunFolder.open(run), self.group(chosen, name)
         found = typical.of_group(folder, group) if folder.head["target"] == chosen.target else None
         return asdict(found) if found else None
@@ -197,11 +197,11 @@ class Reviews:
             return catalogue.of_library(workspace, workspace.manifest(chosen.target), specs=chosen.specs)
         plan = make_plan(workspace, chosen.campaign, Choices())
         if plan.campaign.target != chosen.target:
-            raise Absent(f"campaign '{chosen.campaign}' is of the target '{plan.campaign.target}'")
+            raise Absent(f"campaign '{chosen.campaign}' belongs to target '{plan.campaign.target}'")
         return catalogue.of_plan(workspace, plan)
 
     def _stamp(self, target: str) -> object:
-        """Another one as soon as a file changes that groups follow from."""
+        """Return a value that changes with every file that groups depend on."""
         manifest = self.workspace.manifest(target)
         places = (self.workspace.library, self.workspace.templates, manifest.root)
         return [_files_in(place) for place in places]
@@ -212,13 +212,13 @@ def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
 
 
 def _files_in(place: Path) -> list[tuple[str, int, int]]:
-    """Path, time and size of each file below a folder."""
+    """Return path, time and size of each file below a folder."""
     found = []
     for folder, inner, names in os.walk(place):
         inner[:] = sorted({*inner} - _SKIPPED)
         for name in names:
             path = os.path.join(folder, name)  # noqa: PTH118 - a thousand of them at each look
-            with suppress(OSError):  # it may go meanwhile
+            with suppress(OSError):  # it may vanish meanwhile
                 facts = os.lstat(path)
                 found.append((path, facts.st_mtime_ns, facts.st_size))
     return found

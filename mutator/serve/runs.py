@@ -1,4 +1,4 @@
-"""The run folders that are served: found anew at each look, told in short, and their files opened."""
+"""The served run folders: finds them at each request, summarises them, and opens their files."""
 
 import os
 import stat
@@ -17,7 +17,7 @@ from mutator.outcomes.reader import Results
 from mutator.store.run_folder import RunFolder
 
 REPORT = "report/index.html"
-# folder in a run folder -> kinds of files in it that are served
+# folder in a run folder -> served file types
 SERVED: Mapping[str, tuple[str, ...]] = {
     "": (".csv",),
     "report": (".html", ".md"),
@@ -31,18 +31,18 @@ _FOLDER = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
 
 
 class Absent(MutatorError):
-    """There is no such thing here, or none that is served."""
+    """The requested object does not exist or is not served."""
 
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Run folders below `roots`, each a run folder or a folder of them. A run is known by its folder's name;
-    of several that share one, the later have `-2`, `-3` and so on."""
+    """Run folders below `roots`, each a run folder or a folder of run folders. A run's key is its folder's
+    name, followed by `-2`, `-3` and so on for repeated names."""
 
     roots: tuple[Path, ...]
 
     def folders(self) -> dict[str, Path]:
-        """The run folders by key. A link to a folder elsewhere is left out."""
+        """Return the run folders by key, without links to folders elsewhere."""
         found: dict[str, Path] = {}
         for root in self.roots:
             for path in _runs_in(root.resolve()):
@@ -51,20 +51,18 @@ class Runs:
         return found
 
     def folder(self, key: str) -> Path:
-        """The run folder with that key; Absent if there is none."""
+        """Return the run folder with this key; Absent if there is none."""
         with suppress(KeyError):
             return self.folders()[key]
-        raise Absent(
-            f"no run '{key}'", expected="one of the runs that are served", remedy="see the first page"
-        )
+        raise Absent(f"no run '{key}'", expected="one of the served runs", remedy="see the first page")
 
     def key_of(self, folder: Path) -> str | None:
-        """The key of a run folder; None for one that is not served."""
+        """Return the key of a run folder; None if it is not served."""
         return next((key for key, path in self.folders().items() if path == folder.resolve()), None)
 
     @property
     def new(self) -> Path:
-        """Where a new run folder goes: the first folder of runs."""
+        """Return the parent for new run folders: the first folder of runs."""
         return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
 
 
@@ -80,7 +78,7 @@ def _runs_in(root: Path) -> list[Path]:
 
 
 def report_of(key: str) -> str:
-    """The address of a run's report."""
+    """Return the address of a run's report."""
     return f"/runs/{quote(key, safe='')}/{REPORT}"
 
 
@@ -93,7 +91,7 @@ def _free(name: str, taken: Iterable[str]) -> str:
 
 
 def told(key: str, path: Path) -> dict[str, Any]:
-    """A run in short: campaign, target, how far it is, how its experiments ended."""
+    """Summarise a run: campaign, target, progress, endings."""
     facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
     facts |= {"report": report_of(key)}
     facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
@@ -114,12 +112,12 @@ def told(key: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1000)
 def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
-    """How the experiments ended; the table is read again when it has changed."""
+    """Count how the experiments ended; the table is read again if it has changed."""
     return outcome_counts(Results.of_run(run).texts())
 
 
 def check_no_links(run: Path) -> None:
-    """MutatorError for a link anywhere in a run folder: commands would write where it leads."""
+    """Raise MutatorError for a link in a run folder: commands would write to its target."""
     folders = [str(run)]
     while folders:
         with suppress(FileNotFoundError), os.scandir(folders.pop()) as entries:
@@ -128,7 +126,7 @@ def check_no_links(run: Path) -> None:
                     raise MutatorError(
                         f"a link, {Path(entry.path).relative_to(run)}",
                         where=run.name,
-                        expected="files and folders, as a run writes them",
+                        expected="only files and folders",
                         remedy="delete the link",
                     )
                 if entry.is_dir():
@@ -136,7 +134,7 @@ def check_no_links(run: Path) -> None:
 
 
 def open_in_run(run: Path, name: str) -> int:
-    """A descriptor of a file that is served; Absent for anything else, be it there or not."""
+    """Open a served file and return its descriptor; Absent for anything else."""
     folder, _, last = name.rpartition("/")
     if Path(last).suffix not in SERVED.get(folder, ()):
         raise _absent()
@@ -144,9 +142,9 @@ def open_in_run(run: Path, name: str) -> int:
 
 
 def open_below(root: Path, folders: Sequence[str], name: str) -> int:
-    """A descriptor of a plain file in the innermost of these folders; Absent where there is none.
+    """Open a plain file in the innermost of these folders; Absent if there is none.
 
-    No link is followed on the way: each folder is opened in the one before it.
+    Links are not followed: each folder is opened relative to the one before.
     """
     try:
         handle = os.open(root, os.O_RDONLY | os.O_DIRECTORY)
@@ -158,7 +156,7 @@ def open_below(root: Path, folders: Sequence[str], name: str) -> int:
             file = os.open(name, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK, dir_fd=handle)
         finally:
             os.close(handle)
-    except (OSError, ValueError):  # a name with a NUL, or one that is no text
+    except (OSError, ValueError):  # a name with a NUL, or one that cannot be encoded
         raise _absent() from None
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)

@@ -1,8 +1,8 @@
-"""Who is answered at all, and what a browser may do with an answer.
+"""Checks every request, and limits what a browser may do with a response.
 
-Other pages in the user's browser, and other users of the machine, can reach a port of the loopback interface.
-So each request needs the token, in a cookie that other sites never send; it must name this server, or a page
-whose name leads here could read answers; and it must not come from a page of another origin.
+Other pages in the user's browser and other users of the machine can reach a port on the loopback interface.
+So each request needs the token, in a cookie that other sites cannot send. It must name this server, because a
+page whose name resolves to it could otherwise read responses. It must not come from a page of another origin.
 """
 
 import base64
@@ -23,11 +23,11 @@ from mutator.web import asset
 HOST = "127.0.0.1"
 MOST_BYTES = 1_000_000  # of a request's body
 _METHODS = ("GET", "HEAD", "POST")
-_OWN_SITE = ("same-origin", "none")  # what a browser says of its own pages, and of a typed address
+_OWN_SITE = ("same-origin", "none")  # sent by browsers for their own pages and for typed addresses
 
 
 class Guarded:
-    """An application behind these checks, on a port of this machine."""
+    """An application behind these checks, on a local port."""
 
     def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
         self._app, self._token, self._cookie = app, token, f"mutator-{port}"
@@ -52,7 +52,7 @@ class Guarded:
         await (answer or self._app)(scope, receive, send)
 
     def _refused(self, scope: Scope) -> Response | None:
-        """The answer to a request that comes from elsewhere."""
+        """Return the response to a request from elsewhere."""
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
         if method not in _METHODS:
@@ -68,7 +68,7 @@ class Guarded:
         return None
 
     def _entered(self, scope: Scope) -> Response | None:
-        """None for who has the cookie; who has the token in the address gets it, and an address without."""
+        """Return None if the cookie is valid; set it if the token is in the address, and redirect."""
         query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
             if not all(self._is_token(given) for given in query["token"]):
@@ -97,7 +97,7 @@ def _refusal(why: str, status: int = 403) -> Response:
 
 
 async def _body(headers: Headers, receive: Receive) -> bytes | None:
-    """The whole body of a request; None as soon as it is too long, whatever length was told."""
+    """Read the body of a request; None if it is too long, whatever length was declared."""
     told = headers.get("content-length", "0")
     if not told.isascii() or not told.isdigit() or len(told) > 20 or int(told) > MOST_BYTES:
         return None
@@ -116,7 +116,7 @@ async def _body(headers: Headers, receive: Receive) -> bytes | None:
 
 
 def _replayed(body: bytes, receive: Receive) -> Receive:
-    """What gives a body that was read, and then what comes after it."""
+    """Return a receive function that yields a body already read, and then the rest."""
     messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def replay() -> Message:
@@ -142,8 +142,8 @@ def _with_policy(send: Send) -> Send:
 
 @cache
 def policy() -> str:
-    """What pages may load and run: what lies in `mutator.web`, as files or as the pages carry it. Whatever
-    else a file of a run folder carries is not among the hashes."""
+    """Return the policy for pages: they may only run code from `mutator.web`, as files or inline by hash.
+    Other code in a file of a run folder has no hash here."""
     scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")] + [_hash(f"\n{pages.script()}\n")]
     styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
     return "; ".join(
@@ -164,7 +164,7 @@ def policy() -> str:
 
 @cache
 def assets(suffix: str) -> tuple[str, ...]:
-    """The files of `mutator.web` with that suffix."""
+    """Return the files of `mutator.web` with this suffix."""
     return tuple(sorted(one.name for one in files("mutator.web").iterdir() if one.name.endswith(suffix)))
 
 

@@ -1,4 +1,4 @@
-"""The server itself: a socket of the loopback interface, a token, and the end of all jobs with it."""
+"""The server: a socket on the loopback interface and a token; its end ends all jobs."""
 
 import secrets
 import socket
@@ -12,9 +12,9 @@ from mutator.serve.security import HOST, Guarded
 
 
 def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
-    """Serve a site until the process is asked to end; `ready` is called with its address, token included.
+    """Serve a site until the process is interrupted; `ready` is called with the address, including the token.
 
-    `port` 0: any that is free. MutatorError for one that is taken.
+    `port` 0 means any free port. MutatorError for a port in use.
     """
     token = secrets.token_urlsafe(32)
     with listening(port) as listener:
@@ -28,10 +28,10 @@ def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
 
 
 def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
-    """What answers on a port to who has the token."""
+    """Return the server for a port, which answers only with the token."""
     config = uvicorn.Config(
         Guarded(application(site), port=port, token=token),
-        access_log=False,  # the token is in the first address
+        access_log=False,  # it would show the token
         log_level="error",
         ws="none",
         server_header=False,
@@ -42,7 +42,7 @@ def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
 
 
 def listening(port: int) -> socket.socket:
-    """A socket of this machine that nobody else reaches; MutatorError for a port that is taken."""
+    """Open a socket that only this machine can reach; MutatorError for a port in use."""
     listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
@@ -50,7 +50,7 @@ def listening(port: int) -> socket.socket:
     except OSError as err:
         listener.close()
         raise MutatorError(
-            f"port {port} cannot be used ({err.strerror})", argument="port", remedy="choose another, or none"
+            f"cannot use port {port} ({err.strerror})", argument="port", remedy="choose another port, or none"
         ) from None
     listener.listen()
     return listener

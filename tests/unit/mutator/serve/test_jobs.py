@@ -147,6 +147,6 @@ def test_only_so_many_jobs_wait() -> None:
     jobs = Jobs(0, lambda work: None)
     for _ in range(50):
         assert jobs.submit(job().work).state is State.QUEUED
-    with pytest.raises(MutatorError, match="50 jobs wait"):
+    with pytest.raises(MutatorError, match="50 jobs are waiting"):
         jobs.submit(job().work)
     jobs.close()
