@@ -8,7 +8,7 @@ from nbclient import NotebookClient
 
 TUTORIALS = Path(__file__).parents[2] / "docs" / "tutorial"
 COMPARISON = TUTORIALS / "from-fault-to-comparison.ipynb"
-RESEARCH = TUTORIALS / "tour-researcher.ipynb"
+RESEARCH = TUTORIALS / "question-to-figure.ipynb"
 
 
 def run(path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[str, int]:
