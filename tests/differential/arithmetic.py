@@ -1,7 +1,7 @@
-"""Digests of all that a run's bytes depend on: pictures, what detectors see in them, and traces.
+"""Digests of everything that a run's bytes depend on: frames, detections in them, and traces.
 
-`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON, on whatever Python and processor it
-runs, with the compiled code in FOLDER or without any.
+`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor,
+with the compiled code in FOLDER, if given.
 """
 
 import json
@@ -28,7 +28,7 @@ from selfdrive.sim.trace_file import pieces
 from selfdrive.sim.vision import DETECTORS, Pictures
 
 SCENARIOS = Path(__file__).parents[2] / "fault_library" / "scenarios"
-WORN = Look(  # with all that a road can have
+WORN = Look(  # with every feature of a road
     left=Paint(dashed=True, wear=0.4, fade=0.2),
     right=Paint(double=True, wear=0.2),
     cracks=30.0,
@@ -47,7 +47,7 @@ def digests() -> Iterator[tuple[str, str]]:
         for level in (4, 9):
             yield from seen(detector, level)
     for path in sorted(SCENARIOS.glob("*.yaml")):
-        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other one knows no bends
+        for plant in PLANTS if path.stem[0] != "L" else PLANTS[:1]:  # the other detector knows no bends
             yield f"{path.stem} on the {plant} plant", trace(path, plant, None)
     for detector in DETECTORS:
         pictures = Pictures(detector=detector, marks=vision.DASHED)
@@ -57,7 +57,7 @@ def digests() -> Iterator[tuple[str, str]]:
 
 
 def roads() -> dict[str, np.ndarray]:
-    """Rendered roads, and one seen from elsewhere."""
+    """Rendered roads, and one seen from another pose."""
     model = CameraModel()
     found = {
         name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
@@ -71,7 +71,7 @@ def roads() -> dict[str, np.ndarray]:
 
 
 def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
-    """What a detector sees through each effect at that level, at most, and the pictures themselves."""
+    """What a detector sees through each effect, up to that level, and the frames themselves."""
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]

@@ -1,4 +1,4 @@
-"""A campaign command in a process of its own, to be struck by signals and looked at from outside."""
+"""A campaign command in a separate process, to be signalled and inspected from outside."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from mutator.workspace import Workspace
 
-LINGER_S = 5.0  # what is left of a command has so long to end after it
+LINGER_S = 5.0  # after a command ends, its other processes have this long to end
 DERIVED = ("results.csv", "results.parquet", "propagation.parquet")
 Bytes = dict[str, bytes]
 
@@ -30,7 +30,7 @@ def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) ->
 
 
 class Command:
-    """The command `python WORDS`, and all processes that come of it."""
+    """The command `python WORDS` and all processes that it starts."""
 
     def __init__(self, workspace: Workspace, out: Path, *words: str, **environment: str) -> None:
         self.out = out
@@ -48,12 +48,12 @@ class Command:
         )
 
     def wait_for_records(self, count: int) -> None:
-        """Until that many experiments have a record."""
+        """Wait until that many experiments have a record."""
         files = self.out / "records"
         self._wait(lambda: sum(p.read_bytes().count(b"\n") - 1 for p in files.glob("*.jsonl")) >= count)
 
     def wait_for(self, path: Path) -> None:
-        """Until there is something at this path."""
+        """Wait until this path exists."""
         self._wait(path.exists)
 
     def _wait(self, reached: Callable[[], bool]) -> None:
@@ -79,12 +79,12 @@ class Command:
                 continue
 
     def workers(self) -> list[int]:
-        """Its xdist workers that live."""
+        """Its living xdist workers."""
         registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
     def end(self, *, longest_s: float = 600.0) -> str:
-        """Wait for its end and for the end of everything it started; returns what it printed."""
+        """Wait until it and everything it started have ended; return its output."""
         printed = self.process.communicate(timeout=longest_s)[0]
         deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):
@@ -93,7 +93,7 @@ class Command:
         return printed
 
     def kill(self) -> None:
-        """End it and everything it started, come what may."""
+        """Kill it and everything it started, unconditionally."""
         self.process.kill()
         self.process.wait()
         while left := list(self.others()):

@@ -1,4 +1,4 @@
-"""A Dask scheduler and workers as processes of their own, each with folders and caches that no other has."""
+"""A Dask scheduler and workers as separate processes, each with its own folders and caches."""
 
 import os
 import shutil
@@ -15,10 +15,10 @@ _QUIET = {"DASK_LOGGING__DISTRIBUTED": "error"}
 
 @dataclass
 class Machines:
-    """A scheduler, started at once, and workers, started when asked for."""
+    """A scheduler, started at once, and workers, started on request."""
 
     folder: Path
-    nanny: bool = True  # starts a worker that died anew
+    nanny: bool = True  # restarts a worker that died
     environment: Mapping[str, str] = field(default_factory=dict)
     workers: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
@@ -28,7 +28,7 @@ class Machines:
         self.start_scheduler()
 
     def start_scheduler(self) -> None:
-        """Start it, at a free port of the loopback, and wait until it has written its file."""
+        """Start it at a free loopback port and wait until it has written its file."""
         self.file.unlink(missing_ok=True)
         words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(self.file)]
         self.scheduler = self._started("scheduler", words)
@@ -38,19 +38,19 @@ class Machines:
             time.sleep(0.05)
 
     def add(self, name: str, **environment: str) -> None:
-        """Start a worker of that name, with one thread."""
+        """Start a worker with that name and one thread."""
         words = ["--scheduler-file", str(self.file), "--name", name, "--nthreads", "1", "--no-dashboard"]
         words += ["--host", "127.0.0.1", "--memory-limit", "0", "--nanny" if self.nanny else "--no-nanny"]
         words += ["--local-directory", str(self.folder / name / "dask"), "--death-timeout", "60"]
         self.workers[name] = self._started("worker", words, name, **environment)
 
     def strike(self, name: str, number: signal.Signals) -> None:
-        """A signal to a worker's process, not to its nanny."""
+        """Send a signal to a worker's process, not to its nanny."""
         for pid in self.processes(name):
             os.kill(pid, number)
 
     def processes(self, name: str) -> list[int]:
-        """The process that does a worker's work; none while its nanny starts it anew."""
+        """The process that does a worker's work; none while its nanny restarts it."""
         process = self.workers[name]
         if not self.nanny:
             return [process.pid]
@@ -65,7 +65,7 @@ class Machines:
         return found
 
     def children(self) -> list[int]:
-        """Processes that run pieces of work, of whatever worker."""
+        """Processes that run pieces of work, for any worker."""
         found = []
         for path in Path("/proc").glob("[0-9]*"):
             try:
@@ -78,7 +78,7 @@ class Machines:
         return found
 
     def end(self) -> None:
-        """Kill all of them, with what they started."""
+        """Kill all of them and everything they started."""
         for process in (*self.workers.values(), self.scheduler):
             for number in (signal.SIGCONT, signal.SIGKILL):
                 try:

@@ -1,5 +1,6 @@
-"""The same bytes on every Python, on processors with narrower vectors, with and without compiled code:
-pictures, detections, traces."""
+"""Frames, detections and traces have the same bytes on every Python, on processors with narrower vectors, and
+with or without compiled code.
+"""
 
 import json
 import os
@@ -24,7 +25,10 @@ PROCESSORS = {
 @pytest.mark.parametrize("processor", PROCESSORS)
 @pytest.mark.parametrize("code", ["plain", "compiled"])
 def test_bytes_are_those_that_were_recorded(processor: str, code: str, tmp_path: Path) -> None:
-    """Who changes results on purpose records them anew, with `python tests/differential/arithmetic.py`."""
+    """The digests are the recorded ones.
+
+    After an intended change of results, record them with `python tests/differential/arithmetic.py`.
+    """
     command = [sys.executable, str(HERE / "arithmetic.py")]
     if code == "compiled":
         if not compiler():

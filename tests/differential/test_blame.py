@@ -1,4 +1,4 @@
-"""Whose doing it is that a run did not end well: the same answer, to the letter, from every engine."""
+"""Every engine gives the same reason, to the letter, why a run did not end well."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -35,9 +35,9 @@ FROM_2_S = at_time(2.0)
 IN_ONE_STEP = Trigger(name="x", condition="t > 1.97 and t < 2.02")
 FIRST_ACTIVE_S = 2.0
 
-# What the target does when its sensor tells a text instead of a distance: `gap_of` does it and goes on with a
-# distance. In every step of a mutant it does what the number in the scenario stands for; with the careful
-# scenario it notices when its sensor fails.
+# What the target does when its sensor returns a text instead of a distance: `gap_of` does it, then continues
+# with a distance. In every step of a mutant it acts on the scenario's number; in the careful scenario it
+# notices a failing sensor.
 MOODS = """
 import ctypes, os, sys
 from contextlib import suppress
@@ -180,7 +180,7 @@ MODELS = {  # line of the template, more in the YAML
 
 
 def prepare(toy: Workspace) -> None:
-    """The toy with those moods, and with fault models whose lines raise."""
+    """The toy with those moods, and with fault models that inject raising lines."""
     tree = toy.library.parent / "tree" / "toycar"
     (tree / "moods.py").write_text(MOODS)
     for name, pairs in EDITS.items():
@@ -210,7 +210,7 @@ def at(anchor: Anchor) -> FaultLocation:
 
 
 def sensed(mood: str | None) -> Fault:
-    """The sensor tells this instead of a distance."""
+    """The sensor returns this instead of a distance."""
     return at_gap("stuck", value=mood)
 
 
@@ -256,7 +256,7 @@ class Blamed:
         return [finished.record for finished in runner.run(experiments)]
 
     def record(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Record:
-        """The record of an experiment, which is the same from every engine."""
+        """The record of an experiment, which every engine must agree on."""
         experiment = self.experiment(fault, trigger, scenario)
         reference, *others = [record for name in ENGINES for record in self.run(name, [experiment])]
         assert others == [reference, reference]
@@ -295,8 +295,9 @@ def blamed(
     ],
 )
 def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, place: str | None) -> None:
-    """An exception of the target after the activation, an exit or the interpreter's end is its crash; the
-    record keeps type, text and place of an exception."""
+    """An exception in the target after the activation, an exit or the interpreter's end is the target's
+    crash; the record keeps type, text and place of an exception.
+    """
     record = blamed.record(sensed(mood))
     assert record.status is Status.CRASHED
     if place is None:
@@ -310,7 +311,7 @@ def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, 
 
 
 def test_a_guarded_statement_raises(blamed: Blamed) -> None:
-    """A statement of the target stays one under its guard: what it raises after the activation is a crash."""
+    """A guarded statement still belongs to the target: an exception in it after the activation is a crash."""
     left_out = fault(Injection(location=at(SEEN), model="omission"))
     record = blamed.record(left_out, IN_ONE_STEP)
     assert record.status is Status.CRASHED
@@ -339,7 +340,7 @@ WORLD = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="offset")
 def test_an_injected_line_raises(
     blamed: Blamed, injected: Fault, scenario: str, code: str, error: str
 ) -> None:
-    """What comes out of an injected line makes the mutant invalid, and the line is named."""
+    """An exception in an injected line makes the mutant invalid, and the line is named."""
     record = blamed.record(injected, scenario=scenario)
     assert record.status is Status.INVALID_MUTANT
     named, _, rest = record.detail.partition(": the injected ")
@@ -349,7 +350,7 @@ def test_an_injected_line_raises(
 
 
 def test_a_model_that_raises(blamed: Blamed) -> None:
-    """Where the fault model declares that it raises, what its line raises is a crash."""
+    """If the fault model declares that it raises, an exception in its line is a crash."""
     record = blamed.record(at_gap("declared"))
     assert record.status is Status.CRASHED
     assert record.detail == "IndexError: list index out of range (toycar/sensing.py:15)"
@@ -362,8 +363,9 @@ def test_a_model_that_raises(blamed: Blamed) -> None:
 def test_a_statement_of_the_target_raises_once_more(
     blamed: Blamed, model: str, params: tuple[tuple[str, Value], ...], kind: str
 ) -> None:
-    """A statement that is repeated stays the target's: what it raises the second time is a crash, as is what
-    a model is there to raise."""
+    """A repeated statement still belongs to the target: an exception at its second execution is a crash, as
+    is one that a model raises on purpose.
+    """
     seen = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="self.seen")
     record = blamed.record(fault(Injection(location=at(seen), model=model, params=params)))
     assert record.status is Status.CRASHED
@@ -380,7 +382,7 @@ def test_a_statement_of_the_target_raises_once_more(
     ],
 )
 def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -> None:
-    """Nothing that happens before the fault is active is its doing."""
+    """Nothing that happens before the activation is blamed on the fault."""
     record = blamed.record(sensed("fail"), scenario=f"early{number}")
     place = f" ({record.error.place})" if record.error else ""
     assert (record.error is not None) is (number < 2)
@@ -390,7 +392,7 @@ def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -
 
 @pytest.mark.slow
 def test_a_hang_after_the_activation(blamed: Blamed) -> None:
-    """A run that does not come to its end with its fault is a timeout."""
+    """A run that hangs after the activation is a timeout."""
     record = blamed.record(sensed("hang"))
     assert (record.status, record.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
@@ -406,14 +408,14 @@ def test_a_hang_after_the_activation(blamed: Blamed) -> None:
     ],
 )
 def test_a_mutant_overwrites_its_probe(blamed: Blamed, mood: str, detail: str) -> None:
-    """A probe whose report is none, or that is broken, makes a harness error."""
+    """A broken probe or an invalid probe report is a harness error."""
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR
     assert record.detail.startswith(detail)
 
 
 def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
-    """The experiments before and after it have their results."""
+    """A damaged report costs one experiment; those before and after it keep their results."""
     experiments = [blamed.experiment(f) for f in (at_gap("offset", by=1.0), sensed("damage_the_counts"))]
     experiments.append(blamed.experiment(at_gap("offset", by=2.0)))
     for engine in blamed.engines:
@@ -423,8 +425,9 @@ def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
 
 @pytest.mark.parametrize("mood", ["stop_the_time", "observe_again_and_hide_it", "lose_the_lead"])
 def test_what_cannot_be_observed(blamed: Blamed, mood: str) -> None:
-    """Observing twice at one time, and failing to, is an error of the probe that names the place, even if the
-    target catches it."""
+    """Observing twice at one time, or a failed observation, is a probe error that names the place, even if
+    the target catches it.
+    """
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR
     assert record.error is not None

@@ -1,4 +1,4 @@
-"""A whole campaign on each engine: the same results, also after kills."""
+"""A whole campaign gives the same results on each engine, also after kills."""
 
 import os
 import signal
@@ -35,7 +35,7 @@ def expected(
 def test_every_engine_gives_the_same_tables(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], engine: str, workers: int
 ) -> None:
-    """The tables of a campaign are the same bytes from each engine and any number of workers."""
+    """The tables of a campaign are the same bytes for each engine and any number of workers."""
     summary = run_campaign(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
     assert (summary.exit_code, summary.problem) == (0, "")
     assert summary.proof == Proof(sampled=20, same=20)
@@ -47,7 +47,7 @@ def test_every_engine_gives_the_same_tables(
 def test_killed_again_and_again(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], victim: str
 ) -> None:
-    """Servers or workers killed in the middle of a campaign cost but time: the tables are the same."""
+    """Killing servers or workers in mid-campaign only costs time: the tables are the same."""
     out = tmp_path / "run"
     for _ in range(3):
         process = _begun(toy, out)
@@ -57,7 +57,7 @@ def test_killed_again_and_again(
             if out.exists() and len(read_records(out)) > done + 2:
                 done = len(read_records(out))
                 for pid in _victims(out, victim):
-                    with suppress(ProcessLookupError):  # the death of another one may have ended it
+                    with suppress(ProcessLookupError):  # the death of another worker may have ended it
                         os.kill(pid, signal.SIGKILL)
         process.wait()
     summary = run_campaign(toy, "toy", out, engine="fork")
@@ -68,7 +68,7 @@ def test_killed_again_and_again(
 
 @pytest.mark.slow
 def test_a_proof_goes_on_after_kills(toy: Workspace, tmp_path: Path, expected: dict[str, bytes]) -> None:
-    """A campaign killed in the middle of its proof goes on with what is left: nothing is proved twice."""
+    """A campaign killed during its proof resumes with the remaining experiments and proves none twice."""
     out, proved = tmp_path / "run", 0
     for _ in range(3):
         process = _begun(toy, out)
@@ -98,7 +98,7 @@ def _begun(toy: Workspace, out: Path) -> "subprocess.Popen[bytes]":
 
 
 def _proved(out: Path) -> list[str]:
-    """The lines of the proof, but for the heads of their files."""
+    """The lines of the proof, without the headers of their files."""
     files = (out / "proof").glob("*.jsonl")
     return [line for path in files for line in path.read_text().splitlines()[1:]]
 

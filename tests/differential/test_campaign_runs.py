@@ -1,4 +1,4 @@
-"""The same campaign gives the same bytes, however it is run, stopped and resumed."""
+"""A campaign gives the same bytes, however it is run, stopped and resumed."""
 
 import os
 import random
@@ -27,13 +27,13 @@ CopyToycar = Callable[[Path], Workspace]
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, whose checks are known."""
+    """The toy, with cached checks."""
     return toy
 
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
-    """The small campaign, run in one process, in one go; no test may write to its folder."""
+    """The small campaign, run in one process without a break; no test may write to its folder."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
@@ -43,7 +43,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> 
 
 @pytest.fixture(scope="module")
 def undisturbed(whole: Path) -> Bytes:
-    """What it gives."""
+    """The results of the uninterrupted run."""
     return results(whole)
 
 
@@ -59,7 +59,7 @@ def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Byte
 def test_any_order_in_any_number_of_sessions(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run that is given up after every two chunks, not the next ones, and resumed, gives the same bytes."""
+    """A run that stops after every two chunks, in shuffled order, and resumes gives the same bytes."""
     prepare, draw = Session.prepare, random.Random(3)
     taken: list[int] = []
 
@@ -82,8 +82,10 @@ def test_any_order_in_any_number_of_sessions(
 def test_lost_records_run_again(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes, closed: bool
 ) -> None:
-    """Lines lost at the end of a records file are run again, and no others. Of a file that a session has
-    closed nothing gets lost by a kill: it is refused until it was repaired."""
+    """Only records lost at the end of a file are run again.
+
+    A file that a session has closed cannot lose records in a kill: it is refused until it is repaired.
+    """
     out = shutil.copytree(whole, tmp_path / "run")
     [path] = (out / "records").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)
@@ -104,7 +106,7 @@ def test_lost_records_run_again(
 def test_derived_files_can_be_made_again(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes
 ) -> None:
-    """Tables deleted from a complete run come back from its records, byte for byte."""
+    """Tables deleted from a complete run are rebuilt from its records, byte for byte."""
     out = shutil.copytree(whole, tmp_path / "run")
     for name in DERIVED:
         (out / name).unlink()
@@ -118,11 +120,11 @@ def test_derived_files_can_be_made_again(
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:
-    """A command killed half-way leaves no process behind; given again, it completes to the same bytes."""
+    """A command killed half-way leaves no process; repeated, it completes to the same bytes."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(4)
-    if number is signal.SIGINT:  # as a terminal does it: everyone in the foreground gets it
+    if number is signal.SIGINT:  # as a terminal does: the whole foreground group gets it
         os.killpg(command.process.pid, number)
     else:
         command.process.send_signal(number)
@@ -137,10 +139,10 @@ def test_killed_and_resumed(
 
 @pytest.mark.slow
 def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """`mutator run` and pytest's campaign are the same thing: pytest resumes what the other was killed at, of
-    which no process lives on, and comes to the same bytes. The killed workers' registrations go, too.
+    """After a kill, pytest resumes what `mutator run` began and reaches the same bytes; no process or
+    registration of a killed worker is left.
 
-    That `mutator run` resumes what pytest left is shown by the killed worker below.
+    The killed worker below shows that `mutator run` resumes what pytest left.
     """
     out = tmp_path / "run"
     command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
@@ -159,7 +161,7 @@ def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbe
 
 
 def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """Killed before its first experiment, the command begins anew and gives the same bytes."""
+    """A command killed before its first experiment starts again and gives the same bytes."""
     out = tmp_path / "run"
     command = Command(toycar, out, *pytest_words(out))
     command.wait_for(out / "work" / "checks")
@@ -170,7 +172,9 @@ def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed
 
 
 def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A worker that is killed costs its chunk; the rest is run, the exit code says 3, a resume completes."""
+    """A killed worker costs its chunk; the rest is run, the exit code is 3, and a resume completes the
+    campaign.
+    """
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(2)
@@ -191,7 +195,7 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
 def test_a_worker_dies_with_its_command_from_its_first_moment(
     toy: Workspace, tmp_path: Path, words: list[str] | None
 ) -> None:
-    """A worker that has read nothing yet, and does not come to, is gone when its command is killed."""
+    """A worker that is stopped before it has read anything ends when its command is killed."""
     out = tmp_path / "run"
     command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
     while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):
@@ -210,11 +214,11 @@ def test_a_worker_dies_with_its_command_from_its_first_moment(
 
 
 def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A second command in a folder at work is told who works there, and disturbs nothing."""
+    """A second command in a folder in use is refused with the name of the owner, and disturbs nothing."""
     out = tmp_path / "run"
     first = Command(toy, out, *pytest_words(out, workers=0))
     first.wait_for_records(1)
-    first.process.send_signal(signal.SIGSTOP)  # so that it is not done before the second has begun
+    first.process.send_signal(signal.SIGSTOP)  # so that it is not finished before the second begins
     try:
         second = Command(toy, out, *pytest_words(out))
         printed = second.process.communicate(timeout=60)[0]
@@ -230,14 +234,16 @@ def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes)
 
 @pytest.fixture(scope="module")
 def clone() -> Workspace:
-    """The library, templates and controller that ship."""
+    """The shipped library, templates and controller."""
     return Workspace.find(root=Path(__file__).parents[2])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", ["as_described", "as_coded"])
 def test_the_controller_that_ships(clone: Workspace, tmp_path: Path, reading: str) -> None:
-    """On the real target too: one worker, two, killed with TERM and KILL and resumed, the same bytes."""
+    """The shipped controller gives the same bytes with one worker, with two, and after TERM, KILL and a
+    resume.
+    """
     text = clone.campaign("quickstart").read_text()
     for old, new in (
         ("scenarios: [S1, S2, S3, S4, S5]", "scenarios: [S2]"),

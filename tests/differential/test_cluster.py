@@ -1,4 +1,4 @@
-"""A campaign on a Dask cluster gives the bytes that this machine gives, whoever dies meanwhile."""
+"""A campaign on a Dask cluster gives the bytes of a local run, whichever processes die."""
 
 import os
 import random
@@ -29,13 +29,13 @@ INT, TERM, KILL, STOP = signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SI
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, whose checks are known."""
+    """The toy, with cached checks."""
     return toy
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
-    """What the small campaign gives with the fork engine and two workers of this machine, and its seal."""
+    """The small campaign's results with the fork engine and two local workers, and its seal."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run", workers=2, engine="fork")
     assert (summary.exit_code, summary.done) == (0, 12)
@@ -45,7 +45,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToyca
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A scheduler with two workers, which no test may harm."""
+    """A scheduler with two workers that no test may harm."""
     machines = Machines(tmp_path_factory.mktemp("two") / "machines", nanny=False)
     machines.add("alpha")
     machines.add("beta")
@@ -62,7 +62,7 @@ def machines(tmp_path: Path) -> Iterator[Machines]:
 
 
 def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary:
-    """Run the small campaign there."""
+    """Run the small campaign on these machines."""
     deals = distributor(str(machines.file))
     return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
 
@@ -70,8 +70,11 @@ def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary
 def test_two_workers_give_the_same_bytes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
-    """Two workers with folders of their own give tables, series and seal of a local run; each experiment has
-    one record, the proof is whole, the machines are noted, and nothing is left on the workers."""
+    """Two workers with separate folders give the tables, series and seal of a local run.
+
+    Each experiment has one record, the proof is complete, the machines are noted, and the workers keep no
+    files.
+    """
     out = tmp_path / "run"
     summary = on(two, toy, out)
     assert (summary.exit_code, summary.problem, summary.done) == (0, "", 12)
@@ -100,8 +103,9 @@ def test_pytest_deals_out_to_a_cluster(
 def test_a_worker_that_computes_otherwise_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Where no worker drives the campaign's golden run, each is named with its versions and the campaign ends
-    with the reason."""
+    """If no worker reproduces the campaign's golden run, each is named with its versions and the campaign
+    ends with the reason.
+    """
     real = bundle.read_json
     monkeypatch.setattr(
         bundle,
@@ -118,8 +122,7 @@ def test_a_worker_that_computes_otherwise_is_refused(
 def test_a_worker_with_another_version_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A worker whose packages would not be allowed to resume the run is refused by name, with the
-    difference."""
+    """A worker with packages that could not resume the run is refused by name, with the difference."""
     real = machine.versions
     monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
@@ -138,8 +141,9 @@ def test_a_dead_command_leaves_nothing_at_work(
     number: signal.Signals,
     code: int,
 ) -> None:
-    """When the command is killed or interrupted, the work of the workers stops within 10 s, with all its
-    processes; the rest is then run to the same bytes."""
+    """When the command is killed or interrupted, all processes of the workers' work end within 10 s; the rest
+    then runs to the same bytes.
+    """
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "small", "--out", str(out)]
     words += ["--engine", "fork", "--cluster", str(two.file)]
@@ -171,7 +175,7 @@ def test_workers_struck_at_random(
     seed: int,
     whole_toy: tuple[Bytes, str],
 ) -> None:
-    """While workers are struck at random, and one joins late, a campaign comes to the same bytes."""
+    """With workers killed at random, and one that joins late, a campaign gives the same bytes."""
     draw = random.Random(f"{number} {seed}")
     for name in ("alpha", "beta"):
         machines.add(name)
@@ -199,7 +203,7 @@ def test_workers_struck_at_random(
 
 @pytest.fixture(scope="module")
 def whole_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
-    """What the campaign `toy` gives with two workers of this machine."""
+    """The results of the campaign `toy` with two local workers."""
     folder = tmp_path_factory.mktemp("whole")
     summary = run_campaign(copy_toycar(folder), "toy", folder / "run", workers=2, engine="fork")
     assert summary.exit_code == 0
@@ -230,7 +234,9 @@ _OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n
 def test_a_refused_worker_is_told_and_the_others_do_its_work(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str], code: str, why: str
 ) -> None:
-    """A worker whose arithmetic or version is another one is refused by name, and the campaign ends right."""
+    """A worker with other arithmetic or another version is refused by name, and the others complete the
+    campaign.
+    """
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text(code)
     machines.add("alpha")
@@ -249,8 +255,9 @@ def test_a_refused_worker_is_told_and_the_others_do_its_work(
 def test_the_scheduler_dies(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str]
 ) -> None:
-    """When the scheduler dies, the command ends with what to do; the same command, once there is another one,
-    repeats nothing and comes to the same bytes."""
+    """When the scheduler dies, the command ends and says what to do; with a new scheduler, the same command
+    repeats nothing and reaches the same bytes.
+    """
     machines.add("alpha")
     out = tmp_path / "run"
 
@@ -276,7 +283,7 @@ def test_the_scheduler_dies(
 @pytest.mark.slow
 @pytest.mark.parametrize("campaign", ["quickstart", "paper_smoke"])
 def test_shipped_campaigns_on_three_workers(tmp_path: Path, machines: Machines, campaign: str) -> None:
-    """Shipped campaigns give on three workers, byte for byte, what two of this machine give."""
+    """Shipped campaigns give the same bytes on three workers as on two local ones."""
     shipped = Workspace.find(CLONE)
     here = run_campaign(shipped, campaign, tmp_path / "here", workers=2)
     assert here.exit_code == 0

@@ -1,4 +1,4 @@
-"""The fork and warm engines against the reference engine: the same bytes for every fault and every end."""
+"""The fork and warm engines give the reference engine's bytes for every fault and every way to end."""
 
 import shutil
 from collections import Counter
@@ -149,7 +149,7 @@ class Engines:
         )
 
     def run(self, name: str, job: Job) -> tuple[Execution, dict[str, bytes]]:
-        """What came of a job, and the files that it left."""
+        """The result of a job, and the files that it left."""
         ((_, execution),) = [
             (job, replace(done, log=done.log)) for job, done in self._kept(self.made[name], [job])
         ]
@@ -191,7 +191,9 @@ def fault_at(place: FaultLocation, model: str, params: dict[str, Value]) -> Faul
 
 
 def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
-    """Status, words, probe and files are those of the reference engine; the fork engine's execution."""
+    """Check that status, messages, probe report and files equal the reference engine's; return the fork
+    engine's execution.
+    """
     expected, files = three.run("reference", job)
     for name in ("warm", "fork"):
         execution, found = three.run(name, job)
@@ -209,7 +211,7 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Executio
 
 @pytest.mark.parametrize("model", ["offset", "omission", "image_effect", "reordering", "slow_call"])
 def test_same_bytes(three: Engines, model: str) -> None:
-    """A fault that is active in a context gives the reference engine's bytes, without its interpreter."""
+    """A fault that is active in a context gives the reference engine's bytes without a fresh interpreter."""
     execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
     assert execution.start > 20
 
@@ -218,8 +220,9 @@ def test_same_bytes(three: Engines, model: str) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
-    """Every fault model under every kind of trigger gives the reference engine's bytes; one whose trigger
-    never holds gives them without being run."""
+    """Every fault model under every kind of trigger gives the reference engine's bytes; a trigger that never
+    holds gives them without a run.
+    """
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
         check_same(
@@ -230,7 +233,7 @@ def test_every_model_under_every_trigger(three: Engines, model: str, trigger: st
 
 
 def test_a_changed_value_is_forked(three: Engines) -> None:
-    """A value that is changed where it stands gives the reference engine's bytes, without its interpreter."""
+    """A value changed in place gives the reference engine's bytes without a fresh interpreter."""
     anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="closing")
     place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
     check_same(
@@ -242,8 +245,9 @@ def test_a_changed_value_is_forked(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", ["always", "for 1 s", "off and on"])
 @pytest.mark.parametrize("path", ["toycar/sensing.py", "toycar/driver.py"])
 def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
-    """Every value of the toy, by each of its anchors, changed by a model that fits or ends badly:
-    every engine gives the reference engine's bytes or words."""
+    """For every value of the toy and each of its anchors, changed by a model that fits or fails, every engine
+    gives the reference engine's bytes or message.
+    """
     places = values(three, path)
     assert len(places) > 10
     changes: tuple[tuple[str, dict[str, Value]], ...] = (
@@ -258,14 +262,16 @@ def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ENDS)
 def test_every_bad_end(three: Engines, model: str) -> None:
-    """A run that crashes, hangs, hoards, leaves or breaks the interpreter ends in the same words."""
+    """A run that crashes, hangs, exhausts memory, exits or breaks the interpreter ends with the
+    same message.
+    """
     execution = check_same(three, three.job(fault(model, GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"]))
     assert execution.status is (Status.TIMEOUT if model == "hang" else Status.CRASHED)
     check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), RunMode.FORK)
 
 
 def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
-    """What does not end well is run again by the reference engine, and its server goes on."""
+    """The reference engine reruns what does not end well, and the engine's server continues."""
     job = three.job(fault("crash", GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"])
     execution, _ = three.run("fork", job)
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
@@ -278,7 +284,7 @@ def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
 def test_the_limit_of_steps_counts_golden_ones(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A fork that goes on beyond the limit of steps is a timeout after as many steps as anywhere."""
+    """A fork that exceeds the limit of steps times out after as many steps as in any engine."""
     few = Engines(copy_toycar(tmp_path), tmp_path, replace(LIMITS, steps=100))
     try:
         job = few.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])

@@ -1,4 +1,4 @@
-"""The engines on the controller that ships: the same records, nothing left to the reference engine."""
+"""The engines give the same records on the shipped controller, and leave nothing to the reference engine."""
 
 from collections import Counter
 from pathlib import Path
@@ -21,8 +21,9 @@ CLONE = Path(__file__).parents[2]
 @pytest.mark.slow
 @pytest.mark.parametrize(("campaign", "limit"), [("quickstart", 26), ("paper", 8)])
 def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
-    """Experiments of every kind, with ideal vision and with pictures, have the same records, trace digests
-    included, and are forked rather than run anew."""
+    """Experiments of every kind, with ideal vision and with frames, have the same records and trace digests,
+    and are forked rather than run in full.
+    """
     clone = Workspace.find(root=CLONE)
     plan = make_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()

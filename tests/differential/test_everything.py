@@ -1,4 +1,4 @@
-"""A campaign that uses every anchor, every fault model and every operator: the engines agree on all of it."""
+"""The engines agree on a campaign with every anchor, every fault model and every operator."""
 
 import json
 from collections.abc import Callable
@@ -20,7 +20,7 @@ DRIVE = {"file": "toycar/driver.py", "function": "Driver.drive"}
 GAP, OFFSET = SENSE | {"after_assign": "gap"}, SENSE | {"assigned_value": "offset"}
 WANTED = {"model": "offset", "unit": "1", "params": {"by": 1.5}}
 
-# A fault for each anchor, then one for each model that is not among these.
+# A fault for each anchor, then one for each model that these do not use.
 FAULTS: list[dict[str, Any]] = [
     {"at": GAP, "model": "offset", "unit": "m", "params": {"by_m": 30}},
     {"at": SENSE | {"before_assign": "offset"}, "model": "scale", "params": {"target": "gap", "factor": 1.5}},
@@ -149,7 +149,9 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
 
 
 def test_nothing_is_left_out(everything: Workspace) -> None:
-    """The campaign has every kind of anchor, every fault model that is not an operator's, and where."""
+    """The campaign has every kind of anchor, and every fault model except the operators' own, with its
+    location.
+    """
     anchors = {kind for kind in AnchorKind for fault in FAULTS if kind.value in fault["at"]}
     assert anchors == set(AnchorKind)
     shipped = {model.name for model in everything.fault_models() if not model.name.startswith("operator_")}

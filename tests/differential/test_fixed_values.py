@@ -1,4 +1,4 @@
-"""Constants and defaults that the probe sets: the same bytes from each engine, and another drive."""
+"""Constants and defaults that the probe sets give the same bytes on each engine, and change the drive."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -97,8 +97,9 @@ def fault(*locations: FaultLocation) -> Fault:
 
 
 def test_all_at_once(three: Engines) -> None:
-    """A mutant that sets all of them off and on is forked, counts each active step once for each, and gives
-    the reference engine's bytes."""
+    """A mutant that switches all of them on and off is forked, counts each active step once for each, and
+    gives the reference engine's bytes.
+    """
     job = three.job(fault(*PLACES.values()), TRIGGERS["off and on"])
     execution = check_same(three, job, RunMode.FORK)
     assert execution.probe is not None
@@ -111,8 +112,9 @@ def test_all_at_once(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("place", PLACES)
 def test_each_under_every_trigger(three: Engines, place: str, trigger: str) -> None:
-    """Each of them, under every kind of trigger, changes the drive, unless that never holds, and gives the
-    reference engine's bytes."""
+    """Each of them, under every kind of trigger that holds, changes the drive and gives the reference
+    engine's bytes.
+    """
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     execution = check_same(three, three.job(fault(PLACES[place]), TRIGGERS[trigger]), how)
     assert execution.status is Status.OK

@@ -1,4 +1,4 @@
-"""Injections into one instance or some executions: the same bytes from each engine."""
+"""Injections limited to one instance or some executions give the same bytes on each engine."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -49,8 +49,9 @@ def fault(*injections: Injection) -> Fault:
 
 
 def test_all_at_once(three: Engines) -> None:
-    """A mutant with one instance, some executions, and both, is forked, gives the reference engine's bytes,
-    and counts what acted."""
+    """A mutant limited to one instance, to some executions, and to both is forked, gives the reference
+    engine's bytes, and counts the activations.
+    """
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
     assert execution.probe is not None
     counts = [told["count"] for told in execution.probe["injections"].values()]

@@ -1,4 +1,4 @@
-"""Killed at random moments, a campaign comes to the same results and leaves nothing behind."""
+"""Killed at random moments, a campaign reaches the same results and leaves nothing behind."""
 
 import os
 import random
@@ -31,13 +31,13 @@ def contents(tree: Path) -> dict[str, bytes]:
 
 
 def struck(command: Command, kill: Kill, after_s: float) -> bool:
-    """Kill it, or one of its workers, after that time; false if it ended before."""
+    """Kill it, or one of its workers, after that time; return false if it ended before."""
     try:
         command.process.wait(after_s)
         return False
     except subprocess.TimeoutExpired:
         number, one_worker = kill
-    if not one_worker:  # Ctrl-C at a terminal goes to everyone in the foreground
+    if not one_worker:  # Ctrl-C at a terminal goes to the whole foreground group
         (os.killpg if number is INT else os.kill)(command.process.pid, number)
         return True
     while not (workers := command.workers()):
@@ -49,7 +49,7 @@ def struck(command: Command, kill: Kill, after_s: float) -> bool:
 
 
 def scratch(out: Path) -> list[Path]:
-    """What may be in a run folder only while a command is at work there."""
+    """Files that a run folder may contain only while a command works there."""
     return [path for path in out.rglob("*") if path.name == "work" or is_half_written(path.name)]
 
 
@@ -67,28 +67,29 @@ def stage(out: Path) -> str:
 
 
 class Campaign:
-    """A command that is killed at random moments of the time that it takes undisturbed, and given again."""
+    """A command that is killed at random moments of its undisturbed duration, and repeated."""
 
     def __init__(self, workspace: Workspace, folder: Path, words: Sequence[str], seed: int) -> None:
         self.workspace, self.folder, self.words = workspace, folder, words
         self.tree = workspace.manifest(workspace.target_name()).root
         self.before = contents(self.tree)
         self.random = random.Random(seed)
-        self.stages: list[str] = []  # in which the kills came
+        self.stages: list[str] = []  # the stages in which the kills came
         began = time.monotonic()
         self.longest_s = 0.0
         self.results = self.finish(folder / "undisturbed", [])
         self.longest_s = time.monotonic() - began
 
     def kill_and_resume(self, kills: Sequence[Kill]) -> None:
-        """Runs, each in a new folder and with checks of its own, until each of the kills has come."""
+        """Do runs, each in a new folder with its own checks, until all kills have come."""
         left, number = list(kills), count()
         while left:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results
 
     def finish(self, out: Path, kills: list[Kill]) -> str:
-        """Give the command until it comes to its end, killing it with what is left of `kills`; returns the
-        digest of the results."""
+        """Repeat the command until it completes, killing it with the remaining `kills`; return the digest of
+        the results.
+        """
         done = False
         while not done:
             command = Command(
@@ -102,22 +103,24 @@ class Campaign:
             done = command.process.returncode == 0
             assert done or hit, printed
             assert contents(self.tree) == self.before
-            if done or command.process.returncode == 130:  # it was asked to stop, and tidied up
+            if done or command.process.returncode == 130:  # it was asked to stop, and cleaned up
                 assert not scratch(out), printed
         return results_digest(out)
 
 
 def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
-    """Killed 20 times with INT, TERM and KILL, all of it or a worker: the same results, nothing is left."""
+    """Killed 20 times with INT, TERM and KILL, as a whole or one worker, it gives the same results and leaves
+    nothing.
+    """
     words = ["-m", "mutator", "run", "small", "-n", "2"]
     campaign = Campaign(copy_toycar(tmp_path), tmp_path, words, seed=5)
     campaign.kill_and_resume(random.Random(5).sample(EVERY * 4, 20))
     assert len(campaign.stages) == 20
-    assert len(set(campaign.stages)) > 1  # not all before anything was begun
+    assert len(set(campaign.stages)) > 1  # not all of them before the first experiment
 
 
 def test_kills_on_the_controller_that_ships(tmp_path: Path) -> None:
-    """The same on the real target: 30 experiments without pictures, killed six times."""
+    """The shipped controller does the same: 30 experiments without frames, killed six times."""
     for name in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["-m", "mutator", "run", "paper_reference", "-n", "2", "--limit", "30"]

@@ -1,4 +1,4 @@
-"""How the process of a run ends, and what is left of it: the same in every engine."""
+"""A run's process ends, and leaves files and processes, in the same way in every engine."""
 
 import os
 import signal
@@ -28,7 +28,10 @@ ACTIVE = (fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])
 
 
 def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: Limits) -> Engines:
-    """Engines on the toy; a mutant comes to execute the code `trouble`. `head` is run when it is loaded."""
+    """Engines on the toy with a mutant that executes the code `trouble`.
+
+    `head` runs when the target is loaded.
+    """
     package = toy.library.parent / "tree" / "toycar"
     go = (package / "go.py").read_text()
     assert MEET_TROUBLE in go
@@ -39,8 +42,9 @@ def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: 
 
 @pytest.fixture
 def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
-    """Runs a mutant in each engine that comes to execute the code `trouble`, in its output folder; what came
-    of it, and the files that it left. `head` is more code of the target, run when it is loaded."""
+    """Run a mutant that executes the code `trouble` in its output folder, in each engine; return the result
+    and the files. `head` is more code of the target, run when it is loaded.
+    """
     made: list[Engines] = []
 
     def run(
@@ -104,8 +108,9 @@ def lives(pid: int) -> bool:
 
 
 def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
-    """Of ten daemons that a mutant leaves (in sessions of their own, deaf to signals, some with children,
-    some forking again and again) none is there after the run, in any engine."""
+    """Ten daemons of a mutant (in separate sessions, ignoring signals, some with children, some forking
+    repeatedly) are all gone after the run, in any engine.
+    """
     notes = tmp_path / "notes"
     notes.mkdir()
     told = misbehave(DAEMONS.format(notes=str(notes)))
@@ -121,7 +126,7 @@ def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
 def test_daemons_of_a_killed_engine(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str
 ) -> None:
-    """When the process of an engine is killed in the middle of a run, the daemons of that run end, too."""
+    """When an engine's process is killed in the middle of a run, the run's daemons end, too."""
     notes = tmp_path / "notes"
     notes.mkdir()
     trouble = DAEMONS.format(notes=str(notes)) + "\n(NOTES.parent / 'all').touch()\ntime.sleep(60)\n"
@@ -169,8 +174,9 @@ scratch = tempfile.TemporaryDirectory(dir=".")
 
 
 def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
-    """`atexit` handlers, finalizers and open files leave the same bytes in the output folder, in each
-    engine."""
+    """`atexit` handlers, finalizers and open files leave the same bytes in the output folder in
+    each engine.
+    """
     told = misbehave(LATE_WORDS)
     expected = {
         "late.txt": b"last registered\nfirst registered\nfinalized\n",
@@ -185,8 +191,9 @@ def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
 
 
 def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) -> None:
-    """An `atexit` handler that the target registers when it is loaded is called once a run in each engine, in
-    the run's output folder, and not by the processes that wait."""
+    """An `atexit` handler that the loaded target registers is called once a run in each engine, in the run's
+    output folder, and never in the waiting processes.
+    """
     calls = tmp_path / "calls"
     head = (
         "import atexit, os\n"
@@ -196,11 +203,11 @@ def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) ->
     told = misbehave("", head)
     assert all(files["end.txt"] == b"the end" for _, files in told.values())
     folders = [Path(line).name for line in calls.read_text().splitlines()]
-    assert folders == ["out"] * 5  # the golden run, three mutants, a look at what the golden run observes
+    assert folders == ["out"] * 5  # the golden run, three mutants, the golden run's observations
 
 
 def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
-    """A run whose `atexit` handler never returns is a timeout in each engine."""
+    """A run with an `atexit` handler that never returns is a timeout in each engine."""
     waits = "import atexit, time\natexit.register(time.sleep, 100)"
     told = misbehave(waits, limits=replace(LIMITS, wall_s=2))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "wall time limit of 2 s")}
@@ -208,20 +215,20 @@ def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
 
 
 def test_a_handler_that_fails(misbehave: Misbehave) -> None:
-    """What breaks at the end of a run that has reported is no crash of it, whichever engine it has."""
+    """A failure at the end of a run that has reported is not a crash, in any engine."""
     told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 
 def test_a_kill_from_outside_at_the_end(misbehave: Misbehave) -> None:
-    """A run that is killed from outside after its report did not end well: its files may be incomplete."""
+    """A run killed from outside after its report did not end well, because its files may be incomplete."""
     told = misbehave("import atexit, os\natexit.register(os.kill, os.getpid(), 9)")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.HARNESS_ERROR, "killed from outside by SIGKILL")}
 
 
 def test_a_thread_that_outlives_its_run(misbehave: Misbehave) -> None:
-    """A thread that the interpreter waits for may finish its work, in each engine."""
+    """A thread that the interpreter waits for may finish its work in each engine."""
     thread = (
         "import threading, time\nfrom pathlib import Path\nhere = Path.cwd()\n"
         "def work():\n    time.sleep(0.5)\n    (here / 'thread.txt').write_text('done')\n"
@@ -259,14 +266,15 @@ FULL = {
 
 @pytest.mark.parametrize("how", FULL)
 def test_a_limit_of_space(misbehave: Misbehave, how: str) -> None:
-    """A run that writes more than it may into its output folder and TMPDIR is a timeout that names the limit,
-    in each engine."""
+    """A run that exceeds its space in the output folder and TMPDIR is a timeout that names the limit, in each
+    engine.
+    """
     told = misbehave(FULL[how], limits=replace(LIMITS, disk_mb=3))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "disk limit of 3 MiB")}
 
 
 def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
-    """A run may write nearly as much as its limit; what lies there already does not count, nor do holes."""
+    """A run may write nearly up to its limit; existing files and holes do not count."""
     body = (
         "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"
     )
@@ -275,7 +283,7 @@ def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
 
 
 def test_a_file_that_is_too_large(misbehave: Misbehave) -> None:
-    """No single file may be larger than the limit, holes or not: the run is told, and crashes on it."""
+    """A single file above the limit, with or without holes, raises an error in the run, which crashes."""
     told = misbehave("f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.CRASHED, "OSError: [Errno 27] File too large (toycar/trouble.py:4)")}

@@ -1,4 +1,4 @@
-"""Shards run apart and merged are the run of one machine."""
+"""Shards that run separately and are merged equal the run of one machine."""
 
 import json
 import shutil
@@ -32,7 +32,7 @@ DERIVED = ("results.csv", "results.parquet", "propagation.parquet", "plan.csv", 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Runs:
-    """The small campaign whole (`whole`), and as two shards (`1/2`, `2/2`) in folders of their own."""
+    """The small campaign whole (`whole`), and as two shards (`1/2`, `2/2`) in separate folders."""
     folder = tmp_path_factory.mktemp("shards")
     toy = copy_toycar(folder)
     made = {"whole": folder / "whole", "1/2": folder / "one", "2/2": folder / "two"}
@@ -56,8 +56,9 @@ def change_head(run: Path, **values: object) -> None:
 
 
 def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """Results, plan, patches and series are those of the single run, byte for byte, in whatever order shards
-    come."""
+    """Results, plan, patches and series equal those of the single run, byte for byte, in any order
+    of shards.
+    """
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
@@ -81,7 +82,7 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
 def test_a_merged_run_folder_has_series_from_the_first(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A merge that is killed once its folder is a run folder has lost no series: nothing remakes them."""
+    """A merge killed once its folder is a run folder has lost no series, since nothing would rebuild them."""
     seen: list[int] = []
 
     def build(run: Path) -> Path:
@@ -94,7 +95,7 @@ def test_a_merged_run_folder_has_series_from_the_first(
 
 
 def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """The seal does not depend on how many machines computed; a shard has another one."""
+    """The seal does not depend on the number of machines; a shard has a different seal."""
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
@@ -103,14 +104,15 @@ def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
 def test_shards_have_the_engine_of_the_whole(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A share of a plan that is worth forking is forked, too, however small: the merged run has the proof,
-    and with it the seal, of the whole."""
+    """If the whole plan is large enough to fork, every shard is forked, however small: the merged run has the
+    proof and the seal of the whole.
+    """
     monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
 def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
-    """The merged run says who approved what if every shard does, not what is true of one shard alone."""
+    """The merged run lists an approval if every shard has it."""
     said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
     gate.write_approvals(shards[0], said)
@@ -122,7 +124,7 @@ def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
 
 
 def test_shards_are_disjoint_and_all(runs: Runs) -> None:
-    """No experiment is run by two shards, and each by one; their plan digest is that of the whole."""
+    """Every experiment is run by exactly one shard; the shards' plan digest is that of the whole."""
     one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
     assert not one & two
     assert one | two == whole
@@ -130,7 +132,7 @@ def test_shards_are_disjoint_and_all(runs: Runs) -> None:
 
 
 def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
-    """The shard need not be said again, and another one is refused in its folder."""
+    """A shard resumes without naming it again; another shard is refused in its folder."""
     summary = run_campaign(toy, "small", copies["1/2"])
     assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
     with pytest.raises(MutatorError, match="shard 2/2"):
@@ -138,7 +140,7 @@ def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
 
 
 def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
-    """A merged folder is complete: running its campaign there again finds nothing to do."""
+    """A merged folder is complete: running its campaign there finds nothing to do."""
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     summary = run_campaign(toy, "small", tmp_path / "out")
     assert (summary.exit_code, summary.ran, summary.done) == (0, 0, 12)
@@ -153,7 +155,7 @@ def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> No
     ],
 )
 def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str) -> None:
-    """A shard that is missing or given twice, and a whole run, are refused, and nothing is made."""
+    """A missing shard, a duplicate one, or a whole run is refused, and nothing is written."""
     with pytest.raises(MutatorError, match=told):
         merge([runs[name] for name in given], tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -162,7 +164,7 @@ def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...
 def test_shards_of_something_else_are_told(
     copies: Runs, toy: Workspace, tmp_path: Path, reseal: Reseal
 ) -> None:
-    """Another plan, other sources or another number of shards is refused, with the folder's name."""
+    """Another plan, other sources or another number of shards is refused with the folder's name."""
     two = copies["2/2"]
     head = json.loads((two / "run.json").read_text())
     for change, told in (
@@ -180,7 +182,7 @@ def test_shards_of_something_else_are_told(
 
 
 def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
-    """A shard that lacks a record, or holds one of another shard, is refused with what is wrong."""
+    """A shard that lacks a record, or holds one of another shard, is refused with the reason."""
     one, two = copies["1/2"], copies["2/2"]
     path = next((one / "records").iterdir())
     lines = path.read_bytes().splitlines(keepends=True)
@@ -197,7 +199,7 @@ def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, re
 
 
 def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
-    """Shards whose fault-free runs differ are not put together."""
+    """Shards with different fault-free runs are not merged."""
     path = copies["2/2"] / "checks.json"
     checks = json.loads(path.read_text())
     path.write_text(json.dumps(checks | {"goldens": {"A": "0" * 64}}))
@@ -210,8 +212,9 @@ def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, re
 def test_a_shard_whose_proof_failed_is_told(
     copies: Runs, tmp_path: Path, broken: str, reseal: Reseal
 ) -> None:
-    """One experiment that is another one on the reference engine, in whichever shard, and nothing is merged;
-    it is named, with the folder."""
+    """If the reference engine contradicts one experiment of any shard, nothing is merged; the error names
+    experiment and folder.
+    """
     for path in (copies["1/2"], copies["2/2"]):
         shutil.copytree(path / "records", path / "proof")
         reseal(path)
@@ -230,7 +233,7 @@ def test_a_shard_whose_proof_failed_is_told(
 
 
 def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> None:
-    """The folder of another run is left as it is."""
+    """The folder of another run stays unchanged."""
     before = (runs["whole"] / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match="holds a run"):
         merge([runs["1/2"], runs["2/2"]], runs["whole"])
@@ -238,8 +241,7 @@ def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> N
 
 
 def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
-    """The same command makes the merged run, whatever was written before the kill; what others put there is
-    not deleted."""
+    """The same command completes a killed merge at any stage, and does not delete other people's files."""
     out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
     for name in (".run.json.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
@@ -257,7 +259,7 @@ def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
 def test_a_merge_that_fails_leaves_nothing(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """When results cannot be built nothing is left, and the same command can be given again."""
+    """If results cannot be built, no files are left, and the command can be repeated."""
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr("mutator.outcomes.results.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
@@ -271,14 +273,14 @@ def fail(run: Path) -> Path:
 
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
 def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
-    """A share that is none, or more shares than chunks, is refused before anything runs."""
+    """An invalid shard, or more shards than chunks, is refused before anything runs."""
     with pytest.raises(MutatorError, match=f"shard:? '?{shard}"):
         make_plan(toy, "small", Choices(shard=shard))
 
 
 @pytest.mark.slow
 def test_shards_of_the_controller_that_ships(tmp_path: Path) -> None:
-    """On the real target too: one worker, two, and three shards merged come to the same bytes."""
+    """On the shipped controller, one worker, two workers, and three merged shards give the same bytes."""
     clone = Workspace.find(root=Path(__file__).parents[2])
 
     def ran(name: str, workers: int, shard: str | None = None) -> Path:

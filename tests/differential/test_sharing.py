@@ -1,4 +1,4 @@
-"""What several scenarios have in common is run once, counted in each, and proved before."""
+"""Runs common to several scenarios are run once, counted in each, and proved equal first."""
 
 import csv
 import json
@@ -38,7 +38,9 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def two_scenarios(toy: Workspace, changes: str) -> Workspace:
-    """The faults of the small campaign that need the other car gone, on A and C, which differ in it alone."""
+    """The faults of the small campaign that need the other car gone, on A and C, which differ only in that
+    car.
+    """
     scenarios = toy.library / "scenarios"
     (scenarios / "C.yaml").write_text((scenarios / "A.yaml").read_text().replace("0.8", "0.1"))
     edit(toy.library / "targets" / "toycar.yaml", ALONE, changes)
@@ -50,7 +52,7 @@ def two_scenarios(toy: Workspace, changes: str) -> Workspace:
 
 @pytest.fixture(scope="module")
 def driven() -> dict[str, list[str]]:
-    """Names of the runs that were driven for each of `runs`, those of the checks among them."""
+    """Names of the runs that were run for each of `runs`, including the checks' runs."""
     return {"shared": [], "apart": []}
 
 
@@ -58,7 +60,7 @@ def driven() -> dict[str, list[str]]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar, driven: dict[str, list[str]]
 ) -> tuple[Path, Path]:
-    """The campaign run with shared runs, and with every experiment run by itself."""
+    """The campaign with shared runs, and with every experiment run separately."""
     execute = ReferenceEngine.execute
 
     def counted(self: ReferenceEngine, job, scratch):  # type: ignore[no-untyped-def]
@@ -78,7 +80,9 @@ def runs(
 
 
 def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
-    """Results with shared runs are those of running everything, byte for byte; each scenario has its row."""
+    """Results with shared runs equal those of running everything, byte for byte; each scenario has
+    its row.
+    """
     shared, apart = runs
     for name in ("results.csv", "results.parquet"):
         assert (shared / name).read_bytes() == (apart / name).read_bytes()
@@ -89,7 +93,7 @@ def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
 
 
 def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
-    """Two guided runs are shared by two scenarios each; random ones have times of their own."""
+    """Two guided runs are shared by two scenarios each; random runs have separate times."""
     shared, apart = (load_plan(RunFolder.open(run)) for run in runs)
     assert (len(shared.experiments), shared.runs) == (8, 6)
     assert (len(apart.experiments), apart.runs) == (8, 8)
@@ -99,21 +103,22 @@ def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
 
 
 def test_they_are_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]) -> None:
-    """No more runs are driven than the plan says, the checks' apart."""
+    """Apart from the checks, only as many runs are run as the plan says."""
     ids = {e.id for e in load_plan(RunFolder.open(runs[0])).experiments}
     counts = {which: sum(name in ids for name in names) for which, names in driven.items()}
     assert counts == {"shared": 6, "apart": 8}
 
 
 def test_the_checks_prove_it(runs: tuple[Path, Path]) -> None:
-    """The fault-free runs of scenarios that are said to be one are compared, and the check is kept."""
+    """The fault-free runs of scenarios declared equal are compared, and the check is kept."""
     checks = json.loads((runs[0] / "checks.json").read_text())["results"]
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
 
 
 def test_part_of_a_shared_run_is_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """Where a kill or a split left one experiment of a shared run, a worker drives that one's own golden run,
-    and has its record."""
+    """If a kill or a split leaves one experiment of a shared run, a worker runs its own golden run and keeps
+    its record.
+    """
     folder = RunFolder.open(runs[0])
     toy = Workspace(
         library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"
@@ -134,7 +139,7 @@ def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
 
 
 def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> None:
-    """A manifest that says so of scenarios that differ is refused before anything is run, by their names."""
+    """A manifest that declares different scenarios equal is refused before any run, with their names."""
     two_scenarios(toy, SHARED)
     edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)

@@ -1,4 +1,4 @@
-"""Every anchor of a source that the documentation promises, found by `ast` alone."""
+"""Every anchor that the documentation promises for a source, found by `ast` alone."""
 
 import ast
 from collections import Counter
@@ -14,7 +14,7 @@ _Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 @dataclass(frozen=True, slots=True)
 class Spot:
-    """A location, the statement that it names (or the function to be entered), and the function around it."""
+    """A location, the statement (or the function entry) that it names, and the function around it."""
 
     location: FaultLocation
     node: ast.stmt
@@ -26,7 +26,7 @@ class Spot:
 
 
 def spots(tree: ast.Module) -> Iterator[Spot]:
-    """Every anchor; statements of one kind and name are counted as `nth` counts them."""
+    """Every anchor; statements of one kind and name are numbered as `nth` numbers them."""
     functions: dict[str, list[_Function]] = {}
     for name, function in _functions(tree, ""):
         functions.setdefault(name, []).append(function)
@@ -58,7 +58,7 @@ def _functions(node: ast.AST, scope: str) -> Iterator[tuple[str, _Function]]:
 
 
 def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
-    """Statements in the order of the source, without those of inner functions and classes."""
+    """Statements in source order, without those of inner functions and classes."""
     for statement in body:
         yield statement
         if isinstance(statement, _Function | ast.ClassDef):
@@ -72,7 +72,7 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _effects(statement: ast.stmt) -> Iterator[tuple[str, str]]:
-    """(verb, name) of what a statement assigns, calls and returns."""
+    """(verb, name) of everything that a statement assigns, calls and returns."""
     called = None
     if isinstance(statement, ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return):
         value = statement.value

@@ -1,4 +1,4 @@
-"""What a generated module does, told so that two runs can be compared."""
+"""Record what a generated module does, so that two runs can be compared."""
 
 import contextlib
 import io
@@ -12,7 +12,7 @@ MOST_STEPS = 1000
 
 
 def behaviour(data: bytes) -> object:
-    """What a module does with a probe that is never active: its trace, its output, its end, its variables."""
+    """What a module does with a probe that is never active: its trace, output, ending and variables."""
     run = _Run()
     names: dict[str, Any] = {
         "T": run.trace,
@@ -39,7 +39,7 @@ def behaviour(data: bytes) -> object:
 
 @dataclass(slots=True)
 class _Run:
-    """The trace of a run, and its length so far: no run goes on for ever."""
+    """The trace of a run and its length so far, which bounds every run."""
 
     seen: list[Any] = field(default_factory=list)
     steps: int = 0
@@ -50,7 +50,7 @@ class _Run:
         return value
 
     def call(self, made: Any, *args: Any) -> int:
-        """Call a function, or every method of a class, and keep how it ended."""
+        """Call a function, or every method of a class, and record how it ended."""
         self._count(10)
         try:
             if isinstance(made, type):
@@ -70,7 +70,7 @@ class _Run:
 
 
 class Box:
-    """An object that takes every attribute, item and call."""
+    """An object that accepts every attribute, item and call."""
 
     __match_args__ = ("n",)
 
@@ -96,7 +96,7 @@ class Box:
 
 @dataclass(frozen=True, slots=True)
 class _Decorator:
-    """A decorator, plain or with arguments, that keeps what is decorated."""
+    """A decorator, plain or with arguments, that returns the decorated object."""
 
     seen: list[Any]
 
@@ -143,7 +143,7 @@ class _Later:
 
 
 def _ended(result: Any) -> Any:
-    """What comes of a call: of a coroutine its result, of a generator its first values."""
+    """The outcome of a call: a coroutine's result, a generator's first values."""
     if isinstance(result, types.CoroutineType):
         try:
             result.send(None)

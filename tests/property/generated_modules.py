@@ -1,6 +1,6 @@
-"""Modules of every shape that Python allows, made from a seed; they run, end, and tell what they did.
+"""Modules of every shape that Python allows, made from a seed; they run, terminate, and trace what they did.
 
-They need the names that `behaviour` gives them, such as `T`, which keeps and returns a value, and `call`.
+They need the names that `behaviour` provides, such as `T`, which records and returns a value, and `call`.
 """
 
 import sys
@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from .generated_statements import COMMENTS, GLOBALS, Scope, StatementWriter
 
-MOST_STATEMENTS = 30  # after which only simple ones are made
+MOST_STATEMENTS = 30  # beyond this, only simple ones are made
 _UNITS = ("    ", "    ", "    ", "  ", " ", "\t", "  \t", "        ")
 _VARIABLES = ("a", "b", "total", "größe", "µ", "ﬁx", "match", "case", "type", "_", "__own", "max")
 _PLAIN = ('"""Doc."""', "'''Two\n    lines.\n'''", '"a" "b"', r'r"""Raw \."""')
@@ -40,10 +40,10 @@ _Maker = Callable[[Scope, str], list[str]]
 
 
 class ModuleWriter(StatementWriter):
-    """Writes one module: the same bytes for the same seed, on one version of Python."""
+    """Writes one module: the same bytes for the same seed on one version of Python."""
 
     def module(self) -> bytes:
-        """The module, in any encoding and with any line ends."""
+        """The module, in any encoding and with any line endings."""
         encoding = self._drawn(_ENCODINGS)
         lines = self._head(encoding)
         scope = Scope(level=0, kind="module", known=[*GLOBALS], pool=("m0", "m1"))
@@ -62,7 +62,7 @@ class ModuleWriter(StatementWriter):
         return self.rng.choices(list(ways), list(ways.values()))[0]
 
     def _head(self, encoding: str) -> list[str]:
-        """What comes before the first statement, and imports from `__future__`."""
+        """The lines before the first statement, and imports from `__future__`."""
         lines = self.rng.choice([[], [], ["#!/usr/bin/env python"], ["# head", ""], ["", ""]])
         if encoding not in ("utf-8", "bom"):
             cookie = self.rng.choice(["# -*- coding: {} -*-", "# vim: set fileencoding={} :"])
@@ -268,7 +268,7 @@ class ModuleWriter(StatementWriter):
         return lines
 
     def _variables(self, level: int) -> list[str]:
-        """Names of variables; those of inner functions are others, but for private ones."""
+        """Variable names; inner functions use different ones, except for private names."""
         names = self.rng.sample(_VARIABLES, 4)
         return [name if level == 1 or name[0] == "_" else f"{name}{level}" for name in names]
 

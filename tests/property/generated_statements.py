@@ -1,4 +1,4 @@
-"""Simple statements of every shape, made by chance: what generated modules consist of."""
+"""Random simple statements of every shape, the content of generated modules."""
 
 import random
 import sys
@@ -41,12 +41,12 @@ class Scope:
     made: list[int] = field(default_factory=lambda: [0])  # statements so far
 
     def inside(self, **changes: Any) -> "Scope":
-        """The scope of a block that may be skipped: what is set there is not known afterwards."""
+        """The scope of a block that may be skipped: variables set there are not known afterwards."""
         return replace(self, known=[*self.known], **changes)
 
 
 class StatementWriter:
-    """Writes expressions and simple statements; what it draws follows from the seed."""
+    """Writes expressions and simple statements; the seed determines what it draws."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed)
@@ -59,12 +59,12 @@ class StatementWriter:
         return self.rng.choice(["0", "1", "2", "3", "0x10", "1_0", "-1"])
 
     def fresh(self, prefix: str) -> str:
-        """A name that is nowhere else."""
+        """A name that occurs nowhere else."""
         self.count += 1
         return f"{prefix}{self.count}"
 
     def gap(self, indent: str) -> list[str]:
-        """The lines that may stand between two statements."""
+        """Lines that may stand between two statements."""
         ways: list[tuple[list[str], float]] = [
             ([], 60),
             ([""], 12),
@@ -78,14 +78,14 @@ class StatementWriter:
         return self.rng.choices([way for way, _ in ways], [weight for _, weight in ways])[0]
 
     def tail(self) -> str:
-        """What may follow a simple statement on its line."""
+        """Text that may follow a simple statement on its line."""
         ways = ["", "  # why", ";", " ; # why", "  ", "\t", " \\\n", "; \\\n"]
         return self.rng.choices(ways, [70, 9, 5, 3, 5, 2, 2, 1])[0]
 
     # Expressions; the value is a number
 
     def expression(self, scope: Scope, depth: int = 2) -> str:
-        """It may span lines, in brackets, strings or after a backslash."""
+        """An expression, which may span lines, in brackets, strings or after a backslash."""
         if depth <= 0 or self.chance(0.3):
             return self.rng.choice([self.number(), self.number(), *self.rng.choices(scope.known, k=3)])
         e, f = (self.expression(scope, depth - 1) for _ in "ef")
@@ -126,7 +126,7 @@ class StatementWriter:
     # Simple statements: lines at a depth
 
     def target(self, scope: Scope) -> str:
-        """A variable to be set, which is known from then on."""
+        """A variable to set, which is known from then on."""
         name = self.rng.choice([*scope.pool, *scope.writable])
         if name not in scope.known:
             scope.known.append(name)

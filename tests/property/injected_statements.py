@@ -1,4 +1,4 @@
-"""The injected lines and statements of a mutant, told by their tags."""
+"""The injected lines and statements of a mutant, identified by their tags."""
 
 import ast
 from collections.abc import Container
@@ -10,7 +10,7 @@ from mutator.mutants.injected_lines import tag_of
 
 @dataclass(frozen=True, slots=True)
 class Lines:
-    """Which lines of a mutant are injected (from 1), and the number that each one has in the original."""
+    """Which lines of a mutant are injected (from 1), and the original number of each other line."""
 
     injected: frozenset[int]
     original: tuple[int, ...]
@@ -27,7 +27,9 @@ class Lines:
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What is beside an injected statement: the ones above and below, the node around, its place there."""
+    """The neighbours of an injected statement: those above and below, the enclosing node, and its position
+    there.
+    """
 
     above: Any
     below: Any
@@ -36,7 +38,9 @@ class Beside:
 
 
 def take_out(node: ast.AST, injected: Container[int], found: dict[str, Beside]) -> None:
-    """Take injected statements out of a tree, and keep what each was beside; a guard leaves its statement."""
+    """Remove injected statements from a tree and record each one's neighbours; a guard leaves its
+    statement.
+    """
     for _, body in ast.iter_fields(node):
         if not isinstance(body, list) or not body or not isinstance(body[0], ast.AST):
             continue

@@ -1,4 +1,4 @@
-"""What names mean in the bytecode of each function of a source."""
+"""The scope of each name in the bytecode of each function of a source."""
 
 import dis
 import types
@@ -9,7 +9,7 @@ from .injected_statements import Lines
 
 
 def keeps_names(source: bytes, mutant: bytes) -> bool:
-    """Whether in the bytecode of each function every name is as local, free or global as it was."""
+    """Whether every name in the bytecode of each function is as local, free or global as before."""
     lines = Lines.of(mutant)
     try:
         after = dict(_homes(compile(mutant, "m.py", "exec", dont_inherit=True), lines))
@@ -20,18 +20,18 @@ def keeps_names(source: bytes, mutant: bytes) -> bool:
 
 
 def is_carried_out(source: bytes, function: str, name: str) -> bool:
-    """Whether the bytecode of a function so called has a name: what is never reached has no bytecode."""
+    """Whether bytecode contains a name for a function with this name: unreachable code has no bytecode."""
     code = compile(source, "m.py", "exec", dont_inherit=True)
     found = _homes(code, Lines.of(source))
     return any(key[0].rpartition(".")[2] == function and name in homes for key, homes in found)
 
 
 def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int, int], dict[str, str]]]:
-    """The names of each function that is not injected; functions are told apart by name, line and number."""
+    """The names of each function that is not injected; functions are identified by name, line and number."""
     stack, counts = [code], Counter[tuple[str, int]]()
     while stack:
         one = stack.pop()
-        # not those of `co_consts`: what is never reached may be left there, or not
+        # not those of `co_consts`: unreachable ones may or may not be left there
         steps = dis.get_instructions(one)
         stack += [step.argval for step in steps if isinstance(step.argval, types.CodeType)]
         if one is not code and one.co_firstlineno in lines.injected:

@@ -1,7 +1,7 @@
-"""What must hold of mutants of any source, proved by `ast`, by bytecode and by execution; LibCST has no say.
+"""What must hold for mutants of any source, proved by `ast`, bytecode and execution, without LibCST.
 
-`prove` splices at every anchor of a source, and counts what it tried, and what was refused and why. Wrong is
-raised for what does not hold, and for what is refused without need.
+`prove` splices at every anchor of a source, and counts the tries and the refusals by reason. It raises Wrong
+if a property fails or a refusal is unnecessary.
 """
 
 import ast
@@ -44,12 +44,12 @@ _INJECTIONS: tuple[tuple[str, dict[str, Any]], ...] = (
 
 
 class Wrong(AssertionError):
-    """A mutant is not what it must be."""
+    """A mutant violates a property."""
 
 
 @dataclass(slots=True)
 class Figures:
-    """How many modules, anchors, and injections that set a variable were tried, and what became of them."""
+    """How many modules, anchors and variable-setting injections were tried, with their outcomes."""
 
     modules: Counter[str] = field(default_factory=Counter)
     anchors: Counter[str] = field(default_factory=Counter)
@@ -67,7 +67,7 @@ class Figures:
 
 @dataclass(frozen=True, slots=True)
 class _Placed:
-    """An edit and the spot that it is meant for."""
+    """An edit and its intended spot."""
 
     spot: Spot
     edit: splicing.Edit
@@ -80,7 +80,7 @@ class _Placed:
 
 
 def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int = 3) -> None:
-    """Splice at every anchor of a source; Wrong unless every mutant is what it must be.
+    """Splice at every anchor of a source; raise Wrong if a mutant violates a property.
 
     At `variables` of the anchors, drawn from the source itself, variables are set, too.
     """
@@ -120,7 +120,7 @@ def _expect(holds: bool, what: str, mutant: bytes = b"") -> None:
 
 
 def _reason(error: MutatorError) -> str:
-    """Why something is refused, without what differs from case to case; it must name the file."""
+    """The reason of a refusal, without what differs between cases; it must name the file."""
     _expect(error.where is not None, f"no file: {error}")
     text = re.sub(
         r"'[^']*'|`[^`]*`|\d+", "_", re.sub(r"(error: [a-z ]+).*", r"\1", error.got, flags=re.DOTALL)
@@ -132,7 +132,7 @@ def _reason(error: MutatorError) -> str:
 
 
 def _groups(file: ParsedFile, tree: ast.Module, figures: Figures) -> dict[str, list[_Placed]]:
-    """Edits at all anchors, in groups of which each makes one mutant."""
+    """Edits at all anchors, in groups that each make one mutant."""
     groups: dict[str, list[_Placed]] = {}
     for i, spot in enumerate(spots(tree)):
         name = f"{i:08x}"
@@ -168,7 +168,7 @@ def _add_guard(
 
 
 def _crowded(file: ParsedFile, spot: Spot) -> bool:
-    """Whether there is a reason to refuse an anchor: its statement returns, or shares its lines."""
+    """Whether an anchor must be refused: its statement returns, or shares its lines."""
     node, kind = spot.node, spot.kind
     if kind is AnchorKind.ENTRY:
         node = spot.within.body[0]
@@ -182,12 +182,12 @@ def _crowded(file: ParsedFile, spot: Spot) -> bool:
 
 
 def _line(file: ParsedFile, number: int) -> bytes:
-    """A line as `ast` counts its columns."""
+    """A line with `ast`'s count of columns."""
     return file.lines[number - 1].decode(file.encoding).removeprefix("\ufeff").encode()
 
 
 def _check_site(file: ParsedFile, site: Site, spot: Spot) -> None:
-    """The lines of the site are those on which `ast` sees the statement."""
+    """The lines of the site are those where `ast` sees the statement."""
     end = spot.node.end_lineno or 0
     if spot.kind in AFTER:
         between = b"".join(file.lines[end : site.last]).strip(b" \t\f\r\n\\;")
@@ -210,7 +210,9 @@ def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
 
 
 def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
-    """Each injected statement is beside its anchored one; without them the dumped tree is the original's."""
+    """Each injected statement is next to its anchored one; without them the tree's dump equals the
+    original's.
+    """
     lines, changed = Lines.of(mutant), ast.parse(mutant)
     found: dict[str, Beside] = {}
     take_out(changed, lines.injected, found)
@@ -237,7 +239,9 @@ def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
 
 
 def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
-    """The mutant in which a variable is set at an anchor, its names being as they were; empty if refused."""
+    """The mutant in which a variable is set at an anchor, with unchanged scopes of its names; empty if
+    refused.
+    """
     chosen = random.Random(f"{spot.location}")
     known = sorted(
         {n.id for n in ast.walk(spot.within) if isinstance(n, ast.Name)} - {"int"} | {"max", "new"}

@@ -37,7 +37,7 @@ OBSERVED = st.fixed_dictionaries({name: st.floats(allow_nan=True, allow_infinity
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, OBSERVED)
 def test_canonical_text_means_the_same(text: str, values: dict[str, float]) -> None:
-    """The canonical text is stable and decides exactly as the text it comes from."""
+    """The canonical text is stable and decides exactly like the original text."""
     try:
         canonical = check_condition(text)
     except MutatorError as error:
@@ -63,7 +63,7 @@ def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, floa
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
 def test_any_text_is_answered(text: str) -> None:
-    """Whatever is typed is a condition of the few allowed kinds, or a MutatorError."""
+    """Any text is an allowed condition or a MutatorError."""
     try:
         code = to_code(check_condition(text, variables=VARIABLES))
     except MutatorError:
@@ -76,19 +76,19 @@ def test_any_text_is_answered(text: str) -> None:
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
 def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, float]]) -> None:
-    """Over a whole trace a condition holds in those steps in which it holds alone."""
+    """Over a whole trace a condition holds in exactly the steps in which it holds alone."""
     try:
         canonical = check_condition(text, variables=VARIABLES)
     except MutatorError as error:
         assert "characters" in str(error)
         return
     columns = {name: np.array([step[name] for step in steps]) for name in VARIABLES}
-    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # these two answer NaN by their order
+    if not {"min", "max"} & set(re.findall(r"\w+", text)):  # these two return NaN depending on order
         assert holds(canonical, columns).tolist() == [evaluate(canonical, step) for step in steps]
 
 
 def test_formulas_over_a_trace() -> None:
-    """A number for each step, worked out by hand: a choice, division by 0, the rate of change."""
+    """Formulas over a trace equal hand-computed numbers: a choice, division by 0, the rate of change."""
     trace = {
         "t": np.array([0.0, 0.5, 1.5]),
         "gap": np.array([3.0, 2.0, -1.0]),

@@ -1,4 +1,4 @@
-"""Proofs about context tables against what single observations say."""
+"""Proofs about context tables agree with single observations."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -34,7 +34,7 @@ def contexts_at(conditions: dict[str, str], hwt: float, rs: float, v_ego: float)
 def test_what_is_proved_holds_everywhere(
     first: str, second: str, hwt: float, rs: float, v_ego: float
 ) -> None:
-    """Where a table is proved no observation, infinite ones included, is in no context or in two."""
+    """In a proved table every observation, including infinite ones, is in exactly one context."""
     texts = {"A": first, "B": f"not ({first}) and ({second})", "C": f"not ({first}) and not ({second})"}
     right = {row: check_condition(text) for row, text in texts.items()}
     assert measure_coverage(right).place is None

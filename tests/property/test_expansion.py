@@ -1,4 +1,4 @@
-"""Expansion: values depend on seed, key and range, and on nothing else."""
+"""Expansion: values depend only on seed, key and range."""
 
 from pathlib import Path
 
@@ -35,7 +35,7 @@ def library(seed: int, reading: str) -> list[Fault]:
 def test_draws_lie_in_their_ranges(
     seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
 ) -> None:
-    """One value from each range, whole where the ranges are, at most the cap, the same when asked again."""
+    """There is one value from each range, integer if the range is, up to the cap, and the same every time."""
     draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
     values = draw_values(draw, seed)
     assert len(values) == len(ranges)
@@ -49,7 +49,7 @@ def test_draws_lie_in_their_ranges(
 @settings(max_examples=100, deadline=None)
 @given(SEEDS, st.integers(1, 4))
 def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
-    """From overlapping ranges that hold enough values every value is another, and none is 0."""
+    """If overlapping ranges hold enough values, the values are distinct and none is 0."""
     ranges = tuple((-2.5 + 0.5 * i, -1.5 + 0.5 * i) for i in range(10))
     draw = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges, decimals=decimals)
     values = draw_values(draw, seed)
@@ -61,7 +61,7 @@ def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
 def test_more_ranges_leave_earlier_values_alone(
     seed: int, ranges: tuple[tuple[float, float], ...], count: int
 ) -> None:
-    """A spec that grows at its end keeps the values it had."""
+    """A spec extended at its end keeps its earlier values."""
     whole = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges)
     part = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges[:count])
     assert draw_values(part, seed) == draw_values(whole, seed)[:count]
@@ -70,7 +70,7 @@ def test_more_ranges_leave_earlier_values_alone(
 @settings(max_examples=20, deadline=None)
 @given(SEEDS)
 def test_readings_are_matched(seed: int) -> None:
-    """Whatever the seed, both readings have the same specs and values in the same order, and unique ids."""
+    """For any seed, both readings have the same specs and values in the same order, and unique ids."""
     described, coded = library(seed, "as_described"), library(seed, "as_coded")
     assert [(f.spec, f.value, f.unit) for f in described] == [(f.spec, f.value, f.unit) for f in coded]
     assert len({f.id for f in (*described, *coded)}) == 2 * sum(spec.count for spec in SPECS)
@@ -79,6 +79,6 @@ def test_readings_are_matched(seed: int) -> None:
 @settings(max_examples=10, deadline=None)
 @given(SEEDS, st.permutations(SPECS), st.sampled_from(CLONE.readings().names))
 def test_order_does_not_matter(seed: int, specs: list, reading: str) -> None:
-    """A fault is the same in whatever order, and in whatever company, its spec is expanded."""
+    """A fault does not depend on the order of expansion or on the other specs."""
     found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}
     assert found == {f.id for f in library(seed, reading)}

@@ -1,4 +1,4 @@
-"""Constants and defaults that the probe sets, in modules of Python's own library: each is a case."""
+"""Constants and defaults that the probe sets, in modules of Python's standard library."""
 
 import ast
 import inspect
@@ -28,7 +28,7 @@ MORE += ("tkinter.constants", "token", "xmlrpc.client")
 
 
 def locations(file: ParsedFile) -> list[tuple[FixedValue, FaultLocation]]:
-    """Every value of a file that can be set, and the anchor that leads to it."""
+    """Every settable value of a file, and the anchor that leads to it."""
     found = []
     for one in file.fixed:
         if one.reason is None:
@@ -49,7 +49,7 @@ def mutant(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]]) 
 
 
 class WithoutProbe(ast.NodeTransformer):
-    """A module without the lines that import the probe and tell it what to set."""
+    """Removes the lines that import the probe and set values through it."""
 
     def visit_Import(self, node: ast.Import) -> ast.AST | None:
         return None if node.names[0].name == "_fi" else node
@@ -59,7 +59,7 @@ class WithoutProbe(ast.NodeTransformer):
 
 
 def probe(ids: Sequence[str]) -> Any:
-    """A probe that is active from time 1 on, until 2."""
+    """A probe that is active from time 1 until 2."""
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 2")
@@ -70,7 +70,7 @@ def probe(ids: Sequence[str]) -> Any:
 
 
 def read(names: types.ModuleType, one: FixedValue) -> Any:
-    """The value as the program has it: what lies under the name, or what Python says of the signature."""
+    """The value that the program has: under its name, or in the signature as Python reports it."""
     *path, last = one.path.split(".")
     found: Any = names
     for name in path:
@@ -84,7 +84,7 @@ def read(names: types.ModuleType, one: FixedValue) -> Any:
 def readable(
     names: types.ModuleType, cases: Sequence[tuple[FixedValue, FaultLocation]]
 ) -> Iterator[FixedValue]:
-    """Those that the program made: some are made on other systems alone."""
+    """The values that exist on this system: some are defined only on others."""
     for one, _ in cases:
         try:
             read(names, one)
@@ -94,8 +94,10 @@ def readable(
 
 
 def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *, run: bool) -> None:
-    """A mutant compiles, un-splices, and is the module but for the lines that tell the probe what to set; if
-    it is `run`, each value is another in an active step alone, and afterwards what it was."""
+    """Check that a mutant compiles, un-splices, and equals the module except for the lines that set values.
+
+    If it is `run`, each value differs only in an active step and is restored afterwards.
+    """
     data = mutant(file, cases)
     tree = ast.parse(data)
     compile(tree, "<mutant>", "exec", dont_inherit=True)
@@ -124,7 +126,7 @@ def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *
 
 
 def checked(names: Sequence[str], count: int, *, run: bool) -> int:
-    """Check so many cases drawn from the modules of these names; how many they were."""
+    """Check that many cases drawn from the modules with these names; return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in locations(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))
@@ -136,13 +138,14 @@ def checked(names: Sequence[str], count: int, *, run: bool) -> int:
 
 
 def test_what_the_probe_sets_is_put_back() -> None:
-    """A mutant compiles, un-splices to every byte, and differs by lines that tell the probe what to set; each
-    value is another while the fault is active, and the same object again afterwards."""
+    """A mutant compiles, un-splices to every byte, and differs only by lines that set values through the
+    probe; each value differs while the fault is active, and is the same object again afterwards.
+    """
     assert checked(FEW, 200, run=True) == 200
 
 
 @pytest.mark.slow
 def test_what_the_probe_sets_is_put_back_at_large() -> None:
-    """The same of thousands of values; those of modules that do things when they are loaded are not run."""
+    """The same holds for thousands of values; modules with side effects at import are not run."""
     assert checked(FEW, 2000, run=True) > 250
     assert checked((*MANY, *MORE), 3000, run=False) == 3000

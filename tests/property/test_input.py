@@ -1,4 +1,4 @@
-"""Whatever stands in a file, it is read or refused; nothing else happens."""
+"""Any file content is read or refused, without side effects."""
 
 import math
 import time
@@ -37,7 +37,7 @@ PLAIN = st.recursive(
     | st.text("a: -[]{}#&*!|>'\"\n\t%@", max_size=60).map(str.encode)
 )
 def test_any_bytes(tmp_path: Path, data: bytes) -> None:
-    """Arbitrary bytes are YAML of the strict kind, or a MutatorError that names the file."""
+    """Arbitrary bytes are strict YAML, or a MutatorError that names the file."""
     path = tmp_path / "x.yaml"
     path.write_bytes(data)
     try:
@@ -49,7 +49,7 @@ def test_any_bytes(tmp_path: Path, data: bytes) -> None:
 @settings(max_examples=100, deadline=None, suppress_health_check=QUIET)
 @given(PLAIN)
 def test_plain_data_survives(tmp_path: Path, value: object) -> None:
-    """What a YAML writer made of plain data is read back as it was, each part with a line."""
+    """Plain data written by a YAML writer is read back unchanged, with a line for each part."""
     path = tmp_path / "x.yaml"
     path.write_text(yaml.safe_dump(value, allow_unicode=True, default_style='"'), encoding="utf-8")
     text = path.read_text(encoding="utf-8")
@@ -63,7 +63,7 @@ def test_plain_data_survives(tmp_path: Path, value: object) -> None:
 @settings(max_examples=150, deadline=None, suppress_health_check=QUIET)
 @given(st.data())
 def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
-    """A spec with a line dropped, doubled or garbled is read or refused with a MutatorError."""
+    """A spec with a dropped, doubled or garbled line is read, or refused with a MutatorError."""
     lines = SPEC.read_text().splitlines()
     i = data.draw(st.integers(0, len(lines) - 1))
     how = data.draw(st.sampled_from(["drop", "double", "garble", "indent"]))
@@ -90,7 +90,7 @@ def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
 @example(b"#\x80")  # LibCST has no line for it
 def test_any_source(data: bytes) -> None:
-    """Arbitrary bytes are Python that can be spliced into, or a MutatorError."""
+    """Arbitrary bytes are Python that can be spliced, or a MutatorError."""
     try:
         file = parse_file("x.py", data, Path("root"))
     except MutatorError as error:
@@ -101,7 +101,7 @@ def test_any_source(data: bytes) -> None:
 
 @given(st.floats() | st.integers(-(10**30), 10**30))
 def test_numbers_survive_rendering(value: float) -> None:
-    """A rendered number is the number, to the last bit, also as a signed term."""
+    """A rendered number is exact to the last bit, also as a signed term."""
     assert repr(eval(literal(value))) == repr(value)
     if value == value:
         assert eval(f"0 {signed(value)}") == value
@@ -109,8 +109,7 @@ def test_numbers_survive_rendering(value: float) -> None:
 
 @given(st.floats(), st.floats(allow_nan=False), st.sampled_from(["float", "np.float64", "np.float32"]))
 def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kind: str) -> None:
-    """To a float, of numpy or not, it makes no difference, to the last bit, that a whole number is written as
-    an integer."""
+    """Adding a whole number written as an integer to a float, of numpy or not, gives the same bits."""
     sign = "-" if math.copysign(1.0, value) < 0 else "+"
     with np.errstate(all="ignore"):
         texts = (f"{kind}(x) {signed(value)}", f"{kind}(x) {sign} {literal(abs(value))}")
@@ -120,7 +119,7 @@ def test_a_term_without_a_point_adds_the_same(variable: float, value: float, kin
 
 @pytest.mark.parametrize("value", [[1], {"a": 1}, object()])
 def test_only_numbers_and_names_are_rendered(value: object) -> None:
-    """Anything else in a template is an error."""
+    """Anything other than a number or a name in a template is an error."""
     with pytest.raises(MutatorError):
         literal(value)
 
@@ -145,8 +144,9 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
-    """A file of a shape that would take long to read, or end the interpreter, is refused at once, with its
-    line."""
+    """A file with a shape that would take long to read, or end the interpreter, is refused at once with its
+    line.
+    """
     path = tmp_path / "x.yaml"
     path.write_text(SHAPES[shape], encoding="utf-8")
     began = time.process_time()
@@ -163,7 +163,7 @@ def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
     st.data(),
 )
 def test_any_shape(tmp_path: Path, words: list[str], data: st.DataObject) -> None:
-    """Brackets, dashes and line ends in any order, some of them very often, are read or refused, and soon."""
+    """Brackets, dashes and line endings in any order and number are soon read or refused."""
     text = "".join(word * data.draw(st.sampled_from([1, 1, 1, 1000, 50_000])) for word in words)
     path = tmp_path / "x.yaml"
     path.write_text(text, encoding="utf-8")
@@ -188,8 +188,9 @@ NESTED = {
 
 @pytest.mark.parametrize("nested", NESTED)
 def test_nested_expressions(nested: str) -> None:
-    """Conditions and filters of any depth and length are read or refused, and soon; what is read can be
-    evaluated."""
+    """Conditions and filters of any depth and length are soon read or refused; those read can be
+    evaluated.
+    """
     began = time.process_time()
     with suppress(MutatorError):
         evaluate(check_condition(NESTED[nested]), {"t": 1.0})
@@ -199,7 +200,7 @@ def test_nested_expressions(nested: str) -> None:
 
 
 def test_deep_json(tmp_path: Path) -> None:
-    """A JSON file that is nested too deeply is a damaged one."""
+    """A JSON file with too deep nesting is reported as damaged."""
     (tmp_path / "x.json").write_text("[" * 100_000)
     with pytest.raises(MutatorError, match=r"x\.json: not JSON"):
         read_json(tmp_path / "x.json", "x/1")

@@ -1,4 +1,4 @@
-"""Injections into one instance or some executions, in modules of Python's own library: each is a case."""
+"""Injections into one instance or some executions, in modules of Python's standard library."""
 
 import ast
 import random
@@ -67,7 +67,7 @@ class Inactive(ast.NodeTransformer):
 
 
 def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -> Injection:
-    """An injection at the place, for an instance among names that the function knows, or some executions."""
+    """An injection at the place, limited to an instance among the function's names, or to some executions."""
     value = location.anchor.kind is not AnchorKind.BEFORE_ASSIGN
     made = Injection(
         location=location,
@@ -83,7 +83,9 @@ def limited(random_: random.Random, file: ParsedFile, location: FaultLocation) -
 
 
 def check(file: ParsedFile, injection: Injection) -> None:
-    """A mutant compiles, un-splices, and is the module while no fault is active; its line is known to ask."""
+    """Check that a mutant compiles, un-splices, and equals the module while no fault is active, and that the
+    line of its probe call is known.
+    """
     edit = injection_edit(file, models(), injection, "0a1b2c3d")
     data = joined(apply_edits(file, in_lines(file, [edit])))
     assert unsplice(data) == file.data, injection
@@ -96,7 +98,7 @@ def check(file: ParsedFile, injection: Injection) -> None:
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check so many cases drawn from the modules of these names; how many they were."""
+    """Check that many cases drawn from the modules with these names; return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, location) for file in files for _, location in anchors(file)]
     guarded = [(file, location) for file in files for location in statements(file)]
@@ -109,12 +111,13 @@ def checked(names: Sequence[str], count: int) -> int:
 
 
 def test_an_instance_is_all_that_differs() -> None:
-    """A mutant that is limited compiles, un-splices to every byte, asks the probe once, and does what the
-    module does while no fault is active."""
+    """A limited mutant compiles, un-splices to every byte, calls the probe once, and acts like the module
+    while no fault is active.
+    """
     assert checked(FEW[:2], 130) == 130
 
 
 @pytest.mark.slow
 def test_an_instance_is_all_that_differs_at_large() -> None:
-    """The same of thousands of cases."""
+    """The same holds for thousands of cases."""
     assert checked((*FEW, *MANY[:20]), 4000) == 4000

@@ -1,4 +1,4 @@
-"""Mutants from reused changes equal spliced ones, byte for byte, for the faults of the paper and others."""
+"""Mutants from reused changes equal spliced ones byte for byte, for the faults of the paper and others."""
 
 import math
 from dataclasses import replace
@@ -64,7 +64,7 @@ def triggers(draw: st.DrawFn) -> Trigger:
 
 @st.composite
 def varied(draw: st.DrawFn) -> Fault:
-    """A fault of the library with other numbers in it, any that there are."""
+    """A fault of the library with any other numbers in it."""
     fault = draw(st.sampled_from(faults()))
     injections = []
     for injection in fault.injections:
@@ -77,7 +77,7 @@ def varied(draw: st.DrawFn) -> Fault:
 
 @st.composite
 def others(draw: st.DrawFn) -> Fault:
-    """A fault of any model of the templates, where the library has one; what may be left out may be."""
+    """A fault of any model of the templates at a location in the library; optional fields may be missing."""
     manifest, models = paper()
     model = models.get(draw(st.sampled_from(sorted(models.models))))
     fault = draw(st.sampled_from(faults()))
@@ -106,7 +106,7 @@ def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
 
 
 def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, str]:
-    """The mutant, or what it is refused with."""
+    """The mutant, or the reason it is refused."""
     try:
         return way(*paper(), fault, trigger)
     except MutatorError as error:
@@ -116,15 +116,15 @@ def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, st
 @settings(max_examples=50, deadline=None)
 @given(varied() | others(), triggers())
 def test_reused_changes_give_what_splicing_gives(fault: Fault, trigger: Trigger) -> None:
-    """Files, patch, ids and digest are the same whatever numbers, models and triggers are; errors too."""
-    made(build, fault, trigger)  # leaves a reusable change, if it is the first of its kind
+    """Files, patch, ids, digest and errors are the same for all numbers, models and triggers."""
+    made(build, fault, trigger)  # leaves a reusable change if it is the first of its kind
     assert made(build, fault, trigger) == made(build_directly, fault, trigger)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", READINGS)
 def test_the_whole_library(reading: str) -> None:
-    """Every mutant of the paper's campaign is the one that splicing makes."""
+    """Every mutant of the paper's campaign equals the spliced one."""
     plan = make_plan(Workspace.find(root=ROOT), "paper", Choices(reading=reading))
     pairs = {(e.fault.id, e.trigger): e for e in plan.experiments}
     assert len(pairs) > 6000

@@ -1,4 +1,4 @@
-"""Patches grouped by shape: whatever the values are, each patch is given back, and one label is one shape."""
+"""Patches grouped by shape: each patch can be restored for any values, and one label means one shape."""
 
 import math
 from dataclasses import replace
@@ -15,7 +15,7 @@ from mutator.review.groups import group_label, parameter_values, shapes
 from mutator.workspace import Workspace
 
 WORKSPACE = Workspace.find(root=Path(__file__).parents[2])
-SOME = [0.0, -0.0, 35.0, 10000000.0, 1e22, 5e-324, math.nan, -math.inf]  # one has eight digits, as an id
+SOME = [0.0, -0.0, 35.0, 10000000.0, 1e22, 5e-324, math.nan, -math.inf]  # one has eight digits, like an id
 NUMBERS = st.floats() | st.sampled_from(SOME)
 CONDITIONS = ["hwt <= 2.0 and rs > 0.0", "not hwt / 2.0 > 1.0", "abs(d_rel) < max(v_ego, 3.0)"]
 
@@ -34,7 +34,7 @@ def setting() -> tuple[object, object, list[Fault]]:
 
 @st.composite
 def alike(draw: st.DrawFn) -> list[tuple[Fault, Trigger]]:
-    """A fault with other numbers, as often as wanted, under contexts."""
+    """Copies of a fault with other numbers, under contexts."""
     fault = draw(st.sampled_from(setting()[2]))
     found = []
     for _ in range(draw(st.integers(1, 4))):

@@ -1,4 +1,4 @@
-"""The splicer on generated sources: every byte comes back, and it does what LibCST's own insertion does."""
+"""The splicer on generated sources: it restores every byte, and does what LibCST's insertion does."""
 
 import ast
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def sources(draw: st.DrawFn) -> tuple[bytes, list[str]]:
 
 @st.composite
 def blocks(draw: st.DrawFn, indent: str, unit: str, names: list[str], depth: int) -> list[str]:
-    """Lines of a block: assignments of every form, comments, blank lines, and blocks inside."""
+    """Lines of a block: assignments of every form, comments, blank lines, and nested blocks."""
     lines: list[str] = []
     for _ in range(draw(st.integers(1, 3))):
         kinds = ["plain", "multi", "text", "slash", "ann", "tuple", "last"]
@@ -71,7 +71,7 @@ def site(name: str, kind: AnchorKind) -> FaultLocation:
 
 
 class Direct(cst.CSTTransformer):
-    """The same mutation by LibCST's tree: statements put behind, or around, the one that assigns `name`."""
+    """The same mutation in LibCST's tree: insert statements after, or around, the one that assigns `name`."""
 
     def __init__(self, after: set[str], guarded: set[str]) -> None:
         super().__init__()
@@ -120,14 +120,14 @@ def mutate(data: bytes, after: Sequence[str], guarded: Sequence[str]) -> tuple[s
 
 
 def can_guard(data: bytes, name: str) -> bool:
-    """Not when the statement shares its line."""
+    """False if the statement shares its line."""
     return f"; {name} = ".encode() not in data
 
 
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_every_byte_comes_back(data: st.DataObject) -> None:
-    """A mutated source compiles, differs by tagged lines (and guarded statements) only, and un-splices."""
+    """A mutated source compiles, differs only by tagged lines (and guarded statements), and un-splices."""
     source, names = data.draw(sources())
     chosen = data.draw(st.lists(st.sampled_from(names), unique=True)) if names else []
     guarded = [n for n in data.draw(st.permutations(names))[: len(names) // 2] if can_guard(source, n)]

@@ -1,6 +1,6 @@
-"""The splicer on thousands of sources: whatever it does not refuse is spliced right.
+"""The splicer on thousands of sources: every mutant that it does not refuse is correct.
 
-`pytest -m slow -n 2 -rP tests/property/test_splicer_at_large.py` tries all, and prints the figures.
+`pytest -m slow -n 2 -rP tests/property/test_splicer_at_large.py` tries all and prints the figures.
 """
 
 import random
@@ -26,14 +26,14 @@ KINDS = ("entry", "after_assign", "before_assign", "after_call", "before_call", 
 
 @pytest.fixture(autouse=True)
 def _quiet() -> Iterator[None]:
-    """What the sources warn of is their business."""
+    """Ignore the warnings of the sources."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: int = 3) -> Figures:
-    """What was tried with these sources; those that came out wrong are named."""
+    """What was tried with these sources; failures are named."""
     figures = Figures()
     for name, data in sources:
         try:
@@ -52,7 +52,7 @@ PARTS = 8  # of what takes long, for as many workers
     [(0, 6), *(pytest.param(2500 * part, 2500, marks=pytest.mark.slow) for part in range(PARTS))],
 )
 def test_generated_modules(first: int, count: int) -> None:
-    """At every anchor of generated modules a mutant is right by `ast`, and does what the original does."""
+    """At every anchor of generated modules a mutant is correct by `ast`, and acts like the original."""
     seeds = range(first, first + count)
     figures = proved(((seed, ModuleWriter(seed).module()) for seed in seeds), behaviour)
     assert not figures.wrong
@@ -62,7 +62,7 @@ def test_generated_modules(first: int, count: int) -> None:
 
 @pytest.mark.parametrize("part", [None, *(pytest.param(n, marks=pytest.mark.slow) for n in range(PARTS))])
 def test_the_standard_library(part: int | None) -> None:
-    """At every anchor of the installed standard library and its tests a mutant is right by `ast`."""
+    """At every anchor of the installed standard library and its tests a mutant is correct by `ast`."""
     paths = sorted(path for path in LIBRARY.rglob("*.py") if "site-packages" not in path.parts)
     chosen = random.Random(4).sample(paths, 4) if part is None else paths[part::PARTS]
     figures = proved(((path, path.read_bytes()) for path in chosen), None)
@@ -72,7 +72,7 @@ def test_the_standard_library(part: int | None) -> None:
 
 
 def test_a_seed_makes_one_module() -> None:
-    """What is found wrong can be made again."""
+    """A seed reproduces its module, so failures can be reproduced."""
     assert ModuleWriter(7).module() == ModuleWriter(7).module() != ModuleWriter(8).module()
 
 
@@ -93,7 +93,9 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
 def test_a_broken_splicer_is_found(
     place: ModuleType, name: str, source: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without one of its checks, or with a wrong end of a statement or depth, something comes out wrong."""
+    """Without one of its checks, or with a wrong end of a statement or a wrong depth, the splicer fails a
+    proof.
+    """
     assert not proved([("", source)], behaviour, 20).wrong
     broken = {
         "libcst_module": without_check_of_bytes,

@@ -1,4 +1,4 @@
-"""Statements that fault models repeat or exchange, all over the controller that ships."""
+"""Statements that fault models repeat or exchange, throughout the shipped controller."""
 
 import ast
 from collections import Counter
@@ -28,7 +28,7 @@ EXCUSES = (
 
 
 class _Inactive(ast.NodeTransformer):
-    """Takes out what asks the probe first; what stands beneath `else:` stays."""
+    """Removes the probe's conditions; the body of `else:` stays."""
 
     def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)
@@ -54,7 +54,8 @@ def locations(file: ParsedFile) -> Iterator[FaultLocation]:
 @pytest.mark.parametrize("model", ["reordering", "repetition"])
 def test_statements_of_the_controller(model: str, files: list[Path], least: int) -> None:
     """Wherever two statements are exchanged, or one is repeated, the file compiles, un-splices to its bytes,
-    and is to `ast` what it was once the active branch is gone; what is refused has a reason."""
+    and equals the original to `ast` without the active branch; refusals have a reason.
+    """
     models, made = Workspace.find(root=CLONE).fault_models(), 0
     for path in files:
         file = parse_file(path.name, path.read_bytes(), TARGET)

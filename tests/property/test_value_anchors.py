@@ -1,4 +1,4 @@
-"""Values that are changed where they stand, in modules of Python's own library: each is a case."""
+"""Values changed in place, in modules of Python's standard library."""
 
 import ast
 import importlib.util
@@ -56,7 +56,7 @@ def models() -> FaultModels:
 
 @cache
 def module(name: str) -> ParsedFile | None:
-    """A module of Python's library as a file of a target; None for one that this Python does not have."""
+    """A standard-library module as a file of a target; None if this Python does not have it."""
     try:
         found = importlib.util.find_spec(name)
     except ModuleNotFoundError:
@@ -67,7 +67,7 @@ def module(name: str) -> ParsedFile | None:
 
 
 def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
-    """Every expression of a file, by each of the anchors that lead to it."""
+    """Every expression of a file, by each of its anchors."""
     for function, known in file.expressions.items():
         seen = Counter[tuple[AnchorKind, str, str | None]]()
         for expression in known:
@@ -84,7 +84,7 @@ def active(node: ast.expr) -> bool:
 
 
 class Inactive(ast.NodeTransformer):
-    """What a module does while no fault is active; `kept` are the expressions whose values are changed."""
+    """What a module does while no fault is active; `kept` are the expressions with changed values."""
 
     def __init__(self) -> None:
         self.kept: list[str] = []
@@ -106,7 +106,7 @@ Case = tuple[Expression, FaultLocation]
 
 
 def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
-    """The change of a case's value, by one of the models, under an id of its own."""
+    """The change of a case's value by one of the models, under its own id."""
     expression, location = case
     assert file.resolve_value(location) is expression, location
     name, params = MODELS[number % len(MODELS)]
@@ -117,7 +117,7 @@ def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
 
 
 def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
-    """The cases in groups of expressions of which none lies in another."""
+    """The cases in groups of expressions that do not contain each other."""
     left = list(cases)
     while left:
         group: list[Case] = []
@@ -131,8 +131,9 @@ def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
 
 
 def check(file: ParsedFile, cases: Sequence[Case]) -> None:
-    """A mutant with these values changed compiles, un-splices, asks the probe once for each, changes the
-    whole of it and no more, and does what the file does while nothing is active."""
+    """Check that a mutant with these values changed compiles, un-splices, calls the probe once for each,
+    changes exactly these expressions, and acts like the file while no fault is active.
+    """
     edits = [edit_of(file, case, number) for number, case in enumerate(cases)]
     kept = check_edits(file, edits, cases)
     assert sorted(kept) == sorted(ast.dump(expression.node) for expression, _ in cases), cases
@@ -151,7 +152,7 @@ def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: obje
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check so many cases drawn from the modules of these names; how many they were."""
+    """Check that many cases drawn from the modules with these names; return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in anchors(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))
@@ -162,19 +163,20 @@ def checked(names: Sequence[str], count: int) -> int:
 
 
 def test_a_changed_value_is_all_that_differs() -> None:
-    """A mutant compiles, un-splices to every byte, asks the probe once for each value, and does what the
-    module does while no fault is active; each anchor leads to its own expression."""
+    """A mutant compiles, un-splices to every byte, calls the probe once for each value, and acts like the
+    module while no fault is active; each anchor leads to its own expression.
+    """
     assert checked(FEW, 300) == 300
 
 
 @pytest.mark.slow
 def test_a_changed_value_is_all_that_differs_at_large() -> None:
-    """The same of 20,000 cases in some fifty modules."""
+    """The same holds for 20,000 cases in some fifty modules."""
     assert checked(MANY, 20_000) == 20_000
 
 
 def mutations(file: ParsedFile) -> Iterator[Mutation]:
-    """What all operators make of a module."""
+    """All operators' mutations of a module."""
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
     facts = facts_of(tree, file.path)
     for function in file.functions:
@@ -182,7 +184,7 @@ def mutations(file: ParsedFile) -> Iterator[Mutation]:
 
 
 def checked_mutations(names: Sequence[str], count: int) -> int:
-    """Check so many mutants of operators, drawn from the modules of these names; how many they were."""
+    """Check that many operators' mutants drawn from the modules with these names; return their number."""
     files = [file for name in names if (file := module(name))]
     drawn = [(file, mutation) for file in files for mutation in mutations(file)]
     chosen = random.Random(2).sample(drawn, min(count, len(drawn)))
@@ -195,7 +197,7 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
                 edit = injection_edit(file, models(), injection, f"{number:08x}")
                 try:
                     apply_edits(file, in_lines(file, [*edits, edit]))
-                except MutatorError:  # it lies in another one, or this one in it
+                except MutatorError:  # one contains the other
                     check_edits(file, [edit], mutation)
                 else:
                     edits.append(edit)
@@ -204,11 +206,11 @@ def checked_mutations(names: Sequence[str], count: int) -> int:
 
 
 def test_a_mutation_is_all_that_differs() -> None:
-    """The same holds for what operators make, statements that are left out included."""
+    """The same holds for the operators' mutants, including deleted statements."""
     assert checked_mutations(FEW, 150) == 150
 
 
 @pytest.mark.slow
 def test_a_mutation_is_all_that_differs_at_large() -> None:
-    """The same of 20,000 mutants of operators."""
+    """The same holds for 20,000 operators' mutants."""
     assert checked_mutations(MANY, 20_000) == 20_000

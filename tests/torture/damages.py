@@ -1,4 +1,4 @@
-"""What can become of a file on a disk: each damage is a function of the file, its neighbours and chance."""
+"""Damage to files on a disk: each damage is a function of the file, its neighbours and chance."""
 
 import json
 import os
@@ -115,25 +115,25 @@ def become_a_folder(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def become_a_link(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """To nowhere, to itself, or to another file or folder."""
+    """A link to nowhere, to itself, or to another file or folder."""
     path.unlink()
     path.symlink_to(chance.choice([path.with_name("nowhere"), path, path.parent, *others]))
 
 
 def become_a_pipe(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """Or a socket: who reads of it must not wait for what nobody will say."""
+    """A pipe or a socket: a reader must not wait for data that never comes."""
     path.unlink()
     if chance.random() < 0.7:
         os.mkfifo(path)
         return
     here = os.open(path.parent, os.O_RDONLY)
     with socket.socket(socket.AF_UNIX) as made:
-        made.bind(f"/proc/self/fd/{here}/{path.name}")  # the whole path may be longer than a socket's may be
+        made.bind(f"/proc/self/fd/{here}/{path.name}")  # a socket's path is limited in length
     os.close(here)
 
 
 def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """A value of a JSON text, or of one of its lines, becomes a strange one, goes, or gets a companion."""
+    """Change, delete or duplicate a value of a JSON text, or of one of its lines."""
     data = path.read_bytes()
     as_lines = path.suffix == ".jsonl"
     texts = data.splitlines() if as_lines else [data]
@@ -149,7 +149,7 @@ def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def changed(value: Any, chance: Chance, strange: Sequence[object] = STRANGE) -> Any:
-    """A value with one of the values in it changed, at any depth."""
+    """A value with one nested value changed, at any depth."""
     inside = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     if not inside or chance.random() < 0.1:
         return chance.choice(strange)
@@ -176,7 +176,7 @@ DAMAGES: dict[str, Damage] = {
 
 
 def contents(folder: Path) -> dict[str, bytes | str]:
-    """What is in a folder by name: bytes of files, targets of links."""
+    """The contents of a folder by name: bytes of files, targets of links."""
     return {
         path.relative_to(folder).as_posix(): str(path.readlink()) if path.is_symlink() else path.read_bytes()
         for path in sorted(folder.rglob("*"))
@@ -187,8 +187,9 @@ def contents(folder: Path) -> dict[str, bytes | str]:
 def damage(
     folder: Path, names: Sequence[str], chance: Chance, damages: Sequence[str]
 ) -> tuple[str, list[str]]:
-    """Damage one of these files in a folder, in one of these ways, until it is damaged; how, and the names of
-    all that is another now."""
+    """Damage one of these files in one of these ways until it differs; return how, and the names of all
+    changed files.
+    """
     before = contents(folder)
     while True:
         name, how = chance.choice(names), chance.choice(damages)

@@ -1,4 +1,4 @@
-"""Files as nobody writes them: what can become of YAML, templates and sources that people write."""
+"""Malformed versions of the YAML, templates and sources that people write."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -60,10 +60,10 @@ MALFORMS: dict[str, Malform] = {
 
 
 def malform(path: Path, chance: Chance) -> str:
-    """Damage a file that people write, half of the time in a way of its own; how."""
+    """Damage a hand-written file, half of the time in a way specific to its kind; return how."""
     text = path.read_text(encoding="utf-8")
     ways = [*MALFORMS] if path.suffix == ".yaml" else [*MALFORMS][1:]
-    # values are what most of reading is about
+    # reading is mostly about values
     how = chance.choice([*DAMAGES, *ways * 4] + ["change_a_value"] * 20 * (path.suffix == ".yaml"))
     if how in MALFORMS:
         path.write_text(MALFORMS[how](text, chance), encoding="utf-8", newline="")

@@ -1,4 +1,4 @@
-"""Campaigns with mutants that misbehave beside ordinary ones, in every engine."""
+"""Campaigns with misbehaving mutants among ordinary ones, in every engine."""
 
 import csv
 import random
@@ -93,7 +93,8 @@ chunk: 2
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misdeed:
     """What a mutant does when its fault is first active, the statuses that its experiment may have, and
-    whether its fault model declares that it raises."""
+    whether its fault model declares that it raises.
+    """
 
     name: str
     lines: tuple[str, ...]
@@ -105,7 +106,7 @@ class Misdeed:
         return self.name.replace(" ", "_").lower()
 
     def write(self, workspace: Workspace) -> None:
-        """Its fault model and its fault spec."""
+        """Write its fault model and its fault spec."""
         imports = [f"import {name}" for name in MODULES]
         body = ["    " + line for line in (*imports, *self.lines)]
         # what looks like Jinja2 in them is Python
@@ -120,7 +121,7 @@ class Misdeed:
 
 
 def misdeeds() -> dict[str, Misdeed]:
-    """All that are listed, by name."""
+    """All misdeeds, by name."""
     _, *parts = re.split(r"^== ", LISTED.read_text(), flags=re.MULTILINE)
     found = {}
     for part in parts:
@@ -134,8 +135,9 @@ def misdeeds() -> dict[str, Misdeed]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Came:
-    """What a campaign came to: its exit code, what it said, the lines of results.csv by experiment, those of
-    misdeeds by their fault type, and what is wrong with what it left."""
+    """A campaign's result: exit code, output, the lines of results.csv by experiment, those of misdeeds by
+    fault type, and what is wrong with the files it left.
+    """
 
     code: int
     said: str
@@ -156,7 +158,7 @@ class Drawn:
 
 
 class Misbehaving:
-    """Campaigns of the toy, one for each seed, and what the misdeeds in them come to."""
+    """Campaigns of the toy, one for each seed, and the results of their misdeeds."""
 
     def __init__(self, workspace: Workspace, at: Path, seeds: Sequence[int]) -> None:
         self.workspace, self.at = workspace, at
@@ -171,7 +173,7 @@ class Misbehaving:
 
     def _draw(self, seed: int) -> Drawn:
         chance = random.Random(seed)
-        engine = list(ENGINES)[-1 - seed % len(ENGINES)]  # so that a few tries have every engine, fork first
+        engine = list(ENGINES)[-1 - seed % len(ENGINES)]  # so that a few tries cover every engine, fork first
         workers, method = (chance.choice(some) for some in (WORKERS, METHODS))
         names = chance.sample(sorted(self.misdeeds), chance.randint(1, MOST))
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
@@ -192,7 +194,7 @@ class Misbehaving:
         return Case(kind=misdeed.name, damage=str(status), reader=reader, end=end, story=story)
 
     def _problem(self, came: Came, method: str) -> str:
-        """What is wrong with a campaign, whatever its misdeeds are; empty if nothing is."""
+        """What is wrong with a campaign, whatever its misdeeds; empty if nothing."""
         if came.left:
             return came.left
         if "Traceback" in came.said or "defect of mutator" in came.said:
@@ -205,18 +207,18 @@ class Misbehaving:
         return "".join(f"{came.rows.get(name)}, not {right.get(name)}" for name in changed)
 
     def _difference(self, misdeed: Misdeed, method: str, came: Came) -> str:
-        """What is wrong with what a misdeed came to; empty if nothing is."""
+        """What is wrong with a misdeed's result; empty if nothing."""
         status, row = came.status.get(misdeed.model), came.bad.get(misdeed.model)
         if status not in misdeed.ends:
             return f"not one of {', '.join(sorted(misdeed.ends))}: {row}"
         truth = self._reference(method)
         if status is Status.HARNESS_ERROR is truth.status[misdeed.model]:
-            return ""  # who guards a run has other words for it in another engine
+            return ""  # the guard of a run words it differently in another engine
         right = truth.bad[misdeed.model]
         return "" if row == right else f"{row}, not {right} as on the reference engine"
 
     def _reference(self, method: str) -> Came:
-        """What all drawn misdeeds come to in one campaign on the reference engine."""
+        """The results of all drawn misdeeds in one campaign on the reference engine."""
         if method not in self._right:
             drawn = [one for one in self.drawn.values() if one.method == method]
             names = sorted({name for one in drawn for name in one.names})
@@ -264,7 +266,7 @@ class Misbehaving:
         return came
 
     def _left(self) -> str:
-        """What a command left that it should not; empty if nothing."""
+        """What a command left behind wrongly; empty if nothing."""
         left = [*(self.at / "tmp").iterdir()]
         left += [
             path for path in (self.at / "run").glob("*") if path.name == "work" or is_half_written(path.name)

@@ -1,4 +1,4 @@
-"""All that reads a run folder, and what is compared of what it tells."""
+"""All readers of a run folder, and the part of their output that is compared."""
 
 import io
 import json
@@ -26,7 +26,7 @@ TABLES = (
     "results.parquet",
     "propagation.parquet",
     "timings.parquet",
-)  # verified if they are there
+)  # verified if they exist
 HOW = re.compile(  # of a report
     r"^## (How the experiments were run|Where the time went)$.*?^(?=## )", re.MULTILINE | re.DOTALL
 )
@@ -34,8 +34,7 @@ HOW = re.compile(  # of a report
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Told:
-    """What a reader came to: its exit code, what it said, and the result that must be that of the undamaged
-    folder."""
+    """A reader's exit code, its messages, and the result that must equal that of the undamaged folder."""
 
     code: int
     said: str
@@ -44,7 +43,7 @@ class Told:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """A copy of a run folder that may be damaged, and what its readers need to know of it."""
+    """A copy of a run folder that may be damaged, and what its readers need to know about it."""
 
     folder: Path  # holds all of it
     genuine: Path = Path()  # the undamaged one, elsewhere
@@ -74,7 +73,7 @@ def _text(stream: io.TextIOWrapper) -> str:
 
 
 def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Told:
-    """What a command came to, if it counts what it printed and wrote."""
+    """A command's result, including its output and its files."""
     code, out, err = cli(*words)
     written = [path.read_bytes() for path in files] if code == 0 else []
     return Told(code=code, said=out + err, result=[out if printed else "", *written])
@@ -91,13 +90,13 @@ def run(place: Place) -> Told:
 
 
 def repair(place: Place) -> Told:
-    """`verify --repair`, then `run`, for which the repaired folder is one like any other."""
+    """`verify --repair`, then `run`, which treats the repaired folder like any other."""
     code, out, err = cli("verify", place.run, "--repair")
     return run(place) if code in (0, 1) else Told(code=code, said=out + err)
 
 
 def report(place: Place) -> Told:
-    """Without what it tells of timings, which say nothing of a result."""
+    """The report without its timings, which are not part of a result."""
     words = ("report", place.run)
     told = _told(words, *(sorted((place.run / "report" / "tables").glob("*.csv"))), printed=True)
     if told.code != 0:
@@ -116,7 +115,7 @@ def show(place: Place) -> Told:
 
 
 def show_plot(place: Place) -> Told:
-    """With the plot, which is drawn of a kept trace, or of one that is driven again."""
+    """The plot is drawn from a kept trace, or from one that is run again."""
     return _told(("show", place.experiment, "--run", place.run), printed=True)
 
 
@@ -150,12 +149,12 @@ def _export(format: str) -> Reader:
 
 
 def verify(place: Place) -> Told:
-    """An audit that finds nothing vouches for every file that it looks at."""
+    """An audit without findings vouches for every file that it checks."""
     code, out, err = cli("verify", place.run)
     found, genuine = contents(place.run) if code == 0 else {}, contents(place.genuine)
     ledger = json.loads(genuine["digests.json"])
     known = [*ledger["files"], "digests.json"]
-    # Nothing may be added to a finished run; of another it is not yet known what it will have been.
+    # Nothing may be added to a finished run; the final files of an unfinished one are not yet known.
     audited = {
         name: found[name] for name in found if name in known or (ledger["finished"] and AUDITED.match(name))
     }
@@ -165,7 +164,7 @@ def verify(place: Place) -> Told:
 
 
 def _table(path: Path, genuine: Path) -> str | bytes:
-    """What a table tells, its own or, where there is none, that of the genuine one."""
+    """A table's content; if the table is missing, the genuine one's."""
     place = path if path.is_file() else genuine
     return pd.read_parquet(place).to_csv() if place.suffix == ".parquet" else place.read_bytes()
 
@@ -177,7 +176,7 @@ def expect(place: Place, seal: str) -> Told:
 
 
 def api(place: Place) -> Told:
-    """Results, endings, seal, an experiment with its patch, in Python."""
+    """Results, endings, seal, and an experiment with its patch, in Python."""
     try:
         found = mutator.load_run(place.run)
         told = [found.results.to_csv(), found.endings, found.seal, found.experiment(place.experiment).patch]
@@ -187,8 +186,10 @@ def api(place: Place) -> Told:
 
 
 def rows(place: Place) -> Told:
-    """Rows of the results that the undamaged folder has not: none. Of a run that was killed some may be lost,
-    for the same command drives them again."""
+    """Rows of the results that the undamaged folder lacks: there must be none.
+
+    A killed run may have lost some, since the same command runs them again.
+    """
     told = api(place)
     if told.code != 0:
         return told

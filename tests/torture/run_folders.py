@@ -1,4 +1,4 @@
-"""Makes the run folders that are damaged."""
+"""Build the run folders to damage."""
 
 import os
 import shutil
@@ -34,7 +34,7 @@ def finished(home: Path, at: Path) -> World:
 
 
 def forged(home: Path, at: Path) -> World:
-    """A run of the toy whose damages are those of somebody who computes all digests anew."""
+    """A run of the toy, damaged by somebody who recomputes all digests."""
     words = (*SMALL, "--engine", "fork")
     done("run", *words, "-n", "0", "--out", home / "run")
     shutil.rmtree(home / "run" / "report")
@@ -43,7 +43,7 @@ def forged(home: Path, at: Path) -> World:
 
 
 def half(home: Path, at: Path) -> World:
-    """A run of the toy that was killed, with most of its experiments done."""
+    """A run of the toy, killed with most of its experiments finished."""
     return _killed(home, at, (*SMALL, *REFERENCE), 4)
 
 
@@ -57,7 +57,7 @@ def shards(home: Path, at: Path) -> World:
 
 
 def shipped(home: Path, at: Path) -> World:
-    """A run on the controller that ships, read without driving."""
+    """A run on the shipped controller, read without running anything."""
     words = (*SHIPPED, *REFERENCE)
     done("run", *words, "-n", "0", "--out", home / "run")
     place = _place(home, at, words, next(iter(RunFolder.open(home / "run").records())))
@@ -65,7 +65,7 @@ def shipped(home: Path, at: Path) -> World:
 
 
 def shipped_half(home: Path, at: Path) -> World:
-    """A run on the controller that ships, killed with half of its experiments done."""
+    """A run on the shipped controller, killed with half of its experiments finished."""
     return _killed(home, at, (*SHIPPED, *REFERENCE), 2)
 
 
@@ -75,7 +75,7 @@ BUILDERS: dict[str, Callable[[Path, Path], World]] = {
 
 
 def done(*words: object) -> None:
-    """Give a command that must go well."""
+    """Run a command that must succeed."""
     code, _, said = cli(*words)
     assert code == 0, said
 
@@ -86,7 +86,7 @@ def hazardous(run: Path) -> str:
 
 
 def _killed(home: Path, at: Path, words: tuple[str, ...], records: int) -> World:
-    """A run that is killed as soon as so many experiments have a record."""
+    """A run that is killed as soon as that many experiments have a record."""
     out = home / "run"
     command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
     command.wait_for_records(records)

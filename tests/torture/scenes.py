@@ -1,4 +1,4 @@
-"""Commands that are killed at random moments, and given again until they come to their end."""
+"""Commands that are killed at random moments and repeated until they complete."""
 
 import math
 import os
@@ -32,21 +32,22 @@ KILLS = 3  # of one command, at most
 
 @dataclass(slots=True, kw_only=True)
 class Scene:
-    """A command, where it begins, and what must have become of the folder in the end."""
+    """A command, the folder where it begins, and the folder's required final state."""
 
     name: str
     workspace: Workspace
-    at: Path  # the folder that all happens in
+    at: Path  # the folder of everything that happens
     words: tuple[object, ...]
-    told: Callable[[], Told]  # of what the command has made
-    home: Path | None = None  # what is in the folder before; None: nothing
+    told: Callable[[], Told]  # of the command's output
+    home: Path | None = None  # the folder's content before; None: nothing
     fresh_cache: bool = False  # so that the checks are run, too
     victims: Sequence[str] = ("command", "group")
-    takes_s: float = math.inf  # what the command took when it was fastest
+    takes_s: float = math.inf  # the command's shortest duration
 
     def cases(self, right: Told, seed: int) -> Sequence[Case]:
-        """Kill the command, give it again, kill that, and so on, then let it end; a case for each kill that
-        came in time."""
+        """Kill the command, repeat it, kill that, and so on, then let it complete; yield a case for each kill
+        that came in time.
+        """
         chance = random.Random(seed)
         self._begin()
         kills = []
@@ -54,7 +55,7 @@ class Scene:
             began, command = time.monotonic(), self._command()
             kills.append(struck(command, chance, self.victims, self.takes_s))
             command.end()  # and that of every process that it started, soon
-            if kills == [None]:  # it came to its end; the machine is less busy than it was
+            if kills == [None]:  # it completed; the machine is less busy now
                 self.takes_s = min(self.takes_s, time.monotonic() - began)
             if self._is_done(command):
                 break
@@ -67,16 +68,15 @@ class Scene:
         ]
 
     def _is_done(self, command: Command) -> bool:
-        """Whether it needs no other: also a merge that was killed when all was written, as the next one would
-        not write over a run."""
+        """Whether no other command is needed: a merge killed after its last write counts, since the next one
+        would not overwrite a run.
+        """
         merged = self.name == "merge" and RunFolder.exists(self.at / "run")
         return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> Told:
-        """What the command comes to when nobody kills it."""
-        if (
-            self.home is None and not self.fresh_cache
-        ):  # the time of those that follow, whose checks are known
+        """The command's result when nobody kills it."""
+        if self.home is None and not self.fresh_cache:  # the duration of later runs, with cached checks
             self._begin()
             self._command().end()
         self._begin()
@@ -106,8 +106,9 @@ class Scene:
 
 
 def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
-    """A run without and with its checks, one of the shipped controller, a report, a repair of a damaged run,
-    a merge."""
+    """A run with and without its checks, one of the shipped controller, a report, a repair of a damaged run,
+    a merge.
+    """
     words, shards = (*SMALL, "--engine", "fork"), (at / "shard1", at / "shard2")
     place, scene = Place(folder=at, campaign=words), partial(Scene, workspace=workspace, at=at)
     running, again = ("run", *words, "-n", "2", "--out", place.run), partial(run, place)
@@ -134,7 +135,7 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
 
 
 def _damaged(home: Path) -> Path:
-    """The run in a folder, with a line of the records lost, a golden run and a patch changed."""
+    """The run in a folder, with a lost record line and a changed golden run and patch."""
     run = home / "run"
     records = next((run / "records").iterdir())
     records.write_bytes(records.read_bytes()[:-1] + b"x\n")
@@ -144,7 +145,7 @@ def _damaged(home: Path) -> Path:
 
 
 def _written(place: Place) -> Told:
-    """A report, as it was written."""
+    """A report as it was written."""
     text = (place.run / "report" / "REPORT.md").read_text()
     tables = sorted((place.run / "report" / "tables").glob("[!.]*"))  # a kill leaves half-written files
     return Told(code=0, said="", result=[HOW.sub("", text), *(table.read_text() for table in tables)])
@@ -158,13 +159,15 @@ def _merged(place: Place) -> Told:
 def struck(
     command: Command, chance: Chance, victims: Sequence[str], takes_s: float
 ) -> tuple[str, signal.Signals] | None:
-    """Send a signal to a process of a command, or to all of them, at some moment of the time that it takes.
-    Returns to which, and the signal; None if there was none any more."""
+    """Send a signal to one process of a command, or to all of them, at a random moment of its duration.
+
+    Return the receiver and the signal; None if no process was left.
+    """
     number, victim = chance.choice(SIGNALS), chance.choice(victims)
     with suppress(subprocess.TimeoutExpired):
         command.process.wait(chance.uniform(0.0, takes_s))
     while command.process.poll() is None:
-        with suppress(ProcessLookupError):  # it has just ended by itself
+        with suppress(ProcessLookupError):  # it has just ended normally
             if pids := VICTIMS[victim](command):
                 os.kill(chance.choice(pids), number)
                 return victim, number
@@ -173,7 +176,7 @@ def struck(
 
 
 def _mutants(command: Command) -> list[int]:
-    """The mutants that are driven, fork servers, and whatever else it started but for its workers."""
+    """The running mutants, fork servers, and everything else it started except its workers."""
     workers = command.workers()
     return [pid for pid, _ in command.others() if pid not in workers]
 

@@ -1,6 +1,6 @@
-"""Where a command may find itself: other locales and clocks, little room, memory and files, closed streams.
+"""Surroundings of a command: other locales and clocks, little disk, memory or file handles, closed streams.
 
-Each surrounding is a context manager of chance and a folder of the case; within it the command is started.
+Each surrounding is a context manager that takes chance and the case's folder; the command starts within it.
 """
 
 import os
@@ -23,7 +23,7 @@ time.time = jumping
 time.time_ns = lambda: int(jumping() * 1e9)
 """
 LIMIT = "import resource\nresource.setrlimit(resource.RLIMIT_{name}, ({most}, {most}))"
-# else root may raise its limits again
+# otherwise root may raise its limits again
 NO_PRIVILEGE = "import ctypes\nctypes.CDLL(None).prctl(24, 24, 0, 0, 0)"
 NOBODY_READS = "import os\nread, write = os.pipe()\nos.close(read)\nfor fd in {fds}: os.dup2(write, fd)"
 
@@ -31,7 +31,8 @@ NOBODY_READS = "import os\nread, write = os.pipe()\nos.close(read)\nfor fd in {f
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Surrounding:
     """What differs for a command: its environment, what its process does before it becomes the command, and
-    the folder of the run. `ease` ends what is hard about it; `is_heard`: its words can be read."""
+    the run's folder. `ease` removes the difficulty; `is_heard` says whether its messages can be read.
+    """
 
     run_in: Path
     how: str
@@ -43,7 +44,7 @@ class Surrounding:
 
 @contextmanager
 def words(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """Environment variables that have nothing to do with a result, and names that are not ASCII."""
+    """Environment variables unrelated to results, and non-ASCII names."""
     locale = chance.choice(["C", "POSIX", "C.UTF-8", "xx_YY.UTF-8", "de_DE.ISO-8859-1", "tr_TR.UTF-8", ""])
     given = {
         "LC_ALL": locale,
@@ -80,7 +81,7 @@ def _limit(name: str, least: int, most: int) -> Callable[..., AbstractContextMan
 
 @contextmanager
 def disk(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """A disk with little room, or few inodes, for the run, for scratch files or for the cache."""
+    """A disk with little space, or few inodes, for the run, for scratch files or for the cache."""
     role, place = chance.choice(["run", "run", "TMPDIR", "XDG_CACHE_HOME"]), at / "disk"
     size, inodes = f"size={int(2 ** chance.uniform(13, 22))}", f"nr_inodes={int(2 ** chance.uniform(1, 9))}"
     small = chance.choice([size, size, inodes])
@@ -95,7 +96,7 @@ def disk(chance: Chance, at: Path) -> Iterator[Surrounding]:
 
 @contextmanager
 def read_only(chance: Chance, at: Path) -> Iterator[Surrounding]:
-    """A cache, home, scratch or run folder that nobody may write to."""
+    """A cache, home, scratch or run folder without write permission."""
     role, place = chance.choice(["run", "TMPDIR", "XDG_CACHE_HOME", "HOME"]), at / "disk"
     given = {} if role == "run" else {role: str(place)}
     if role == "HOME":
@@ -137,7 +138,7 @@ MOUNTED = ("full disk", "read-only")
 
 @contextmanager
 def mounted(place: Path, options: str) -> Iterator[None]:
-    """A disk of its own at that place."""
+    """A separate disk at that place."""
     place.mkdir()
     _mount("-t", "tmpfs", "-o", options, "tmpfs", str(place))
     try:

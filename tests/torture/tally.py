@@ -1,4 +1,4 @@
-"""What became of the cases of a torture: a table that is printed, and the cases that went wrong."""
+"""The outcomes of torture cases: a printed table, and the failures."""
 
 import traceback
 from collections import Counter
@@ -10,17 +10,18 @@ from mutator._common.tables import Table
 
 
 class End(StrEnum):
-    """How a case may end."""
+    """Ways for a case to end."""
 
-    RIGHT = "right"  # with the result of the undisturbed
-    REFUSED = "refused"  # with an error that names the file and what to do
+    RIGHT = "right"  # with the undisturbed result
+    REFUSED = "refused"  # with an error that names the file and the remedy
     WRONG = "wrong"  # with anything else
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One try: the kind of what was tortured, what was done to it, what then read it or went on, how that
-    ended, and what to know of a wrong end."""
+    """One try: what was tortured, how, what then read or resumed it, how that ended, and the details of a
+    failure.
+    """
 
     kind: str
     damage: str
@@ -31,13 +32,13 @@ class Case:
 
 @dataclass(slots=True)
 class Tally:
-    """The cases of one torture, with their seeds: each can be repeated alone, with `--seed`."""
+    """The cases of one torture test with their seeds; `--seed` repeats one case."""
 
     title: str
     cases: list[tuple[int, Case]] = field(default_factory=list)
 
     def drive(self, seeds: Iterable[int], cases_of: Callable[[int], Sequence[Case]]) -> None:
-        """Go through the seeds; what escapes from a case is a wrong end of it."""
+        """Go through the seeds; an exception in a case is a failure."""
         for seed in seeds:
             try:
                 found = cases_of(seed)
@@ -48,13 +49,13 @@ class Tally:
 
     @property
     def wrong(self) -> list[str]:
-        """A line for each wrong end, with the seed that repeats it."""
+        """A line for each failure, with the seed that repeats it."""
         return [
             f"--seed {seed}: {case.kind}: {case.story}" for seed, case in self.cases if case.end is End.WRONG
         ]
 
     def __str__(self) -> str:
-        """A table for each way to look at the cases, and the wrong ends."""
+        """A table for each grouping of the cases, and the failures."""
         heads = [field.name for field in fields(Case)[:3]]
         tables = [self._table(head) for head in heads]
         return "\n\n".join([f"{self.title}: {len(self.cases)} cases", *tables, *self.wrong])

@@ -1,5 +1,4 @@
-"""Whatever becomes of a file of a cache, results are the same: a cache is never a reason to refuse, nor to
-come to anything else."""
+"""A damaged cache file never changes a result and never causes a refusal."""
 
 import random
 import shutil
@@ -47,14 +46,16 @@ spacing_m: {SPACING}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cache:
-    """A filled cache that stays as it is, the place of its copy, and what uses that: run in a new folder."""
+    """A filled cache that stays unchanged, the place of its copy, and a command that uses the copy in a new
+    folder.
+    """
 
     home: Path
     at: Path
     use: Callable[[Path], Mapping[str, bytes | str]]
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Damage a file of the cache, then use it twice: what the first leaves there, the second finds."""
+        """Damage a file of the cache, then use it twice: the second use finds what the first leaves there."""
         chance = random.Random(seed)
         shutil.copytree(self.home, self.at)
         try:
@@ -88,7 +89,7 @@ class Cache:
 
 
 def contents_of(run: Path) -> dict[str, bytes]:
-    """What counts of a run folder, or of the output of a run."""
+    """The relevant content of a run folder, or of a run's output."""
     names = ("results.csv", "trace.npz", "record.json", "golden", "seal")
     found = [path for name in names for path in (run, *run.glob(name)) if path.name == name]
     files = [path for one in found for path in ([one] if one.is_file() else sorted(one.rglob("*.*")))]
@@ -112,7 +113,7 @@ def checks(toy: Workspace, folder: Path) -> Cache:
 
 
 def pictures(toy: Workspace, folder: Path) -> Cache:
-    """Frames and detections of the controller that ships, on a road of a few frames."""
+    """Frames and detections of the shipped controller, on a road of a few frames."""
     frames, home, at = folder / "frames", folder / "home", folder / "cache"
     frames.mkdir()
     (frames / "camera.yaml").write_text(CAMERA)
@@ -144,7 +145,7 @@ def test_caches(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A damage, then runs that would use what is damaged."""
+    """A damaged cache gives the same results as an intact one."""
     monkeypatch.setattr(detection_memory, "BUCKETS", 16)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     cache = CACHES[name](toy, tmp_path)

@@ -1,5 +1,6 @@
-"""Whatever becomes of a file of a run folder: who reads the folder gets the right result, or an error that
-names the file and what to do. Never another result, never a traceback."""
+"""Every reader of a damaged run folder returns the right result, or an error that names the file and the
+remedy; never another result or a traceback.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -29,7 +30,7 @@ def test_damages(
     reseal: Callable[..., None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A damage, then a reader."""
+    """No damage misleads a reader."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name.startswith("shipped") else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "home").mkdir()

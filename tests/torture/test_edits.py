@@ -1,5 +1,6 @@
-"""Whatever is edited or chosen anew between the kill of a run and the same command: the right result, or
-refused with what has changed; and the right result once that is undone."""
+"""After an edit between a killed run and its resume, the same command gives the right result or names the
+change; once that is undone, it gives the right result.
+"""
 
 import os
 import random
@@ -37,8 +38,10 @@ CHOICES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edits:
-    """A command that is killed, and what changes before it is given again. `root` holds library, templates
-    and target, in a git clone of their own."""
+    """A command that is killed, and what changes before it is repeated.
+
+    `root` holds library, templates and target, in a separate git clone.
+    """
 
     workspace: Workspace
     root: Path
@@ -47,7 +50,7 @@ class Edits:
     right: Told
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Kill it, change something, give it again, undo the change, give it again."""
+        """Kill it, change something, repeat it, undo the change, repeat it."""
         chance = random.Random(seed)
         kind = chance.choice([*FILES] * 2 + ["choice"] * 10 + ["commit", "older folder"] * 2)
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -73,7 +76,7 @@ class Edits:
         return [Case(kind=kind, damage=what.split(" of ")[0], reader="run", end=end, story=story)]
 
     def _kill(self, chance: Chance) -> None:
-        """Begin it, and kill it at some moment after its plan was made."""
+        """Start it, and kill it at a random moment after it wrote its plan."""
         run = self.place.run
         words = map(str, ("run", *WORDS, "-n", "2", "--out", run))
         command = Command(self.workspace, run, "-m", "mutator", *words)
@@ -85,7 +88,9 @@ class Edits:
 
     @contextmanager
     def _edited(self, kind: str, chance: Chance) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Within it something is another: what, and more words for the command."""
+        """Apply an edit for the duration of the context; yield its name and additional words for
+        the command.
+        """
         if kind == "choice":
             words = chance.choice(CHOICES)
             yield words[0], words
@@ -117,7 +122,7 @@ class Edits:
 
 
 def commit(root: Path, text: str) -> None:
-    """Make a commit of another file."""
+    """Commit another file."""
     (root / "NOTES").write_text(text)
     who = ("-c", "user.name=a", "-c", "user.email=a@b")
     for words in (("init", "-q"), ("add", "-A"), (*who, "commit", "-q", "-m", text)):
@@ -144,7 +149,9 @@ def test_edits(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A kill, a change, the command, the change undone, the command."""
+    """After a kill and a change, the command gives the right result or refuses; without the change it
+    completes.
+    """
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     monkeypatch.chdir(tmp_path)
     edits = make_edits(toy, tmp_path)

@@ -1,4 +1,4 @@
-"""Whatever stands in a file that people write is read, or refused soon with an error that names a file."""
+"""Any content of a hand-written file is read, or soon refused with an error that names a file."""
 
 import json
 import random
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 HOSTILE = Path(__file__).parents[1] / "toy" / "templates"
 TRIES = 600
-SOON_S = 1.0  # of CPU beyond what a verb takes of files that are in order
+SOON_S = 1.0  # CPU time in addition to that of a verb with valid files
 LONGEST_S = 60  # on a busy machine
 VERBS: dict[str, tuple[str, ...]] = {
     "check": ("check",),
@@ -47,7 +47,7 @@ PATTERNS = {
 
 
 class Inputs:
-    """A library, with templates and target, of which one file is malformed in each case."""
+    """A library, with templates and target; each case has one malformed file."""
 
     def __init__(self, root: Path) -> None:
         self.root, self.home = root, root.with_name("genuine")
@@ -74,7 +74,7 @@ class Inputs:
         return [Case(kind=kind, damage=how, reader=verb, end=end, story=story)]
 
     def _told(self, verb: str) -> tuple[Told, float]:
-        """What a verb says, and the CPU time that it takes, in s."""
+        """A verb's output, and its CPU time in s."""
         began = time.process_time()
         with limited(LONGEST_S):
             code, out, err = cli(*VERBS[verb])
@@ -95,7 +95,7 @@ def test_inputs(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A malformed file, then a verb that may read it."""
+    """A verb reads a malformed file or refuses it by name."""
     root = toy.library.parent
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
     monkeypatch.chdir(tmp_path)

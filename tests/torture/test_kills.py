@@ -1,5 +1,6 @@
-"""Whatever of a command is killed, whenever: the same command, given again, comes to the same results, and
-nothing of the killed one lives on."""
+"""A command killed at any moment, as a whole or in part, reaches the same results when repeated, and leaves
+no process behind.
+"""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -34,7 +35,7 @@ def test_kills(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Kills, then the end of the command."""
+    """The command completes with the undisturbed result after any kills."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name == SHIPPED_RUN else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     scene = next(one for one in scenes(toy, tmp_path / "homes", tmp_path / "case") if one.name == name)

@@ -1,5 +1,6 @@
-"""Whatever mutants do: the command ends in time, ordinary experiments have their results, every engine comes
-to the same verdict, and nothing is left."""
+"""Whatever mutants do, the command ends in time, ordinary experiments have their results, every engine gives
+the same verdict, and nothing is left behind.
+"""
 
 import resource
 from collections.abc import Callable, Sequence
@@ -16,7 +17,7 @@ from .tally import Tally
 pytestmark = pytest.mark.slow
 
 TRIES = 80  # campaigns, of up to three misdeeds each
-MOST_MEMORY = 8 << 30  # of any process, lest the machine suffer from what goes wrong
+MOST_MEMORY = 8 << 30  # of any process, to protect the machine
 
 
 def test_misbehaving(
@@ -27,7 +28,7 @@ def test_misbehaving(
     print_tally: Callable[[Tally | str], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Some misdeeds beside ordinary faults, on some engine."""
+    """Misdeeds do not disturb the ordinary faults next to them, on any engine."""
     monkeypatch.chdir(tmp_path)
     limits = resource.getrlimit(resource.RLIMIT_AS)
     wanted = seeds(TRIES)

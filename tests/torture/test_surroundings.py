@@ -1,5 +1,6 @@
-"""Wherever a campaign is run, it comes to the same bytes, or is refused with what to do about it; and where
-it was refused, the same command comes to them once that is mended."""
+"""In any surroundings a campaign gives the same bytes or is refused with a remedy; once that is applied, the
+same command gives them.
+"""
 
 import random
 import shutil
@@ -29,7 +30,7 @@ REMEDIES = ("to do: ", "expected: ", "resume: ", "the same command")
 
 @dataclass(slots=True, kw_only=True)
 class Elsewhere:
-    """The command in one kind of surroundings, and what it comes to in ordinary ones."""
+    """The command in one kind of surroundings, and its result in ordinary ones."""
 
     name: str
     workspace: Workspace
@@ -42,7 +43,7 @@ class Elsewhere:
         assert self.right.code == 0, self.right.said
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """The command there, then, in ordinary surroundings, the same command in the same folder."""
+        """Run the command there, then the same command in the same folder in ordinary surroundings."""
         chance = random.Random(seed)
         shutil.rmtree(self.at)
         self.at.mkdir()
@@ -92,7 +93,7 @@ def test_surroundings(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The command there, then the command in ordinary surroundings."""
+    """The command in ordinary surroundings completes what it began elsewhere."""
     if name in MOUNTED and not may_mount(tmp_path):
         pytest.skip("needs the right to mount a disk")
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))

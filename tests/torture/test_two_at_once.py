@@ -1,5 +1,6 @@
-"""While a campaign is run, another command begins in its folder: each comes to the right result, or is
-refused as the folder is in use; and the folder ends as it should."""
+"""A second command in the folder of a running campaign: each gives the right result or is refused because the
+folder is in use, and the folder ends up complete.
+"""
 
 import random
 import shutil
@@ -31,7 +32,7 @@ BUSY = ("in use", "run under way", "deleted by another command")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """The command, others that may begin beside it, and what the folder comes to."""
+    """The command, others that may start next to it, and the folder's final state."""
 
     workspace: Workspace
     place: Place
@@ -40,7 +41,7 @@ class Pair:
 
     @property
     def others(self) -> dict[str, tuple[object, ...]]:
-        """Commands that have to do with the folder."""
+        """Commands that use the folder."""
         run, genuine, out = self.place.run, self.place.genuine, self.place.folder / "written"
         experiment = ("--run", run, "--no-plot")
         return {
@@ -60,7 +61,7 @@ class Pair:
         }
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """One begins, then the other; now and then a signal strikes one of them; then the command alone."""
+        """One begins, then the other; sometimes a signal hits one of them; then the command runs alone."""
         chance = random.Random(seed)
         name = chance.choice(sorted(self.others))
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -75,7 +76,7 @@ class Pair:
             if struck.poll() is None:
                 struck.send_signal(chance.choice((*SIGNALS, signal.SIGSTOP)))
                 struck.send_signal(signal.SIGCONT)
-        for one in (other, running):  # of both: what is in the folder is that of either
+        for one in (other, running):  # both: the folder may hold the files of either
             one.process.wait()
         said = {one: one.end() for one in (other, running)}
         ends = [self._judge(one, said[one], name if one is other else "run") for one in both]
@@ -90,7 +91,7 @@ class Pair:
         return [Case(kind=name, damage=f"{len(both)} to their ends", reader="run", end=end, story=story)]
 
     def _judge(self, command: Command, said: str, name: str) -> tuple[End, str]:
-        """How one of them ended: right is also what there is to tell of a run that goes on."""
+        """How one of them ended; output about an unfinished run is valid, too."""
         code = command.process.returncode
         end, why = judged(Told(code=code, said=said), Told(code=0, said=""), [""])
         if end is End.REFUSED and name == "verify" and code == 1:
@@ -114,7 +115,7 @@ def test_two_at_once(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A command beside another, then the first alone."""
+    """Two commands at once do no harm, and the first then completes alone."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     monkeypatch.chdir(tmp_path)
     pair = make_pair(toy, tmp_path)

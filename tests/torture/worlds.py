@@ -1,4 +1,4 @@
-"""Run folders to be damaged: each case gets a copy of one, always in the same place."""
+"""Run folders to damage: each case gets a copy of one, always at the same path."""
 
 import random
 import shutil
@@ -20,19 +20,19 @@ from .readers import TABLES, Place, Reader, Told, expect
 from .tally import Case, End
 
 LONGEST_S = 180  # of a case, on a busy machine
-LAST = 1500  # characters of what a reader said that are told
+LAST = 1500  # characters of a reader's output in the report
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class World:
-    """A folder `home` with run folders, which stays as it is, and what reads the copy of it at `place`."""
+    """A folder `home` with run folders, which stays unchanged, and the readers of its copy at `place`."""
 
     home: Path
     place: Place
     readers: Mapping[str, Reader]
     damages: Sequence[str] = tuple(sorted(DAMAGES))
-    reseal: Callable[[Path], None] | None = None  # computes all digests of a damaged folder anew
-    right: dict[str, Told] = field(default_factory=dict)  # what readers tell of the undamaged folder
+    reseal: Callable[[Path], None] | None = None  # recomputes all digests of a damaged folder
+    right: dict[str, Told] = field(default_factory=dict)  # the readers' output for the undamaged folder
 
     def cases(self, seed: int) -> list[Case]:
         """Damage a file of some kind in some way, and let some reader read the folder."""
@@ -44,7 +44,8 @@ class World:
             kind = chance.choice(sorted(kinds))
             how, touched = damage(self.place.folder, kinds[kind], chance, self.damages)
             told = self._tell(reader) if self.reseal is None else self._resealed(reader)
-        # digests.json speaks of all the others; where all digests fit, another file may be the odd one
+        # digests.json covers all the others; where all digests match, another file may be the inconsistent
+        # one
         at_large = kind == "digests.json" or self.reseal is not None
         touched += TABLES if kind in ("records", "timings") else ()  # they follow from these
         named = ["seal", *kinds, *chain(*kinds.values())] if at_large else touched
@@ -53,8 +54,10 @@ class World:
         return [Case(kind=kind, damage=how, reader=reader, end=end, story=story)]
 
     def _resealed(self, reader: str) -> Told:
-        """What a reader tells of a folder whose digests fit its damage, if it can have any. Whoever knows the
-        seal finds another result out."""
+        """A reader's output for a folder with recomputed digests, if the damage allows that.
+
+        Only the seal reveals another result.
+        """
         assert self.reseal
         with suppress(MutatorError, AttributeError, KeyError, TypeError, ValueError):
             self.reseal(self.place.run)
@@ -85,7 +88,7 @@ class World:
 
 
 def kinds_of(home: Path) -> dict[str, list[str]]:
-    """The files below a folder by kind: those of a folder of a run folder are one kind."""
+    """The files below a folder by kind: the files in one subfolder of a run folder are one kind."""
     found = defaultdict(list)
     for path in sorted(home.rglob("*")):
         if path.is_file():
@@ -95,7 +98,7 @@ def kinds_of(home: Path) -> dict[str, list[str]]:
 
 
 def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
-    """Whether a reader came to the right result, or refused the damaged folder as it should."""
+    """Whether a reader returned the right result, or refused the damaged folder properly."""
     if "Traceback" in told.said or "defect of mutator" in told.said:
         return End.WRONG, "a traceback"
     if told.code == 0:
@@ -129,12 +132,12 @@ def _first(told: object, right: object) -> str:
 
 
 class TooLong(Exception):
-    """Something takes longer than it may. No TimeoutError: that is an OSError, which readers expect."""
+    """Something exceeds its time. Not a TimeoutError: that is an OSError, which readers expect."""
 
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """TooLong where what is within takes longer."""
+    """Raise TooLong if the body takes longer."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise TooLong(f"took more than {seconds} s")
