@@ -191,9 +191,7 @@ def _check_once(model: CampaignModel, source: Source) -> None:
         seen = set[str]()
         for i, value in enumerate(values):
             if value in seen:
-                raise source.error(
-                    (*keys, i), f"'{value}' stands here a second time", remedy="remove one of the two"
-                )
+                raise source.error((*keys, i), f"'{value}' is listed twice", remedy="remove one of the two")
             seen.add(value)
 
 

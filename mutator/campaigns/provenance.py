@@ -69,7 +69,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
         return ()
     found = differences(folder.stretches[-1], machine.python(), _packages(folder))
     if found and not accept:
-        raise other_versions(folder.path, "driven with", found)
+        raise other_versions(folder.path, "run with", found)
     return found
 
 

@@ -46,7 +46,7 @@ def find_study(name: str) -> Study:
         why = f"{type(err).__name__}: {err}"
         raise _refused(name, f"study '{name}' cannot be loaded: {point.value}: {why}", remedy) from err
     if wrong := _wrong(loaded):
-        raise _refused(name, f"study '{name}' is no study: {point.value} {wrong}", remedy)
+        raise _refused(name, f"study '{name}' is not a study: {point.value} {wrong}", remedy)
     return cast(Study, loaded)
 
 
@@ -61,13 +61,13 @@ def study_problems(name: str, study: Study, workspace: Workspace) -> list[Mutato
     except Exception as err:  # third-party code
         return [_bad_check(name, f"fails: {type(err).__name__}: {err}")]
     if strangers := [problem for problem in problems if not isinstance(problem, MutatorError)]:
-        return [_bad_check(name, f"gives {strangers[0]!r}, which is no MutatorError")]
+        return [_bad_check(name, f"returned {strangers[0]!r}, which is not a MutatorError")]
     return problems
 
 
 def _refused(name: str, got: str, remedy: str) -> MutatorError:
     others = [other for other in study_names() if other != name]
-    expected = f"one of {', '.join(others)}" if others else "no study: there is no other"
+    expected = f"one of {', '.join(others)}" if others else "no `study`: no other one is installed"
     return MutatorError(got, expected=expected, remedy=remedy)
 
 

@@ -42,7 +42,7 @@ def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) ->
             known, found = records[name], folder.comparable(single.record)
             if known != found:
                 yield MutatorError(
-                    f"{name} driven again: {equivalence.difference(found, known)}",
+                    f"{name} rerun: {equivalence.difference(found, known)}",
                     where=folder.path,
                     expected="the same record again",
                 )

@@ -214,7 +214,7 @@ def load_fault_models(folder: Path) -> FaultModels:
         model = _load(path)
         models[model.name] = model
     if not models:
-        raise MutatorError("no fault model", where=folder, expected="<model>.yaml beside <model>.py.j2")
+        raise MutatorError("no fault model", where=folder, expected="<model>.yaml next to <model>.py.j2")
     probe = _text(folder / PROBE_TEMPLATE)
     texts = {
         name: [model.template, model.expression] if model.expression else model.template
@@ -233,7 +233,7 @@ def _load(path: Path) -> FaultModel:
     if model.expression is not None and kind is not SnippetKind.INSERT:
         raise source.error(
             ("expression",),
-            f"an expression beside kind {kind.value}",
+            f"`expression` with kind {kind.value}",
             expected="one for kind insert: the template of a `value` is its expression, and a guard has none",
             remedy="leave it out",
         )

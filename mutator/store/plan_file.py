@@ -276,7 +276,7 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         vars(experiment)["id"] = data["id"]  # what the property would compute and keep
     elif experiment.id != data["id"]:
         raise MutatorError(
-            f"what is called experiment {data['id']} is {experiment.id}",
+            f"experiment {data['id']} has the content of {experiment.id}",
             expected="the content that the id was made from",
             remedy=_REMEDY,
         )

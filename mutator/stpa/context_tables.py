@@ -144,7 +144,7 @@ def load_context_table(path: Path, variables: Collection[str] | None = None) -> 
     for name in model.constants:
         if not _CONSTANT.match(name) or name == TIME:
             raise source.error(
-                ("constants", name), f"constant '{name}'", expected="a name of its own in small letters"
+                ("constants", name), f"constant '{name}'", expected="an unused name in lowercase letters"
             )
     rows = tuple(
         ContextRow(

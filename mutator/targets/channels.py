@@ -124,7 +124,7 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
 def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) -> Channel:
     keys = ("channels", name)
     if name == trace.time:
-        raise source.error(keys, f"'{name}'", expected="a channel beside the time", remedy="leave it out")
+        raise source.error(keys, f"'{name}'", expected="a channel other than the time", remedy="leave it out")
     if name in RESERVED:
         raise source.error(
             keys,

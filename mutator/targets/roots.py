@@ -31,7 +31,7 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
         raise source.error(
             ("root",),
             f"no package or module '{name}' is installed here",
-            expected="one that this Python can import, in a folder of its own name or a .py file",
+            expected="one that this Python can import, in a folder of that name or a .py file",
             remedy=pip_install(requires or [name]),
         )
     return place.parent
@@ -80,7 +80,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
                 ("packages", i),
                 f"'{name}'",
                 expected=f"a package, or a module's file such as drive.py, each once, none {PROBE_NAME}",
-                remedy="correct it; what is inside a package needs no mention",
+                remedy="correct it; leave out what is inside a package",
             )
         seen.add(stem)
     return names
@@ -95,14 +95,14 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
         if package.removesuffix(".py") != name:
             raise source.error(
                 ("packages",) if "packages" in source.data else ("package",),
-                f"'{package}' beside {root}",
+                f"'{package}' outside {root}",
                 expected=f"'{name}' alone: other files there belong to other packages",
                 remedy="leave it out; put your own files into an `overlay`",
             )
     for i, glob in enumerate(files):
         if glob != f"{name}.py" and not glob.startswith(f"{name}/"):
             raise source.error(
-                ("files", i), f"'{glob}' beside {root}", expected=f"globs that begin with {name}/"
+                ("files", i), f"'{glob}' outside {root}", expected=f"globs that begin with {name}/"
             )
 
 

@@ -34,7 +34,7 @@ def stop_source(manifest: TargetManifest) -> str:
     for channel in manifest.channels:
         if channel.name in needed and channel.time:
             keys = ("channels", channel.name, "time")
-            raise _refused(manifest, keys, f"{channel.name} has times of its own", "a number in each step")
+            raise _refused(manifest, keys, f"{channel.name} has separate times", "a number in each step")
         if channel.name in needed:
             lines.append(f"    {channel.name} = float(recorded[{channel.in_trace!r}])")
     lines += [f"    {v.name} = {to_code(v.text, number=True)}" for v in derived if v.name in needed]

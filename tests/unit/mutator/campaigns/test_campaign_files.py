@@ -50,11 +50,11 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
     [
         ("campaign/1", "campaign/2", 1, "newer version"),
         ("name: mine", "name: My Campaign", 2, "My Campaign"),
-        ("[A, B]", "[A, B, A]", 5, "'A' stands here a second time"),
+        ("[A, B]", "[A, B, A]", 5, "'A' is listed twice"),
         ("[A, B]", "[]", 5, "scenarios"),
         ("values: 2", "values: 0", 8, "values"),
         ("values: 2", "value: 2", 8, "unknown key 'value'"),
-        ("[guided, random]", "[guided, guided]", 9, "second time"),
+        ("[guided, random]", "[guided, guided]", 9, "listed twice"),
         ("[guided, random]", "[guided, chance]", 9, "chance"),
         ("random_until_s: 5.0", "random_until_s: 1.0", None, "later than armed_after_s"),
         ("random_until_s: 5.0", "random_until: 5.0", None, "random_until"),
@@ -67,7 +67,7 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
         ("random_until_s: 5.0", "random_until_s: 1.0e+300", 13, "random_until_s"),
         ("random_until_s: 5.0", "random_until_s: .inf", 13, "random_until_s"),
         ("seed: 3", "seed: 3\nchunk: 0", 15, "chunk"),
-        ("seed: 3", "seed: 3\nseed: 4", 15, "second time"),
+        ("seed: 3", "seed: 3\nseed: 4", 15, "duplicate key"),
     ],
 )
 def test_mistakes_are_told_with_their_line(
@@ -126,7 +126,7 @@ def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
         made = make_plan(toycar, path, Choices(reading=name)).experiments
         assert {experiment.setting for experiment in made} == {expected[name]}
     twice = in_library(toycar, "methods:", "setting: {as_coded: [alone, alone]}\nmethods:")
-    with pytest.raises(MutatorError, match=r"mine\.yaml:9: 'alone' stands here a second time"):
+    with pytest.raises(MutatorError, match=r"mine\.yaml:9: 'alone' is listed twice"):
         load_campaign(twice)
 
 

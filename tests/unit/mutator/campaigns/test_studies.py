@@ -77,12 +77,12 @@ STRANGERS = {
     "malformed": ("not an object!", "cannot be loaded"),
     "function": (
         "json:dumps",
-        "is no study: json:dumps is a function without about, panels, check, published, drawings",
+        "is not a study: json:dumps is a function without about, panels, check, published, drawings",
     ),
-    "module": ("json", "is no study: json is a module without"),
-    "unmade": ("mutator.report.studies:Study", "is no study: mutator.* is a class, not an object of it"),
-    "idle": ("strange_studies.idle:STUDY", "is no study: .*:STUDY has no function check;"),
-    "paneless": ("strange_studies.idle:PANELESS", "is no study: .* has panels that are not functions;"),
+    "module": ("json", "is not a study: json is a module without"),
+    "unmade": ("mutator.report.studies:Study", "is not a study: mutator.* is a class, not an object of it"),
+    "idle": ("strange_studies.idle:STUDY", "is not a study: .*:STUDY has no function check;"),
+    "paneless": ("strange_studies.idle:PANELESS", "is not a study: .* has panels that are not functions;"),
 }
 MADE = """
 from types import SimpleNamespace
@@ -97,7 +97,7 @@ TALKING = SimpleNamespace(about="", check=lambda _: ["oh"], published=nothing, p
 """
 BAD_CHECKS = {
     "failing": ("strange_studies.idle:FAILING", "fails: ZeroDivisionError: division by zero"),
-    "talking": ("strange_studies.idle:TALKING", "gives 'oh', which is no MutatorError"),
+    "talking": ("strange_studies.idle:TALKING", "returned 'oh', which is not a MutatorError"),
 }
 
 
@@ -181,7 +181,7 @@ def test_a_run_opens_without_its_study(
     folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
     monkeypatch.setattr(studies, "entry_points", EntryPoints().select)
     assert load_plan(folder).campaign.study == "crash_tests"
-    with pytest.raises(MutatorError, match="'crash_tests' is not installed; expected no study"):
+    with pytest.raises(MutatorError, match="'crash_tests' is not installed; expected no `study`"):
         make_plan(toycar, "small")
 
 

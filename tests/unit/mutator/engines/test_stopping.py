@@ -142,7 +142,7 @@ def test_a_drive_that_ends_after_the_fault_where_golden_ends(
         (
             "speed: {unit: m/s, role: truth}",
             "speed: {unit: m/s, role: truth, time: own}",
-            "speed has times of its own; expected a number in each step",
+            "speed has separate times; expected a number in each step",
         ),
         ("  stepwise: begin\n", "", "no `stepwise`"),
     ],

@@ -145,7 +145,12 @@ def test_what_does_not_fit_together_is_refused(
         ),
         (UNSAFE, "contexts: [accelerate_decelerate/C3]", "contexts: [accelerate_decelerate/C1]", "in accel"),
         (PEDALS, "provided: H1", "provided: null", "expected what accelerate_decelerate.yaml says there"),
-        (PEDALS, "accelerate: {provided: null", "accelerate: {provided: H1", "is no unsafe control action"),
+        (
+            PEDALS,
+            "accelerate: {provided: null",
+            "accelerate: {provided: H1",
+            "is not an unsafe control action",
+        ),
         (FACTORS, "RadarSensor.measure", "RadarSensor.measures", "did you mean 'RadarSensor.measure'"),
         (FACTORS, "faults: [radar/chaff]", "faults: [radar/chuff]", "did you mean 'radar/chaff'"),
         (

@@ -66,7 +66,7 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
     ("right", "wrong", "got", "known"),
     [
         ("schema: target/2", "schema: target/9", "target/9", "target/2"),
-        ("step_s: 0.1", "step_s: 0.1\nstep_s: 0.2", "second time", "once"),
+        ("step_s: 0.1", "step_s: 0.1\nstep_s: 0.2", "duplicate key", "once"),
         ("step_s: 0.1", "steps: 0.1", "unknown key 'steps'", "step_s"),
         ("step_s: 0.1", "step_s: fast", "'fast'", "number"),
         ("root: tree", "root: installed:no_such_package", "no_such_package", "import"),

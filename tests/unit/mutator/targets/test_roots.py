@@ -68,7 +68,7 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
         ({"root": "'installed:a.b'", "packages": "[a]"}, "2: 'installed:a.b'; expected installed: and the"),
         (
             {"root": "installed:filters_of_poles", "packages": "[filters_of_poles, aside_of_poles.py]"},
-            "3: 'aside_of_poles.py' beside installed:filters_of_poles; expected 'filters_of_poles' alone",
+            "3: 'aside_of_poles.py' outside installed:filters_of_poles; expected 'filters_of_poles' alone",
         ),
         (
             {
@@ -76,7 +76,7 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
                 "packages": "[filters_of_poles]",
                 "files": '["**/*.py"]',
             },
-            r"4: '\*\*/\*.py' beside installed:filters_of_poles; expected globs that begin with",
+            r"4: '\*\*/\*.py' outside installed:filters_of_poles; expected globs that begin with",
         ),
     ],
 )
