@@ -150,7 +150,7 @@ def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
                     if hazard and (f"{table.name}/{row.id}", action, category, hazard) not in known:
                         yield table.source.error(
                             ("contexts", row.id, "actions", action, category.value),
-                            f"{hazard} from {action} {category} in '{row.id}' is not an unsafe control action",
+                            f"{hazard} by {action} {category} in '{row.id}' is not an unsafe control action",
                             remedy=f"add it to {analysis.unsafe_source.path.name}, or write null",
                         )
 
