@@ -112,12 +112,10 @@ def report(page: Any, path: Path, name: str) -> None:
     film(page, "replay" + name)
 
 
-def static(page: Any, address: str, name: str, begin: str = "body", below: str = "body") -> None:
-    """The first screen of a page; on a narrow one from `begin` on, below what stays at the top."""
+def static(page: Any, address: str, name: str) -> None:
+    """The first screen of a page."""
     page.goto(address)
     page.wait_for_load_state("networkidle")
-    if page.viewport_size == WIDTHS["narrow"]:
-        show(page, begin, below=below)
     save(page.screenshot(), name)
 
 
