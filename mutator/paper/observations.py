@@ -27,7 +27,7 @@ class Verdict(StrEnum):
 
     HOLDS = "holds"
     FAILS = "does not hold"
-    UNDECIDED = "cannot be told"
+    UNDECIDED = "not enough data"
 
 
 class Rule(StrictModel):

@@ -7,14 +7,14 @@ from mutator.paper.observations import FEWEST, JudgedClaim, JudgedObservation
 from mutator.statistics.sheet import Cell, Sheet
 
 RULES = f"""\
-A claim is decided by the 95 % interval of its number, not by the number. *above x*: it holds if the whole
-interval lies above x, and does not hold if it lies below; *below x* and *within x* (of plus and minus x)
-likewise; with fewer than {FEWEST} runs it cannot be told. *some x*: it holds once one run shows it; *never
-x*: it does not hold once one run shows it; if none does, the opposite is said only if the interval ends at
-x or below. Where a claim has groups it must hold in each. A claim about all faults cannot be told from a
-run that lacks fault types of the paper or is not complete. An observation holds if all claims that it rests
-on hold, does not hold if one of them does not, and cannot be told otherwise. The intervals take runs as
-independent, except where whole faults are resampled; they are the least uncertainty there is."""
+The 95 % interval of a claim's number decides the claim, not the number. *above x*: the claim holds if the
+whole interval lies above x, and does not hold if it lies below; *below x* and *within x* (plus or minus x)
+likewise. With fewer than {FEWEST} runs there is not enough data. *some x*: the claim holds if one run shows
+it. *never x*: it does not hold if one run shows it. If no run shows it, the opposite verdict needs an
+interval that ends at x or below. A claim with groups must hold in each group. A claim about all faults
+needs a complete run with all fault types of the paper. An observation holds if all claims that it rests on
+hold, and does not hold if one of them does not; otherwise there is not enough data. The intervals treat
+runs as independent, except where whole faults are resampled, so the true uncertainty is at least as large."""
 
 SESSION = """\
 from mutator.paper.measures import *

@@ -145,7 +145,7 @@ def test_each_rule_reaches_each_verdict(rule: Rule, found: Estimate, verdict: Ve
 
 
 def test_an_observation_holds_if_all_it_rests_on_does() -> None:
-    """One claim against it is enough; one that cannot be told leaves the rest open."""
+    """One claim against it is enough; one without enough data leaves the rest open."""
     assert together([HOLDS, HOLDS]) is HOLDS
     assert together([HOLDS, UNDECIDED]) is UNDECIDED
     assert together([UNDECIDED, FAILS]) is FAILS
@@ -153,7 +153,7 @@ def test_an_observation_holds_if_all_it_rests_on_does() -> None:
 
 
 def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, JudgedClaim]) -> None:
-    """From a run of another mixture it cannot be told, whatever its number; others can be."""
+    """A run of another mixture lacks the data for it, whatever its number; other claims are decided."""
     frame = of_rows(*[ACTIVATED] * 200, *[ACTIVATED | {"t_h1": 9.0, "t_h3": 8.0}] * 20)
     first = judge(FILE, frame, ["a type is missing", "5 are left"])[0].claims
     assert table_2["1.1"].verdict is HOLDS

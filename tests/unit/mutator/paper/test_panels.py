@@ -52,7 +52,7 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         run = ReportedRun(folder=folder, workspace=toycar, texts=texts, frame=frame, study=None, seen=SEEN)
         assert observations_panel(run) is not None
         text = (folder.path / "report" / "observations.md").read_text()
-        why = f"cannot be told: only {done} of the 12 experiments of the plan have been run"
+        why = f"not enough data: only {done} of the 12 experiments of the plan have been run"
         assert text.count(why) == (0 if done == 12 else of_all)
 
 
