@@ -1,10 +1,10 @@
-"""A campaign by this version and by an older one: `python benchmarks/against.py CLONE [--campaign NAME]`.
+"""Compare a campaign by this version and by an older one: `python benchmarks/against.py CLONE [--campaign
+NAME]`.
 
-CLONE is a checkout of the older commit, installed into its .venv as its README says. Both run in turn, each
-time with an empty cache. What an old version compiles by a command of its own is compiled before its clock
-starts. CPU time is that of
-all processes. Wall time needs cores that nobody else uses. The parts are the stages that the command tells
-of; idle is the time of cores that had nothing to do. Exit code 1 when a run fails.
+CLONE is a checkout of the older commit, installed into its .venv as its README says. Both run alternately,
+each time with an empty cache. Code that an old version compiles with a separate command is compiled before
+its clock starts. CPU time covers all processes. Wall time needs otherwise idle cores. The parts are the
+stages that the command reports; idle is the time of cores without work. Exit code 1 when a run fails.
 """
 
 import argparse
@@ -28,10 +28,10 @@ Parts = dict[str, dict[str, float]]  # by stage: wall_s, cpu_s
 
 
 def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
-    """Run a campaign with the version of `clone` and nothing kept; what each part of it takes."""
+    """Run a campaign with the version of `clone` and no caches; return the time of each part."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
-        # older versions keep pictures, detections and helpers in ~/.cache, whatever XDG_CACHE_HOME says
+        # older versions keep frames, detections and helpers in ~/.cache, whatever XDG_CACHE_HOME says
         env = os.environ | {"HOME": place, "XDG_CACHE_HOME": f"{place}/.cache"}
         if clone != ROOT:
             compile_helpers(python, clone, env)
@@ -41,7 +41,7 @@ def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
 
 
 def compile_helpers(python: str, clone: Path, env: dict[str, str]) -> None:
-    """Compile what an older version compiles by a command, into the cache that its runs look into."""
+    """Compile the helpers of an older version into the cache that its runs use."""
     command, env = [python, *HELPERS], env | {"PYTHONPATH": str(clone / "target")}
     said = subprocess.run([*command, "--help"], env=env, capture_output=True, text=True)
     if "--cache" in said.stdout:
@@ -49,7 +49,7 @@ def compile_helpers(python: str, clone: Path, env: dict[str, str]) -> None:
 
 
 def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:
-    """What each stage of a command takes, from when its lines name it to when they name the next."""
+    """The time of each stage of a command, from the line that names it to the next stage's line."""
     parts = {stage: {"wall_s": 0.0, "cpu_s": 0.0} for stage in STAGES}
     stage, line, since, used = STAGES[0], "", time.monotonic(), 0.0
 
@@ -99,7 +99,7 @@ def cpu_of(root: int) -> float:
 
 
 def show(parts: dict[str, Parts], workers: int) -> None:
-    """Print what each part took in both versions, and how long cores had nothing to do."""
+    """Print the time of each part in both versions, and how long cores were idle."""
     print(f"{'':14}" + "".join(f"{name:>9} wall s    CPU s   idle s" for name in parts) + "     CPU ratio")
     for stage in (*STAGES, WHOLE):
         cells = ""

@@ -1,9 +1,8 @@
 """Whole campaigns with one worker and with two: `python benchmarks/campaigns.py [--campaign paper_smoke]`.
 
-Checks, experiments, proof, tables and report, by the command a user gives; CPU time is that of all processes.
-An uncounted run comes first, so that what is kept between runs (frames, detections, passed checks) is there
-for both; then they take turns. Wall time needs cores that nobody else uses. Exit code 1 when a run fails or
-the results are not the same bytes.
+Checks, experiments, proof, tables and report, by the user's command; CPU time covers all processes. An
+uncounted run first fills the caches (frames, detections, passed checks) for both; then they alternate. Wall
+time needs otherwise idle cores. Exit code 1 when a run fails or the results differ in a byte.
 """
 
 import argparse
@@ -22,7 +21,7 @@ WORKERS = (1, 2)
 
 
 def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str, float]:
-    """Run a campaign into the new folder `out`; wall and CPU seconds."""
+    """Run a campaign into the new folder `out`; return wall and CPU seconds."""
     command = [sys.executable, "-m", "mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
     before, began = _cpu(), time.monotonic()
     subprocess.run([*command, *more], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
@@ -30,7 +29,7 @@ def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str
 
 
 def _cpu() -> float:
-    """CPU time (s) of all that this process waited for, and of all that those waited for."""
+    """CPU time (s) of this process's finished children and their descendants."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -1,8 +1,8 @@
-"""What `mutator check --drive` takes beside golden runs: CPU time of the command, less three of them.
+"""What `mutator check --drive` takes in addition to golden runs: CPU time of the command, less three of them.
 
 `python benchmarks/check_drive.py [--rounds N]`. Each round times the command for one scenario of the shipped
-target, and then three golden runs, each a process of its own; the children's CPU time counts. Exit code 1
-where the least difference is above the goal.
+target, then three golden runs, each in its own process, by the children's CPU time. Exit code 1 if the least
+difference is above the goal.
 """
 
 import argparse

@@ -1,11 +1,9 @@
-"""Work dealt out to a cluster: `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`.
+"""Campaigns on a cluster: `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`.
 
-`overhead`: CPU time of a campaign on two Dask workers of this machine and on two local ones, with warm
-caches, in turn; that of all processes. `intake`: results a second that the command takes in from two
-workers, with patches and series of usual size, from an engine that costs nothing. `ends`: when 64 made-up
-workers come to the end of 10,000 experiments that take as long as those of a campaign: the last one beside
-their mean.
-Without a name all three.
+`overhead`: CPU time of all processes for a campaign on two local Dask workers and on two local workers, with
+warm caches, alternately. `intake`: results a second that the command takes in from two workers, with patches
+and series of usual size, from an engine that takes no time. `ends`: when 64 made-up workers finish 10,000
+experiments with a campaign's durations: the last one compared with their mean. Without a name, all three.
 """
 
 import argparse
@@ -44,8 +42,8 @@ from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
 WORKERS, EXPERIMENTS = 64, 10_000
-GOLDEN_S = 1.2  # a worker takes that much to drive a golden run
-RECORD = {  # one as a campaign has most of
+GOLDEN_S = 1.2  # of CPU for a worker's golden run
+RECORD = {  # the most frequent kind in a campaign
     "activation": {"count": 1200, "first": 4.11, "last": 16.1},
     "alerts": [["fcw", 9.81]],
     "detail": "",
@@ -64,7 +62,7 @@ PR_SET_CHILD_SUBREAPER = 36  # of prctl: orphans become children of this process
 
 
 def overhead(campaign: str, rounds: int) -> None:
-    """CPU time on a cluster of this machine's beside that of local workers."""
+    """CPU time on a cluster of this machine, compared with local workers."""
     took: dict[str, list[float]] = {"local": [], "cluster": []}
     options = {"local": ["-n", "2"], "cluster": ["-n", "2", "--cluster", "local:2"]}
     with tempfile.TemporaryDirectory() as place:
@@ -84,7 +82,7 @@ def overhead(campaign: str, rounds: int) -> None:
 
 
 def cpu_s(command: list[str], env: dict[str, str]) -> float:
-    """s of CPU of a command and of all that it starts, also of what outlives the process that started it."""
+    """CPU time (s) of a command and all its descendants, including those that outlive their parent."""
     ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run(command, cwd=ROOT, env=env, capture_output=True, check=True)
@@ -97,14 +95,14 @@ def cpu_s(command: list[str], env: dict[str, str]) -> float:
 
 @contextmanager
 def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[Pending, ...]]]:
-    """A frozen plan of 11,280 experiments; nothing is driven."""
+    """A frozen plan of 11,280 experiments, without running anything."""
     workspace = Workspace.find(ROOT)
     with tempfile.TemporaryDirectory() as place:
         folder = freeze(make_plan(workspace, name), Path(place) / "run", workspace)
         yield workspace, folder, pending(folder, {})
 
 
-# What a worker is asked to do, by an engine that costs nothing. Dask sends these functions as they are.
+# A worker's task with an engine that takes no time. Dask sends these functions as they are.
 
 
 def facts(packages: Any) -> dict[str, Any]:
@@ -127,7 +125,7 @@ def leave(run: str) -> None:
 
 
 def work(run: str, data: bytes) -> bytes:
-    """What a piece would come to."""
+    """The made-up result of a piece of work."""
     piece = Piece.of(data)
     line = json.dumps({"experiment_id": "@"} | RECORD, separators=(",", ":")).encode()
     timing = b'{"cpu_s":0.3,"engine":"fork","experiment_id":"@","host":"here","wall_s":0.3,"worker":"w"}'
@@ -145,7 +143,7 @@ def work(run: str, data: bytes) -> bytes:
 
 
 def intake() -> None:
-    """Results a second that the command takes in."""
+    """Measure the results a second that the command takes in."""
     for fake in (facts, deliver, attend, leave, work):
         setattr(dask_side, fake.__name__, fake)
     with planned() as (workspace, folder, left):
@@ -188,7 +186,7 @@ def intake() -> None:
 
 
 def ends(seed: int) -> None:
-    """When made-up workers come to the end."""
+    """Simulate when made-up workers finish."""
     with planned() as (_, folder, left):
         some, count = [], 0
         for one in left:
@@ -205,7 +203,7 @@ def ends(seed: int) -> None:
 def simulated(
     folder: RunFolder, left: Sequence[Pending], draw: random.Random
 ) -> tuple[list[float], float, int]:
-    """When each worker did its last work, how long all worked, and how many pieces there were."""
+    """When each worker finished its last piece, their total working time, and the number of pieces."""
     now = [0.0]
     board = Board(folder, left, (), now=lambda: now[0])
     names = [f"w{number}" for number in range(WORKERS)]

@@ -1,7 +1,7 @@
-"""What compiled helpers save: runs of 30 s without and with them, in turn, whose traces must be the same.
+"""What compiled helpers save: runs of 30 s without and with them, alternately, with identical traces.
 
-`python benchmarks/compiled.py [--rounds N] [--json FILE]`; it compiles them into a folder of its own first.
-CPU time of this process in one thread; medians, and the ratio of these. Exit code 1 where a trace differs.
+`python benchmarks/compiled.py [--rounds N] [--json FILE]`; it first compiles them into a separate folder. CPU
+time of this process in one thread; medians and their ratio. Exit code 1 if a trace differs.
 """
 
 import argparse
@@ -28,7 +28,7 @@ KINDS = (None, *DETECTORS)
 
 
 def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
-    """CPU seconds and the trace of one run whose pictures nobody has seen before."""
+    """CPU seconds and the trace of one run with frames that no run has seen before."""
     (cache / FILE).unlink(missing_ok=True)
     compiled.use(helpers)
     pictures = Pictures(detector=kind, cache=cache) if kind else None

@@ -1,11 +1,11 @@
-"""What ending runs early could save: of those whose fault is over and that are golden's again.
+"""What ending runs early could save, once the fault is over and the run is the golden run's again.
 
-`python benchmarks/converged.py RUN [--json FILE]`. A fork whose state equals golden's after its fault is over
-could end there with golden's rest. This prints an upper bound of what that saves, as a share of the CPU of
-all runs: of a run whose trace has golden's bytes everything after the last activation counts as saved, of the
-others everything after that from which on no channel of the series (six digits, 20 values a second) differs
-from golden. Equal channels are needed for equal states, and do not suffice; and as long as a fault may act
-again, what it has done so far says nothing of what it will do.
+`python benchmarks/converged.py RUN [--json FILE]`. A fork with the golden run's state after its fault is over
+could end there and take the rest from the golden run. This prints an upper bound of the saving, as a share of
+the CPU of all runs. If a trace has the golden run's bytes, everything after the last activation counts as
+saved; otherwise, everything after the last difference from golden in any channel of the series (six digits,
+20 values a second). Equal channels are necessary for equal states, but not sufficient; and while a fault may
+act again, its past does not predict its future.
 """
 
 import argparse
@@ -32,20 +32,20 @@ from mutator.workspace import Workspace  # noqa: E402
 
 WORTH_IT = 0.02  # of the CPU
 _LAST_S = (
-    0.06  # a fault that was active so shortly before the end was so to the end: it may act in each 5th step
+    0.06  # a fault active this shortly before the end was active to the end: it may act in each 5th step
 )
 
 
 @dataclass
 class Saved:
-    """Runs, and CPU (s) that could be saved, by the kind of run."""
+    """Runs, and the CPU (s) that could be saved, by the kind of run."""
 
     runs: Counter[str] = field(default_factory=Counter)
     cpu_s: Counter[str] = field(default_factory=Counter)
 
 
 def last_difference(golden: Series, faulty: Series) -> float:
-    """Time (s) of the last sample or point in which a channel differs from golden; -inf: none does."""
+    """Time (s) of the last sample or point where a channel differs from golden; -inf: none does."""
     last = -math.inf
     for number, (one, other) in enumerate(zip(golden.rows, faulty.rows, strict=True)):
         times, known = faulty.times(number), golden.times(number)
@@ -61,7 +61,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
 
 
 def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
-    """What could be saved of a campaign at most, and the CPU (s) of all its runs."""
+    """An upper bound of what a campaign could save, and the CPU (s) of all its runs."""
     manifest, series = workspace.manifest(folder.head["target"]), SeriesFolder(folder.path)
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
@@ -80,7 +80,7 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
 
 
 def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
-    """The kind of a run, and which share of what was driven of it could be saved."""
+    """The kind of a run, and the share of its simulation that could be saved."""
     found, active = series.read(record.experiment_id), record.activation
     if found is None or active is None:
         return "without a series", 0.0

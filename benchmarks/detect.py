@@ -1,9 +1,9 @@
-"""What the paper's lane detector costs: `python benchmarks/detect.py [--repeat N]`.
+"""The paper's lane detector's CPU time: `python benchmarks/detect.py [--repeat N]`.
 
-Prints the median CPU time (ms, one thread) of a detection, compiled and in readable Python, and of the steps
-of the latter, on the rendered road: clean, and with rain, snow and noise that fill it with edges. A run of
-30 s makes 600 detections. The last column is the detection as a run has it (the compiled one, or Python's
-where nothing is compiled) over its goal. Exit code 1 where one misses it.
+Prints the median CPU time (ms, one thread) of a detection, compiled and in readable Python, and of the
+latter's steps, on the rendered road: clean, and with rain, snow and noise that fill it with edges. A run of
+30 s makes 600 detections. The last column is the detection that a run uses (compiled, or Python's if nothing
+is compiled) over its goal. Exit code 1 if one misses it.
 """
 
 import argparse
@@ -41,7 +41,7 @@ COLUMNS = "compiled", "Python", "hog", "edges", "dbscan", "lines", "edge pixels"
 
 
 def median_ms(work: Callable[[], object], repeat: int) -> float:
-    """Median CPU time of `work` over many repeats: what others do on the machine does not count."""
+    """Median CPU time of `work` over many repeats, unaffected by other work on the machine."""
     times = []
     for _ in range(repeat):
         start = time.thread_time()
@@ -51,7 +51,7 @@ def median_ms(work: Callable[[], object], repeat: int) -> float:
 
 
 def pictures(model: CameraModel) -> dict[str, np.ndarray]:
-    """The same moment on the road, in fair weather and foul."""
+    """Frames of the same moment on the road, in fair weather and foul."""
     clean = RoadRenderer(model, "solid", 0).grey(3.0)
     moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
     found = {"clean": clean}
@@ -64,8 +64,9 @@ def pictures(model: CameraModel) -> dict[str, np.ndarray]:
 
 
 def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]:
-    """Medians (ms) of the detection compiled (no number where it is not) and in Python, and of the steps of
-    the latter with every edge that is steep; edge pixels."""
+    """Medians (ms) of the detection, compiled (NaN if it is not) and in Python, and of the latter's steps
+    with every steep edge; the number of edge pixels.
+    """
     fast, plain, region = build_paper_detector(model), PaperDetector(model), RoadRegion(model)
     view = CameraView(0.0, 0.0, 0.0, (), 0.0, picture)
     hog, lines = Hog(*region.shape), EdgeLines(model, region)
@@ -84,7 +85,7 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
 
 
 def main() -> int:
-    """Print the table; 1 if a detection takes longer than it may."""
+    """Print the table; return 1 if a detection exceeds its goal."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeat", type=int, default=300, help="detections for each median")
     repeat = parser.parse_args().repeat

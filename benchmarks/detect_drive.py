@@ -1,9 +1,8 @@
-"""How long the geometric detector, and the one as coded, take for a picture: medians over a drive.
+"""The geometric detector's and the as-coded detector's time for a frame: medians over a drive.
 
-`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core and clean as in bad weather. What is
-compiled is used, but with `--plain`; the last column says for each whether it was. Times are of this process,
-so other work on the machine matters little, but for the caches it shares. Exit code 1 where a median is above
-its goal.
+`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core, in clean and in bad weather. It uses
+compiled code unless given `--plain`; the last column says whether it did. Times are of this process, so other
+work on the machine matters little, except through shared caches. Exit code 1 if a median is above its goal.
 """
 
 import argparse
@@ -36,12 +35,12 @@ from selfdrive.visiond.robust_detector import RobustDetector  # noqa: E402
 # weather, amount, goal for the median (ms)
 ROBUST = ((None, 0.0, 2.5), ("PaperRain", 10.0, 4.0), ("PaperSnow", 10.0, 4.0), ("Rain", 100.0, 4.0))
 CODED = ((None, 0.0, 3.0), ("CodedRain", 10, 3.0), ("CodedSnow", 10, 3.0), ("CodedOcclusion", 10, 3.0))
-STEP = 1.342  # m between pictures
-DIFFERENT = 40  # pictures of a drive
+STEP = 1.342  # m between frames
+DIFFERENT = 40  # frames of a drive
 
 
 class Moment(NamedTuple):
-    """What effects know of the world."""
+    """What effects know about the world."""
 
     t: float
     position: float
@@ -49,7 +48,7 @@ class Moment(NamedTuple):
 
 
 def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
-    """The pictures of two seconds."""
+    """The frames of two seconds."""
     camera = CameraModel()
     road = RoadRenderer(camera, marks, 0)
     pictures = [road.grey(STEP * k) for k in range(DIFFERENT)]
@@ -63,7 +62,7 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
 
 
 def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], repeat: int) -> list[float]:
-    """CPU time (ms) of each detection, the first of all being the only one without a past."""
+    """CPU time (ms) of each detection; only the very first has no past."""
     found = []
     for k in range(repeat):
         view = CameraView(

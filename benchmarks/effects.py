@@ -1,8 +1,8 @@
-"""How long image effects take for a picture: medians over a drive, mild and strong, for the default camera.
+"""Image effects' time for a frame: medians over a drive, mild and strong, for the default camera.
 
-`python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core. What is compiled is used, but
-with `--plain`; the last column says of each effect whether any of it was. Times are of this process, so other
-work on the machine matters little, but for the caches it shares. Exit code 1 where a median is above 3 ms.
+`python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core. It uses compiled code unless
+given `--plain`; the last column says for each effect whether any of it was. Times are of this process, so
+other work on the machine matters little, except through shared caches. Exit code 1 if a median is above 3 ms.
 """
 
 import argparse
@@ -25,11 +25,11 @@ from selfdrive.sim.compile_helpers import FOLDER  # noqa: E402
 from selfdrive.sim.effects.levels import LEVELS  # noqa: E402
 from selfdrive.sim.road_renderer import RoadRenderer  # noqa: E402
 
-GOAL = 3.0  # ms a picture
+GOAL = 3.0  # ms a frame
 
 
 class Moment(NamedTuple):
-    """What effects know of the world."""
+    """What effects know about the world."""
 
     t: float
     position: float

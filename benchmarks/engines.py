@@ -1,10 +1,10 @@
 """Reference, warm and fork engine on the same experiments of the paper's campaign, half guided, half random.
 
 `python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. CPU time (user and
-system) of this process and of all that it starts; golden runs and what is done once for a campaign (loading
-the target, one look at each golden run) are counted separately. With `--library DIR --campaign NAME` those of
-another library: of an example, say, where a step costs so little that the overhead shows. Exit code 1 when
-records differ, or when the fork engine costs more than its goals.
+system) of this process and all its children; golden runs and work done once for a campaign (loading the
+target, observing each golden run) are counted separately. `--library DIR --campaign NAME` uses another
+library, such as an example with steps so fast that the overhead shows. Exit code 1 when records differ, or
+when the fork engine exceeds its goals.
 """
 
 import argparse
@@ -32,17 +32,17 @@ from mutator.store.run_folder import GoldenRun  # noqa: E402
 from mutator.triggers.kinds import always  # noqa: E402
 from mutator.workspace import Workspace  # noqa: E402
 
-GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time that remains after activation
+GOAL_OF_WARM = 1.15  # fork's CPU over warm's times the share of simulated time after activation
 GOAL_OF_REFERENCE = 1 / 3
 
 
 @dataclass
 class Measured:
-    """What an engine cost (s of CPU), and what it found."""
+    """An engine's CPU time (s) and its records."""
 
     cpu_s: float = 0.0
-    children_s: float = 0.0  # of it, the runs themselves
-    steps: int = 0  # that the runs drove
+    children_s: float = 0.0  # the part for the runs themselves
+    steps: int = 0  # steps that the runs simulated
     how: Counter[str] = field(default_factory=Counter)
     why: Counter[str] = field(default_factory=Counter)
     records: dict[str, Record] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class Bench:
         return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
-        """Steps of the golden run, which all that end well have."""
+        """Steps of the golden run, which every run that ends well has."""
         trace = golden.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
@@ -89,7 +89,7 @@ class Bench:
             execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
-        """What an engine took for all of the experiments, and what it took beforehand for each golden run."""
+        """An engine's time for all the experiments, and beforehand for each golden run."""
         engine = self.engines[name]()
         runner = Runner(
             self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario
@@ -98,7 +98,7 @@ class Bench:
         before = _cpu()
         for key in firsts:
             list(runner.run([key]))
-        engine.close()  # only then are its processes counted
+        engine.close()  # its processes are counted only after that
         first_s = _cpu() - before
         before, measured = _cpu(), Measured()
         for finished in runner.run(sorted(experiments, key=lambda e: (e.scenario, e.changes, e.method))):
@@ -117,7 +117,7 @@ class Bench:
 
 
 def _cpu() -> float:
-    """CPU time (s) of this process and of those it waited for."""
+    """CPU time (s) of this process and its finished children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 

@@ -1,9 +1,9 @@
-"""How cost and memory grow with the campaign: plans of 1,000 to 50,000 experiments, a table of 100,000, and
+"""Growth of time and memory with the campaign: plans of 1,000 to 50,000 experiments, a table of 100,000, and
 opening the paper's 11,280.
 
-`python benchmarks/growth.py [--json FILE]`. Each size has a process of its own, as the most memory that a
-process ever had is what is asked: it plans and freezes, or does what a worker does before and after each run
-(reads its chunk, builds the mutant, appends the record). Times are CPU. Exit code 1 where a goal is missed.
+`python benchmarks/growth.py [--json FILE]`. Each size runs in its own process, because the peak memory of a
+process is measured: it plans and freezes, or does a worker's work before and after each run (read the chunk,
+build the mutant, append the record). Times are CPU. Exit code 1 if a goal is missed.
 """
 
 import argparse
@@ -45,7 +45,7 @@ MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 
 
 def plan_of(workspace: Workspace, size: int) -> Plan:
-    """The paper's campaign, in so many scenarios as are needed, cut to size."""
+    """The paper's campaign, in as many scenarios as needed, cut to size."""
     text = workspace.campaign("paper").read_text()
     names = list(workspace.scenarios)
     scenarios = names[: -(-size // 2256)]  # a scenario has 282 faults, 4 contexts and 2 methods
@@ -59,7 +59,7 @@ def plan_of(workspace: Workspace, size: int) -> Plan:
 
 
 def record(experiment: Experiment, number: int) -> Record:
-    """A made-up record, such that all columns are filled in some rows and empty in others."""
+    """A made-up record, so that every column is filled in some rows and empty in others."""
     active, hazard = number % 5 > 0, number % 10 > 6
     return Record(
         experiment_id=experiment.id,
@@ -84,14 +84,14 @@ def _channels() -> tuple[str, ...]:
 
 
 def _left(number: int) -> tuple[tuple[str, float, float], ...]:
-    """Almost every channel has left golden, each at a time of its own."""
+    """Almost every channel has left golden, each at another time."""
     start = 2.05 + number % 997 / 100
     names = [name for place, name in enumerate(_channels()) if (number + place) % 7]
     return tuple((name, start + place / 100, number / (7 + place)) for place, name in enumerate(names))
 
 
 def most_mb() -> float:
-    """The most memory that this process ever had."""
+    """The peak memory of this process."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
@@ -107,7 +107,7 @@ def planning(size: int, out: Path) -> dict[str, float]:
 
 
 def working(size: int, out: Path) -> dict[str, float]:
-    """What a worker does around its runs, for the whole of a frozen plan of `size`."""
+    """A worker's work around its runs, for a whole frozen plan of `size`."""
     workspace = Workspace.find(root=ROOT)
     folder = RunFolder.open(out)
     manifest, models = workspace.manifest(folder.head["target"]), workspace.fault_models()
@@ -125,7 +125,7 @@ def working(size: int, out: Path) -> dict[str, float]:
 
 
 def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
-    """A run folder with so many made-up records, and with the patch that they name, if any, as often."""
+    """A run folder with that many made-up records and, if they name a patch, as many patches."""
     workspace = Workspace.find(root=ROOT)
     plan = make_plan(workspace, "paper")
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
@@ -144,7 +144,9 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
 
 
 def opening(size: int, out: Path) -> dict[str, float]:
-    """Open a finished run of so many experiments: all digests, checksums and ids are compared. Its seal."""
+    """Open a finished run of that many experiments, comparing all digests, checksums and ids; return its
+    seal.
+    """
     folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)
     goldens = [folder.golden(scenario, tuple(changes)) for scenario, changes in head["goldens"]]
@@ -169,7 +171,7 @@ def opening(size: int, out: Path) -> dict[str, float]:
 
 
 def table(size: int, out: Path) -> dict[str, float]:
-    """The results of so many experiments: tables made from the records, results read."""
+    """Build tables of that many records and read the results."""
     written_run(size, out)
     began = process_time()
     path = results.build(out)
@@ -184,7 +186,7 @@ def table(size: int, out: Path) -> dict[str, float]:
 
 
 def apart(work: str, size: int, out: Path) -> dict[str, float]:
-    """A piece of work in a process of its own."""
+    """Run a piece of work in its own process."""
     command = [sys.executable, __file__, "--work", work, str(size), str(out)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return dict(json.loads(done.stdout))

@@ -1,7 +1,7 @@
-"""Lateral behaviour at 60 mph as figures: overshoot, settling time, steady error.
+"""Figures of the lateral behaviour at 60 mph: overshoot, settling time, steady error.
 
-`python benchmarks/lateral.py [--figure FILE.svg]` drives L01 to L03 and a step of the lane, prints a
-table, and draws offset, steering angle and torque over time. Equal sources give equal bytes.
+`python benchmarks/lateral.py [--figure FILE.svg]` simulates L01 to L03 and a step of the lane, prints a
+table, and plots offset, steering angle and torque over time. Equal sources give equal bytes.
 """
 
 import argparse
@@ -30,7 +30,7 @@ Trace = Mapping[str, np.ndarray]
 
 
 def drive(name: str, step: float) -> Trace:
-    """Run a scenario; `step` moves its lane to the left instead of the car's start."""
+    """Simulate a scenario; `step` moves its lane to the left instead of the car's start."""
     simulator = Simulator()
     simulator.reset(load_scenario(ROOT / "fault_library" / "scenarios" / f"{name}.yaml"), 0)
     if step:
@@ -43,9 +43,9 @@ def drive(name: str, step: float) -> Trace:
 
 
 def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
-    """Largest offset and the largest to its other side (m), time to settle (s), steady error (m).
+    """Largest offset and the largest to the other side (m), time to settle (s), steady error (m).
 
-    Then the largest torque, and for how long it was full (s). Settled: to the steady offset's `band`.
+    Then the largest torque, and the time (s) at full torque. Settled: within `band` of the steady offset.
     """
     t, offset = trace["t"], trace["lateral_offset"]
     steady = offset[-100:].mean()
@@ -86,7 +86,7 @@ def figure(traces: Mapping[str, Trace], path: Path) -> None:
 
 
 def main() -> int:
-    """Print the table; draw if asked."""
+    """Print the table; plot on request."""
     parser = argparse.ArgumentParser(description="Measure the lateral behaviour of the controlled car.")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the runs into this SVG file")
     options = parser.parse_args()

@@ -1,9 +1,9 @@
-"""A finished run folder of so many experiments, made up: what other benchmarks read.
+"""Build a made-up finished run folder of any size, for other benchmarks to read.
 
-`python benchmarks/made_up_run.py SIZE OUT`. The experiments are those of the paper's campaign with as many
-seeds as are needed, driven without pictures. Golden runs are driven. Records, patches, timings and series are
-a few hundred real or made-up ones, again and again under other ids, with the checksums and digests that a run
-of this size has: the folder opens, and has a seal.
+`python benchmarks/made_up_run.py SIZE OUT`. The experiments are those of the paper's campaign without frames,
+with as many seeds as needed. Golden runs are simulated. Records, patches, timings and series are a few
+hundred real or made-up ones, repeated under other ids, with the checksums and digests of a run of this size:
+the folder opens and has a seal.
 """
 
 import argparse
@@ -50,16 +50,16 @@ from mutator.workspace import Workspace
 
 ROOT = Path(__file__).resolve().parents[1]
 SEED = 11_280  # experiments of a seed
-KINDS = 480  # different records, which experiments take in turn
+KINDS = 480  # different records, which experiments use alternately
 PATCHES = 240  # different patches
-SERIES, SERIES_MOST = 48, 150_000  # different series, and experiments that have one: what fits into 500 MB
-WORKERS, PIECE = 2, 20  # files, and experiments in a row in one of them
-_WHOLE_EVERY = 256  # patches, as the writer of patches has it
+SERIES, SERIES_MOST = 48, 150_000  # different series, and experiments with a series, to fit 500 MB
+WORKERS, PIECE = 2, 20  # files, and consecutive experiments in one of them
+_WHOLE_EVERY = 256  # patches, as in the writer of patches
 _NO_ID = "0" * 16
 
 
 def make(size: int, out: Path) -> str:
-    """Write the run folder `out` of so many experiments; its seal."""
+    """Write the run folder `out` with that many experiments; return its seal."""
     workspace = Workspace.find(root=ROOT)
     folder = planned(workspace, size, out)
     first = tuple(islice(_experiments(folder), SEED))
@@ -87,7 +87,7 @@ def make(size: int, out: Path) -> str:
 
 
 def campaign(folder: Path, size: int) -> Path:
-    """The paper's campaign without pictures, with as many seeds as are needed, written into a folder."""
+    """Write the paper's campaign without frames, with as many seeds as needed, into a folder."""
     text = (ROOT / "fault_library" / "campaigns" / "paper.yaml").read_text()
     for old, new in (
         ("[pictures, paper_detector]", "[]"),
@@ -102,7 +102,7 @@ def campaign(folder: Path, size: int) -> Path:
 
 
 def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
-    """The plan of at least so many experiments, frozen in `out`."""
+    """The plan of at least that many experiments, frozen in `out`."""
     with TemporaryDirectory() as place:
         return freeze(Planning(workspace, campaign(Path(place), size)), out, workspace)
 
@@ -114,7 +114,9 @@ def _experiments(folder: RunFolder) -> Iterator[Experiment]:
 
 
 def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Experiment]) -> None:
-    """Drive the golden runs of the first seed, copy them for the others, and leave passed checks."""
+    """Simulate the golden runs of the first seed, copy them for the others, and record the checks
+    as passed.
+    """
     manifest, run = workspace.manifest(folder.head["target"]), folder.path
     known, driven = {}, dict[GoldenRun, Path]()
     for one in folder.goldens:
@@ -147,7 +149,7 @@ def patches_of(workspace: Workspace, experiments: Sequence[Experiment]) -> list[
 
 
 def made_up_records(workspace: Workspace, experiments: Sequence[Experiment]) -> list[Record]:
-    """Records that have everything in some and nothing in others."""
+    """Records with all fields, some fields or none."""
     draw = np.random.default_rng(1)
     names = [metric.name for metric in workspace.manifest("openpilot").measures]
     step = max(1, len(experiments) // KINDS)
@@ -160,7 +162,7 @@ def made_up_records(workspace: Workspace, experiments: Sequence[Experiment]) -> 
 
 
 class Lines:
-    """Writes checksummed lines from their bytes, many times as fast as LineWriter does."""
+    """Writes checksummed lines from their bytes, many times faster than LineWriter."""
 
     def __init__(self, path: Path, head: dict[str, str]) -> None:
         path.parent.mkdir(exist_ok=True)
@@ -180,7 +182,7 @@ class Lines:
 def write_segments(
     folder: RunFolder, ids: Sequence[str], records: Sequence[Record], patches: Sequence[bytes]
 ) -> None:
-    """Records, timings and patches of all experiments, as two workers would have left them."""
+    """Write records, timings and patches of all experiments, as two workers would."""
     lines = _bodies(records, patches)
     blocks = _blocks(patches)
     for worker in range(WORKERS):
@@ -210,13 +212,13 @@ def _patch_of(count: int, patches: int) -> int:
 
 
 def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
-    """The first patch whole, each other one beside it."""
+    """The first patch whole, each other one as a difference from it."""
     packer = _Packer()
     return [packer.block(patch) for patch in patches]
 
 
 def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callable[[str, int], bytes]]:
-    """Of each kind of record the line of an experiment with a patch."""
+    """For each kind of record, the line of an experiment with a patch."""
     named = [digest(patch).encode() for patch in patches]
 
     def body(one: Record) -> Callable[[str, int], bytes]:
@@ -231,7 +233,7 @@ def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callabl
 def write_proof(
     folder: RunFolder, ids: Sequence[str], records: Sequence[Record], patches: Sequence[bytes]
 ) -> None:
-    """The proof's sample with the records that the experiments have."""
+    """Write the proof's sample with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
         folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head["plan"], "schema": SCHEMA}
@@ -249,7 +251,7 @@ def write_proof(
 def write_series(
     workspace: Workspace, folder: RunFolder, ids: Sequence[str], experiments: Sequence[Experiment]
 ) -> None:
-    """A packed index in which the experiments that have room share a few series."""
+    """Write a packed index in which the experiments that fit share a few series."""
     manifest, place = workspace.manifest("openpilot"), folder.path / "series"
     place.mkdir()
     first = folder.goldens[0]

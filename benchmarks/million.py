@@ -1,12 +1,12 @@
-"""What a million experiments cost around their runs: plan, tables, resume, report and page, at three sizes.
+"""The cost of a million experiments apart from their runs: plan, tables, resume, report and page, at three
+sizes.
 
-`python benchmarks/million.py [--sizes N ...] [--keep DIR]`. The runs are made up (`made_up_run.py`), and kept
-in DIR for the next time. Each row is a process of its own: seconds of CPU and of wall time, and the most
-memory that it and the processes that it started had at once, pages that they share counted once (looked at
-twice a second). The page is opened in the system's Chromium, headless:
-its wall time is from the navigation on until its list can be used. Growth: CPU time for one experiment,
-beside that of the smallest size. `new here`: on a machine that has not seen the run
-before, so that all of it is verified; then its bytes are compared.
+`python benchmarks/million.py [--sizes N ...] [--keep DIR]`. The runs are made up (`made_up_run.py`) and kept
+in DIR for the next time. Each row is a separate process: CPU and wall seconds, and the peak memory of it and
+its children together, with shared pages counted once (sampled twice a second). The page opens in the system's
+Chromium, headless: its wall time is from the navigation until its list is usable. Growth: CPU time per
+experiment, relative to that of the smallest size. `new here`: on a machine that has not seen the run before,
+so that all of it is verified; afterwards only its bytes are compared.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from mutator.workspace import Workspace
 
 SIZES = (10_000, 100_000, 1_000_000)
 GOAL_SIZE = 1_000_000
-GOALS = {  # wall s and MB at most, of GOAL_SIZE
+GOALS = {  # maximum wall s and MB for GOAL_SIZE
     "plan": (60.0, 1000.0),
     "table": (60.0, 2000.0),
     "resume": (10.0, None),
@@ -43,37 +43,37 @@ GOALS = {  # wall s and MB at most, of GOAL_SIZE
 
 
 def plan(size: int, run: Path) -> None:
-    """Plan into a new folder, as `mutator plan` does."""
+    """Plan into a new folder, like `mutator plan`."""
     with tempfile.TemporaryDirectory(dir=run.parent) as place:
         made_up_run.planned(Workspace.find(root=made_up_run.ROOT), size, Path(place) / "run")
 
 
 def opened(size: int, run: Path) -> None:
-    """Open a finished run: all that it holds is verified."""
+    """Open a finished run and verify all its content."""
     RunFolder.open(run)
 
 
 def resume(size: int, run: Path) -> None:
-    """Give the command again: there is nothing to do."""
+    """Repeat the command, with nothing left to do."""
     summary = run_campaign(Workspace.find(root=made_up_run.ROOT), run / "campaign.yaml", run)
     if summary.done < size or summary.ran:
         raise SystemExit(f"{summary.done} done, {summary.ran} now")
 
 
 def table(size: int, run: Path) -> None:
-    """Make the tables."""
+    """Build the tables."""
     results.build(run)
 
 
 def report(size: int, run: Path) -> None:
-    """Write the report of the tables that are there."""
+    """Write the report of the existing tables."""
     written = building.write(run, Workspace.find(root=made_up_run.ROOT))
     if written.rows < size:
         raise SystemExit(f"a report of {written.rows}")
 
 
 def page(size: int, run: Path) -> float:
-    """Open the report's page; s until its list can be used."""
+    """Open the report's page; return the seconds until its list is usable."""
     with sync_playwright() as playwright:
         browser = report_page.launched(playwright)
         times = report_page.opened(
@@ -90,7 +90,7 @@ ROWS: dict[str, Callable[[int, Path], float | None]] = {
 
 
 def apart(row: str, size: int, run: Path) -> dict[str, float]:
-    """A row in a process of its own."""
+    """Measure a row in its own process."""
     command = [sys.executable, __file__, "--row", row, str(size), str(run)]
     cache = run.parent / "cache"
     if row == "open, new here":
@@ -109,7 +109,7 @@ def apart(row: str, size: int, run: Path) -> dict[str, float]:
 
 
 def family(pid: int) -> list[int]:
-    """A process and all that come from it."""
+    """A process and all its descendants."""
     try:
         told = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
     except OSError:  # it has ended
@@ -118,7 +118,7 @@ def family(pid: int) -> list[int]:
 
 
 def memory_mb(pid: int) -> float:
-    """MB of a process; of what it shares with others its part."""
+    """Memory (MB) of a process, with its share of shared pages."""
     try:
         lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     except OSError:
@@ -127,7 +127,7 @@ def memory_mb(pid: int) -> float:
 
 
 def measured(row: str, size: int, run: Path) -> dict[str, float]:
-    """Do what a row stands for: seconds, and the most memory in MB of one process."""
+    """Do a row's work; return the seconds and the peak memory (MB) of one process."""
     began = perf_counter()
     told = ROWS[row](size, run)
     wall = perf_counter() - began if told is None else told
@@ -181,7 +181,7 @@ def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[in
 
 
 def told(found: dict[str, dict[int, dict[str, float]]]) -> int:
-    """Say which goals are missed; 1 where one is."""
+    """Print the missed goals; return 1 if there are any."""
     code = 0
     for row, (seconds, memory) in GOALS.items():
         one = found.get(row, {}).get(GOAL_SIZE)

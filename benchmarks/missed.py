@@ -1,8 +1,8 @@
 """How often the geometric detector misses a line in bad weather: `python benchmarks/missed.py`.
 
-Rendered roads of all kinds are seen by three cameras behind the strongest rain, snow and occlusion of the
-paper. A picture counts as missed if a line is not found, or is more than 0.3 m off 10 m ahead. Only roads
-count on which both lines are found in fair weather.
+Three cameras see rendered roads of all kinds through the strongest rain, snow and occlusion of the paper. A
+frame counts as missed if a line is not found, or is more than 0.3 m off 10 m ahead. Only roads with both
+lines found in fair weather count.
 """
 
 import argparse

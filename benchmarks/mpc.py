@@ -1,8 +1,8 @@
 """CPU time of both model-predictive controllers: build, iteration, and the solver's share of it.
 
-`python benchmarks/mpc.py [--plain] [--rounds N] [--json FILE]`. The solvers are those that were compiled at
-installing; with `--plain` CasADi's. All are measured in turn in each round, so that what else the machine
-does falls on all of them; printed are the medians and the best rounds.
+`python benchmarks/mpc.py [--plain] [--rounds N] [--json FILE]`. The solvers are those compiled at
+installation; with `--plain` CasADi's. Each round measures all of them, so that other work on the machine
+affects all alike; printed are the medians and the best rounds.
 """
 
 import argparse
@@ -33,7 +33,7 @@ GOALS = {  # microseconds of CPU
 
 
 def follow(mpc: LongitudinalMpc) -> None:
-    """Come up on a slower lead, whose distance is measured in steps of 1/16 m."""
+    """Approach a slower lead at a distance measured in steps of 1/16 m."""
     for k in range(UPDATES):
         mpc.set_cur_state(26.0 - 0.02 * k, -0.4)
         d_rel = int(16 * (80.0 - 0.2 * k)) / 16
@@ -41,7 +41,7 @@ def follow(mpc: LongitudinalMpc) -> None:
 
 
 def steer(mpc: LateralMpc) -> None:
-    """Come back to the middle of a lane that bends slowly."""
+    """Return to the middle of a lane that bends slowly."""
     for k in range(UPDATES):
         y, bend = 0.4 * (1 - k / UPDATES), 2e-4
         left, right, path = ((0.0, bend, 0.01, y + side) for side in (1.85, -1.85, 0.0))
@@ -75,13 +75,13 @@ def measure(rounds: int) -> dict[str, list[float]]:
 
 
 def repeat(task: Callable[[], object]) -> None:
-    """Do `task` as often as a round has updates."""
+    """Repeat `task` for each update of a round."""
     for _ in range(UPDATES):
         task()
 
 
 def main() -> None:
-    """Measure and print; exit 1 where a median misses its goal."""
+    """Measure and print; exit with 1 if a median misses its goal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     parser.add_argument("--rounds", type=int, default=15)

@@ -1,10 +1,11 @@
-"""Mutants per second: from reused changes, spliced, and spliced with each file parsed by LibCST again; and
-those of operators, of which each is in a place of its own.
+"""Mutants per second: from reused changes, spliced, and spliced with each file parsed again by LibCST; and
+those of operators, each in a different place.
 
-`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. First every experiment of the paper's
-campaign has its mutant built, diff, compile check and digests included; then all ways build the same sample
-in turn, round by round. Mutants of operators are found in the shipped controller, and a sample is built, each
-once; its files are parsed before. CPU time of this process. Exit code 1 where either kind misses the goal.
+`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. First it builds the mutant of every
+experiment of the paper's campaign, including diff, compile check and digests; then all ways build the same
+sample alternately, round by round. Operators' mutants are found in the shipped controller, and each of a
+sample is built once; its files are parsed before. CPU time of this process. Exit code 1 if either kind misses
+the goal.
 """
 
 import argparse
@@ -33,7 +34,7 @@ PLACES = ["selfdrive/controls/**"]
 
 
 def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) -> float:
-    """Experiments a second of CPU."""
+    """Experiments per second of CPU."""
     start = process_time()
     for experiment in experiments:
         make(experiment)
@@ -41,7 +42,7 @@ def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) ->
 
 
 def operators(manifest: TargetManifest, models: FaultModels, count: int) -> tuple[float, float]:
-    """Mutants of operators a second of CPU: found in the controller, equal code dropped, and built."""
+    """Operators' mutants per second of CPU: find them in the controller, drop equal code, and build them."""
     find_mutations(manifest, models, [Operator.RETURN], PLACES)  # parses the files, as every campaign must
     start = process_time()
     found = find_mutations(manifest, models, list(Operator), PLACES)

@@ -1,11 +1,11 @@
-"""What an experiment costs beyond its simulation: faults that first act in the last steps of a 30 s run.
+"""The cost of an experiment apart from its simulation: faults that first act in the last steps of a 30 s run.
 
 `python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
-faults of the paper's campaign with ideal vision, each at a time of its own shortly before the end, and does
-with them all that a worker does: mutant, run, comparison with golden, patch, record. CPU of the worker, of
-the children and of the processes that they are forks of; beside it what 30 s of the same driving cost in this
-run. With `--against` a checkout of an older commit does the same in turn, and the ratio is what counts. Exit
-code 1 where the overhead is more than its goal.
+faults of the paper's campaign with ideal vision, each at its own time shortly before the end, with all of a
+worker's steps: mutant, run, comparison with golden, patch, record. It prints the CPU of the worker, of its
+children and of the processes that they are forks of, and for comparison that of 30 s of the same simulation.
+With `--against`, a checkout of an older commit runs alternately; compare the ratio. Exit code 1 if the
+overhead exceeds its goal.
 """
 
 import argparse
@@ -41,12 +41,12 @@ GOAL_MS = 5.0
 GOAL_OF_OLDER = 0.65
 END_S, LAST_STEPS, STEP_S = 30.0, 10, 0.01
 SCENARIO = "S1"
-FEW = 5  # experiments that come first and are not counted: they do what is done once
+FEW = 5  # first experiments, not counted: they do one-time work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """CPU time (s, user and system) of so many experiments."""
+    """CPU time (s, user and system) of that many experiments."""
 
     worker: float
     children: float
@@ -54,12 +54,12 @@ class Cost:
 
 
 def late(workspace: Workspace, count: int) -> list[Experiment]:
-    """Faults of the campaign that need no change of the scenario, first active in the last steps."""
+    """Faults of the campaign that leave the scenario unchanged, first active in the last steps."""
     plan = make_plan(workspace, "paper", Choices(limit=8 * count))
     known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
     made = []
     for number, experiment in enumerate(islice(cycle(known.values()), count)):
-        # no two triggers are alike; later and later, as a golden run goes on
+        # no two triggers are equal; later and later, in the golden run's order
         t = END_S - STEP_S * (1.5 + LAST_STEPS * (1 - (number + 1) / count))
         trigger = Trigger(name="late", condition=f"t >= {t:.9f}", hold=Hold.TO_END, armed_after_s=1.5)
         made.append(replace(experiment, trigger=trigger, setting=()))
@@ -78,7 +78,7 @@ class Bench:
         self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
 
     def golden(self) -> float:
-        """Drive the golden run; CPU time (s) beyond that of one of two steps."""
+        """Simulate the golden run; return CPU time (s) in addition to that of a two-step run."""
         job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
         engine = ReferenceEngine(*self.common)
         whole = engine.execute(job, self.folder / "golden")
@@ -87,8 +87,9 @@ class Bench:
         return whole.cpu_s - short.cpu_s
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
-        """What the experiments cost an engine, but for the first `FEW`, which do what is done once; all of
-        them must be forked."""
+        """An engine's time for the experiments, without the first `FEW`, which do one-time work; all of them
+        must be forked.
+        """
         null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
         goldens = Goldens(self.manifest, lambda experiment: self.folder / "golden" / "out")
@@ -108,13 +109,13 @@ class Bench:
         before, began = self._server(), process_time()
         children = run(experiments[FEW:])
         worker, after = process_time() - began, self._server()
-        assert before.keys() <= after.keys()  # the time of one that ended would be lost
+        assert before.keys() <= after.keys()  # an ended one would lose its time
         records.close()
         engine.close()
         return Cost(worker=worker, children=children, server=sum(after.values()) - sum(before.values()))
 
     def _server(self) -> dict[str, float]:
-        """CPU time (s) of each process of the fork server, those it waited for left out."""
+        """CPU time (s) of each process of the fork server, without its finished children."""
         found = {}
         for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
@@ -124,7 +125,9 @@ class Bench:
 
 
 def against(clone: Path, options: argparse.Namespace) -> int:
-    """This version and the one in `clone` in turn, each in processes of its own; the ratios of medians."""
+    """Run this version and the one in `clone` alternately, each in separate processes; return the ratios of
+    medians.
+    """
     found: dict[str, list[dict[str, float]]] = {"older": [], "this": []}
     for number in range(options.rounds):
         for name in found if number % 2 == 0 else reversed(found):
@@ -143,7 +146,7 @@ def against(clone: Path, options: argparse.Namespace) -> int:
 
 
 def _told_by(root: Path, experiments: int) -> dict[str, float]:
-    """What the benchmark in that checkout says, ms by part."""
+    """The figures of that checkout's benchmark, ms by part."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "told.json"
         words = ["--experiments", str(experiments), "--json", str(told)]

@@ -1,9 +1,9 @@
-"""A picture in a run by this version and by an older one: `python benchmarks/pictures.py CLONE`.
+"""A frame's time in a run by this version and by an older one: `python benchmarks/pictures.py CLONE`.
 
-CLONE is a checkout of the older commit. Each version has an interpreter, compiled helpers and an empty cache
-of its own, and takes its pictures in turn with the other: all are new, and nothing is remembered. Prints the
-CPU time of moving a frame to the car's pose, the image effect and the detection together, and the ratio. A
-detector or effect that the older version lacks is left out; lines that the two see differently are told.
+CLONE is a checkout of the older commit. Each version has its own interpreter, compiled helpers and empty
+cache, and they process frames alternately: all frames are new, and none is remembered. Prints the CPU time of
+moving a frame to the car's pose, the image effect and the detection together, and the ratio. A detector or
+effect that the older version lacks is left out; lines that the two see differently are reported.
 """
 
 import argparse
@@ -40,7 +40,7 @@ EFFECTS: dict[str, tuple[str, float] | None] = {
 
 
 class Version:
-    """A checkout and the process that takes its pictures."""
+    """A checkout and the process that makes its frames."""
 
     def __init__(self, clone: Path, scratch: Path) -> None:
         env = os.environ | {"PYTHONPATH": str(clone / "target"), "OPENBLAS_NUM_THREADS": "1"}
@@ -60,12 +60,12 @@ class Version:
         return json.loads(self._process.stdout.readline())
 
     def end(self) -> None:
-        """Let the process go."""
+        """End the process."""
         self._process.communicate()
 
 
 def answers(cache: Path) -> Iterator[object]:
-    """What the parent asks for: which detectors and effects there are; what pictures took and showed."""
+    """Answer the parent's requests: the detectors and effects that exist; times and results of frames."""
     import cv2
     from selfdrive.common import compiled
     from selfdrive.sim import effects, vision
@@ -87,7 +87,7 @@ def answers(cache: Path) -> Iterator[object]:
 
 
 class Drive:
-    """A car that goes on, never on the same way, and takes pictures with an effect."""
+    """A moving car that never repeats a pose, and takes frames with an effect."""
 
     def __init__(self, detector: str, effect: str, cache: Path) -> None:
         from selfdrive.sim import effects, vision
@@ -105,7 +105,7 @@ class Drive:
             self._effect = getattr(effects, name)(amount, 1, self._seen.model).ready()
 
     def pictures(self, count: int) -> tuple[list[float], str]:
-        """CPU time (ms) of so many, and a digest of their lines."""
+        """CPU time (ms) of that many frames, and a digest of their lines."""
         times, lines = [], sha256()
         for _ in range(count):
             truth = self._truth()
@@ -163,7 +163,7 @@ def main() -> int:
 def _compared(
     versions: list[Version], detector: str, effect: str, options: argparse.Namespace
 ) -> list[list[float]]:
-    """Times of the older version and of this one, in turn; a line of the table."""
+    """Times of the older version and of this one, measured alternately; a line of the table."""
     times: list[list[float]] = [[], []]
     same = True
     for number in range(options.rounds + 1):

@@ -1,9 +1,9 @@
-"""How many of the places where a value is made anchors reach: `python benchmarks/places.py`.
+"""How many of the places that make a value are reached by anchors: `python benchmarks/places.py`.
 
-Eight modules of other people's packages, chosen before anything was counted (`MODULES` says why), each in the
-version that constraints.txt has. The places are counted here with `ast` alone, not with the harness's own
-search; whether an anchor leads to one is asked of the harness. A place may count in several kinds: an
-argument that is a sum is an argument, and arithmetic. Goal: 90 % of all.
+Eight modules of third-party packages, chosen before any count (`MODULES` says why), each in the version of
+constraints.txt. This counts places with `ast` alone, not with the harness's own search; the harness says
+whether an anchor leads to one. A place may count in several kinds: an argument that is a sum is an argument
+and arithmetic. Goal: 90 % of all.
 """
 
 import argparse
@@ -45,17 +45,17 @@ Spot = tuple[int, int, int, int]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A place where a value is made: its kind, its node, what it lies in, and the name that it binds."""
+    """A place that makes a value: its kind, its node, what encloses it, and the name that it binds."""
 
     kind: str
     node: ast.AST
     function: str  # "" at the level of a module or class
     name: str
-    within: str  # what keeps anchors out of it: "f-string", "decorator", ...
+    within: str  # why anchors cannot reach it: "f-string", "decorator", ...
 
 
 class Counting(ast.NodeVisitor):
-    """Walks a module and notes every place."""
+    """Walks a module and records every place."""
 
     def __init__(self) -> None:
         self.sites: list[Site] = []
@@ -140,8 +140,9 @@ class Counting(ast.NodeVisitor):
         self.generic_visit(node)
 
     def bound(self, target: ast.expr, value: ast.expr | None) -> None:
-        """A place for each name, attribute or item that is assigned to; at the level of a module or class,
-        the constants."""
+        """Record a place for each assigned name, attribute or item; at the level of a module or class, the
+        constants.
+        """
         if isinstance(target, ast.Tuple | ast.List):
             for element in target.elts:
                 self.bound(element, None)
@@ -223,7 +224,7 @@ class Counting(ast.NodeVisitor):
 
 
 class Reach:
-    """What anchors of a file lead to."""
+    """What a file's anchors lead to."""
 
     def __init__(self, file: ParsedFile, models: FaultModels, tree: SourceTree) -> None:
         self.file, self.models, self.tree = file, models, tree
@@ -236,7 +237,7 @@ class Reach:
         return _spot(site.node) in self.spots or (bool(site.name) and self.is_assigned(site))
 
     def sets(self, site: Site) -> bool:
-        """Whether the probe can set it: its edit is made, with all modules of the package looked at."""
+        """Whether the probe can set it: build its edit, with all modules of the package in view."""
         function, _, name = site.name.rpartition(":")
         kind = AnchorKind.DEFAULT if site.kind == "default" else AnchorKind.CONSTANT
         location = FaultLocation(path=self.file.path, function=function, anchor=Anchor(kind=kind, name=name))

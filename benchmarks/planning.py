@@ -1,9 +1,9 @@
-"""CPU time of what happens around the experiments of the paper's 11,280: plan, freeze, the way to the first
-experiment, resume when complete.
+"""CPU time of work around the paper's 11,280 experiments: plan, freeze, reach the first experiment, resume a
+complete run.
 
 `python benchmarks/planning.py`. The complete run is made up: every experiment has a record of a masked fault.
-So are the checks that a start finds in the cache; it ends where the first mutant would be run (no workers).
-Each time is told for one experiment, too, and beside that of planning.
+So are the cached checks of a start, which ends where the first mutant would be run (no workers). Each time is
+also printed per experiment and relative to planning.
 """
 
 import argparse
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Table:
-    """Prints times as they come; the first is what the others stand beside."""
+    """Prints times as they come; the others are relative to the first."""
 
     def __init__(self) -> None:
         self.count = 0  # experiments
@@ -69,7 +69,7 @@ def masked(experiment: Experiment) -> Record:
 
 
 def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
-    """Have the cache believe that the checks of this plan passed."""
+    """Make the cache report this plan's checks as passed."""
     looked_at = preflight._Checks(workspace, folder)
     goldens = {}
     for one in looked_at.keys:
@@ -85,7 +85,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:
-    """CPU seconds from the command to where the first mutant would be run."""
+    """CPU seconds from the command to the point where the first mutant would be run."""
     reached = []
 
     def stop(self: ReferenceEngine, job: Job, folder: Path) -> Execution:

@@ -1,8 +1,8 @@
-"""What a probe costs that never acts: the null mutant against the pristine program, in 30 s of driving.
+"""The cost of a probe that never acts: the null mutant against the pristine program, in 30 s of simulation.
 
-`python benchmarks/probe.py [--rounds N]`. Both drive the same scenario in one interpreter, taking turns every
-20 steps, so that what else the machine does meets both; what counts is the median of the ratios of such
-pairs of stretches. Exit code 1 where the null mutant is slower by more than its goal.
+`python benchmarks/probe.py [--rounds N]`. Both simulate the same scenario in one interpreter, alternating
+every 20 steps, so that other work on the machine affects both; the result is the median of the ratios of such
+pairs. Exit code 1 if the null mutant is slower by more than its goal.
 """
 
 import argparse

@@ -1,9 +1,9 @@
-"""What it costs to know which channels left golden: CPU of an experiment's verdict with all channels of the
-manifest, beside that with those alone that the verdict needs, and beside the CPU of the run.
+"""The cost of finding which channels left golden: CPU of an experiment's verdict with all channels of the
+manifest, compared with only those that the verdict needs, and with the CPU of the run.
 
-`python benchmarks/propagation.py [--repeat N]`. One experiment of the shipped target is driven on the
-reference engine; its trace is then loaded and compared again and again. Exit code 1 where the difference is
-more than 1 % of the run's CPU.
+`python benchmarks/propagation.py [--repeat N]`. The reference engine runs one experiment of the shipped
+target; its trace is then loaded and compared repeatedly. Exit code 1 if the difference is more than 1 % of
+the run's CPU.
 """
 
 import argparse

@@ -1,9 +1,9 @@
-"""Which difference between the readings makes faults of pictures hazardous: `python benchmarks/seeing.py`.
+"""Which difference between the readings makes image faults hazardous: `python benchmarks/seeing.py`.
 
-The paper's text and its authors' code differ in how pictures are made and seen. This turns each difference
-on alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an effect at
-each level in every context that a scenario reaches. Where all of them together bring hazards, it also takes
-each difference out, and tries other thresholds of the detector as coded. `--csv FILE` keeps every run.
+The paper's text and its authors' code differ in how frames are made and seen. This enables each difference
+alone and then all of them, on the reference plant, and counts the runs that end in a hazard: an effect at
+each level in every context that a scenario reaches. If all of them together cause hazards, it also removes
+each difference, and tries other thresholds of the detector as coded. `--csv FILE` stores every run.
 """
 
 import argparse
@@ -64,7 +64,7 @@ DIFFERENCES = {
     LABELS: "left and right are swapped in the picture and for the controller",
 }
 ARMED_FROM = 1.5  # s, without ARMING
-THRESHOLDS = 2.0, 3.0  # beside the detector's own
+THRESHOLDS = 2.0, 3.0  # in addition to the detector's own
 SAFE_HEADWAY = 2.0  # s
 CONTEXTS: dict[str, Callable[[float, float], bool]] = {  # of headway time and of how much slower the lead is
     "C1": lambda hwt, slower: hwt <= SAFE_HEADWAY and slower <= 0.0,
@@ -81,13 +81,15 @@ KINDS: dict[str, tuple[type[Effect], type[Effect]]] = {  # as described, as code
     "brightness": (effects.Brightness, effects.Brightness),
     "blur": (effects.AveragingBlur, effects.AveragingBlur),
 }
-DRAWINGS = 20  # of an effect as described: drawn anew, each picture has the next of these
-CYCLE = 0.05  # s between pictures
-FRAMES = "SEEING_FRAMES"  # variable with the folder in which runs share the frames that they draw
+DRAWINGS = 20  # of an effect as described: each frame uses the next of these seeds
+CYCLE = 0.05  # s between frames
+FRAMES = "SEEING_FRAMES"  # environment variable with the folder where runs share their frames
 
 
 class Row(NamedTuple):
-    """A line of the table: the differences that are on, and from where on the coded detector sees a mark."""
+    """A line of the table: the enabled differences, and the threshold for the coded detector to see
+    a mark.
+    """
 
     name: str
     parts: frozenset[str]
@@ -105,7 +107,7 @@ class Case(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """The contexts that came, the first hazard ("" for none), and whether there was an alert."""
+    """The contexts reached, the first hazard ("" for none), and whether there was an alert."""
 
     reached: frozenset[str]
     hazard: str
@@ -125,7 +127,7 @@ THEN = [
 
 
 class TrueLabels(ReferencePlant):
-    """The reference plant, whose pictures show which side the car is on."""
+    """The reference plant with frames that show the car's true side."""
 
     mirrors = False
 
@@ -135,7 +137,7 @@ class TrueLabels(ReferencePlant):
 
 
 class FaultyCamera(PictureCamera):
-    """A camera with the case's effect in front of it while its context holds."""
+    """A camera with the case's effect while its context holds."""
 
     def __init__(self, camera: PictureCamera, case: Case) -> None:
         self._geometry, self._library, self._move = camera._geometry, camera._library, camera._move
@@ -183,7 +185,7 @@ def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel
 
 
 class MixedDetector:
-    """The detector of either reading, with the other one's way to tell a missing line and the path."""
+    """The detector of either reading, with the other one's rule for missing lines and the path."""
 
     def __init__(self, row: Row, camera: CameraModel) -> None:
         self._parts = row.parts
@@ -205,11 +207,11 @@ class MixedDetector:
         return LaneLines(left, right, path)
 
     def _unseen(self, side: int, line: RoadLine) -> RoadLine:
-        """The line, without probability where the detector as coded has no cluster."""
+        """The line, with zero probability if the detector as coded has no cluster."""
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
-        """The lines with one that is missing 8 m to the left; if none is seen, the last ones."""
+        """The lines, with a missing one 8 m to the left; if none is seen, the last ones."""
         if any(line.prob > 0.0 for line in lines):
             pairs = zip(lines, self._nowhere, strict=True)
             self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]
@@ -236,14 +238,14 @@ def drive(case: Case) -> tuple[Case, Ending]:
 
 
 def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]) -> Iterator[Case]:
-    """The runs with these effects, given the fault-free ones."""
+    """The runs with these effects, based on the fault-free ones."""
     for golden, ending in free.items():
         for context, name, level in product(sorted(ending.reached), names, levels):
             yield golden._replace(context=context, effect=name, level=level)
 
 
 def report(runs: dict[Case, Ending], rows: Sequence[Row]) -> None:
-    """Markdown: for each row the hazards of each effect, and what its fault-free runs do."""
+    """Markdown: for each row the hazards of each effect, and the result of its fault-free runs."""
     print("| differences |", *(f"{name} |" for name in KINDS), "fault-free |")
     print("| --- |" + " --- |" * (len(KINDS) + 1))
     for row in rows:

@@ -1,9 +1,9 @@
-"""What series and patches take: bytes an experiment, and their share of its CPU.
+"""The cost of series and patches: bytes per experiment, and their share of its CPU.
 
-`python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. Runs so many
-experiments of a campaign in this process and measures in each what making and appending its series and its
-patch took, over the CPU time of the same experiments: ratios, paired. Bytes are those of the finished run
-folder; what grows with the experiments is taken as often as 11,280 have it. Exit code 1: a goal is missed.
+`python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. Runs that many
+experiments of a campaign in this process and measures the time for building and appending series and patch,
+over the CPU time of the same experiments: ratios, paired. Bytes are those of the finished run folder, with
+the parts that grow with the experiments scaled to 11,280. Exit code 1 if a goal is missed.
 """
 
 import argparse
@@ -33,7 +33,7 @@ GROWING = ("patches", "series", "records", "timings", "plan", "plan.csv", "repor
 
 
 class Clock:
-    """CPU time (s) of calls, one after the other."""
+    """CPU time (s) of consecutive calls."""
 
     def __init__(self) -> None:
         self.times: list[float] = []
@@ -53,7 +53,7 @@ class Clock:
 
 
 def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
-    """Run the experiments; shares of CPU, and bytes."""
+    """Run the experiments; return shares of CPU, and bytes."""
     made, series, patches = Clock(), Clock(), Clock()
     made.on(runner.Runner, "_series")
     series.on(SeriesWriter, "append")
@@ -84,7 +84,7 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files of a folder."""
+    """Bytes of a file, or of all files in a folder."""
     files = path.rglob("*") if path.is_dir() else [path]
     return sum(file.stat().st_size for file in files if file.is_file())
 

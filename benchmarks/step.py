@@ -1,13 +1,13 @@
-"""CPU time of one simulated run beyond imports, and which part of the loop it goes to.
+"""CPU time of one simulated run, without imports, and its distribution over the loop's parts.
 
-`python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`; the parts are measured in a run of their
-own, as measuring slows it down. Times are of this process, so other work on the machine matters little.
-Compiled code is what installing made; none with `--plain`. Exit code 1 where 30 s of driving cost more than
-their goal.
+`python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`; the parts are measured in a separate run,
+because measuring slows it down. Times are of this process, so other work on the machine matters little. It
+uses the code compiled at installation, unless given `--plain`. Exit code 1 if 30 s of simulation exceed their
+goal.
 
-`--against CLONE` measures this version and a checkout of an older commit instead, in turn, each time in a
-fresh interpreter with bytecode and compiled code at hand: imports, building and loop, over those of the
-older one.
+`--against CLONE` instead compares this version with a checkout of an older commit, alternately, each time in
+a fresh interpreter with bytecode and compiled code ready: imports, building and loop, over those of the older
+one.
 """
 
 import argparse
@@ -70,11 +70,11 @@ GROUPS: dict[str, tuple[tuple[type, str], ...]] = {
     "the loop itself": ((Simulator, "step"),),
 }
 PARTS = tuple(part for parts in GROUPS.values() for part in parts)
-GOAL = 0.7  # s of CPU for 30 s of driving, once the loop is built
+GOAL = 0.7  # s of CPU for 30 s of simulation, after the loop is built
 STEPS_OF_GOAL = 3000
-GOALS = {"start": 0.8, "loop": 0.75}  # over the older version
+GOALS = {"start": 0.8, "loop": 0.75}  # relative to the older version
 HELPERS = ("-m", "selfdrive.sim.compile_helpers")
-# Run with the folder of compiled code and a scenario, in a fresh interpreter of either version.
+# Runs in a fresh interpreter of either version, with the folder of compiled code and a scenario.
 RUN = """
 import json, sys
 from pathlib import Path
@@ -102,7 +102,7 @@ print(json.dumps({"imports": imports, "build": first[0], "start": imports + firs
 
 
 class Stopwatch:
-    """Own time of nested parts: what a part calls is charged to the one called."""
+    """Own time of nested parts: a part's calls are charged to the called part."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -110,7 +110,7 @@ class Stopwatch:
         self._inner = [0.0]
 
     def wrap(self, owner: type, name: str) -> Callable[[], None]:
-        """Time a method from now on; the result puts it back."""
+        """Time a method from now on; return a function that restores it."""
         original, key = getattr(owner, name), part_name(owner, name)
         self.seconds[key], self.calls[key] = 0.0, 0
 
@@ -129,12 +129,12 @@ class Stopwatch:
 
 
 def part_name(owner: type, name: str) -> str:
-    """How a part is called in the table."""
+    """The name of a part in the table."""
     return f"{owner.__name__}.{name}"
 
 
 def run(scenario: Scenario) -> tuple[float, float]:
-    """CPU seconds of building the loop, and of running it with its result."""
+    """CPU seconds of building the loop, and of running it, with its result."""
     start = process_time()
     simulator = Simulator()
     simulator.reset(scenario, 0)
@@ -146,7 +146,7 @@ def run(scenario: Scenario) -> tuple[float, float]:
 
 
 def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
-    """One run with every part timed, and the CPU seconds of all of it."""
+    """One run with every part timed, and its total CPU seconds."""
     watch = Stopwatch()
     restore = [watch.wrap(owner, name) for owner, name in PARTS]
     start = process_time()
@@ -158,7 +158,9 @@ def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
 
 
 def against(clone: Path, scenario: Path, rounds: int) -> bool:
-    """Print what start and loop take in this version and in `clone`'s; whether the goals are reached."""
+    """Print the times of start and loop in this version and in `clone`'s; return whether the goals are
+    reached.
+    """
     with tempfile.TemporaryDirectory() as place:
         versions = {"older": clone.resolve(), "this": ROOT}
         times: dict[str, list[dict[str, float]]] = {name: [] for name in versions}
@@ -186,7 +188,7 @@ def _folder_option(root: Path, place: str) -> str:
 
 
 def _fresh(root: Path, place: str, *words: str) -> str:
-    """What a fresh interpreter says that has the target of the clone `root`; its bytecode lies in `place`."""
+    """The output of a fresh interpreter with the target of the clone `root`, with its bytecode in `place`."""
     environment = os.environ | {
         "PYTHONPATH": str(root / "target"),
         "PYTHONPYCACHEPREFIX": f"{place}/bytecode",
@@ -198,7 +200,7 @@ def _fresh(root: Path, place: str, *words: str) -> str:
 
 
 def main() -> None:
-    """Measure and print; exit 1 where the goal is missed."""
+    """Measure and print; exit with 1 if the goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
     parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")
@@ -223,7 +225,7 @@ def main() -> None:
 
 
 def print_parts(scenario: Scenario) -> None:
-    """Tables of what each part of the loop takes, and its methods."""
+    """Print tables of the time of each part of the loop, and of its methods."""
     watch, total = run_in_parts(scenario)
 
     def line(name: str, seconds: float, calls: int) -> str:

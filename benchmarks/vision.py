@@ -1,8 +1,8 @@
-"""What pictures cost: drawing a frame, moving it to the car's pose, opening the library, and whole runs.
+"""The cost of frames: drawing one, moving it to the car's pose, opening the library, and whole runs.
 
 `python benchmarks/vision.py [render] [view] [library] [runs] [--repeat N]`. Times are CPU time of this
-process, in one thread; the median counts, and the fastest tells what the machine can do when idle.
-Exit code 1 where a median misses its goal.
+process, in one thread; the median counts, and the minimum shows the idle machine's speed. Exit code 1 if a
+median misses its goal.
 """
 
 import argparse
@@ -30,17 +30,17 @@ from selfdrive.sim.vision import DETECTORS, Pictures  # noqa: E402
 from selfdrive.visiond.road_region import RoadRegion  # noqa: E402
 
 GOALS = {"render": 2.0, "view": 0.75}  # ms: a grey frame of 640 x 480, moved by the ground's homography
-RUN_GOAL = 1500.0  # ms: 30 s of driving with pictures of which nothing is known yet
+RUN_GOAL = 1500.0  # ms: 30 s of simulation with frames that are all new
 
 
 def times(work: Callable[[int], object], repeat: int) -> list[float]:
-    """CPU time of each call (ms), but for the first, which warms up."""
+    """CPU time of each call (ms), without the first, which warms up."""
     spent = [spent_in(partial(work, number)) for number in range(repeat + 1)]
     return spent[1:]
 
 
 def show(name: str, spent: list[float], goal: float | None = None) -> bool:
-    """Print a line of the table; whether the goal was met."""
+    """Print a line of the table; return whether the goal was met."""
     median = statistics.median(spent)
     against = "" if goal is None else f"  {median / goal:.2f} of the goal of {goal:g} ms"
     print(f"  {name:34} median {median:8.3f} ms  fastest {min(spent):8.3f} ms{against}")
@@ -48,7 +48,7 @@ def show(name: str, spent: list[float], goal: float | None = None) -> bool:
 
 
 def render(repeat: int) -> bool:
-    """Frames of the standard road, one after the other, and seen from elsewhere."""
+    """Consecutive frames of the standard road, drawn and seen from elsewhere."""
     renderer = RoadRenderer(CameraModel(), "dashed", 0)
     straight = times(lambda number: renderer.grey(number * SPACING), repeat)
     aside = times(lambda number: renderer.grey(number * SPACING, 0.5, 0.02), repeat)
@@ -75,7 +75,7 @@ def view(repeat: int) -> bool:
 
 
 def library(repeat: int) -> bool:
-    """The image library, made anew and then from its cache."""
+    """The image library, built and then loaded from its cache."""
     with TemporaryDirectory() as folder:
         pictures = Pictures(cache=Path(folder))
         made = [spent_in(partial(open_library, pictures, seed)) for seed in range(2)]
@@ -85,7 +85,7 @@ def library(repeat: int) -> bool:
 
 
 def runs(repeat: int) -> bool:
-    """Thirty seconds of driving: without pictures, and with ones of which nothing or all is known."""
+    """Thirty seconds of simulation: without frames, with new ones, and with remembered ones."""
     scenario, good = load_scenario(ROOT / "fault_library/scenarios/S1.yaml"), True
     show("runs: without pictures", times(lambda number: simulate(scenario, 0), 2))
     with TemporaryDirectory() as folder:
@@ -110,7 +110,7 @@ def spent_in(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Measure and print; exit 1 where a goal is missed."""
+    """Measure and print; exit with 1 if a goal is missed."""
     parts = {"render": render, "view": view, "library": library, "runs": runs}
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(

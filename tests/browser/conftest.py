@@ -1,6 +1,6 @@
-"""The report's page in the system's Chromium: a run of the toy with made-up records, a browser to open it.
+"""The report's page in the system's Chromium: a toy run with made-up records, and a browser to open it.
 
-Nothing is driven: what is tested is the page. Every test fails on an error in the browser's console.
+Nothing is run: only the page is tested. Every test fails on an error in the browser's console.
 """
 
 import os
@@ -58,8 +58,9 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """A made-up record with that patch: every fifth experiment is not active, three of ten end in a hazard;
-    one harness error, one crash."""
+    """A made-up record with that patch: every fifth experiment is not active, and three of ten end in a
+    hazard; one harness error, one crash.
+    """
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
     hazard = status is Status.OK and number % 10 > 6
@@ -83,7 +84,8 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
     """A run folder of 24 experiments with its report; the series of the second is packed, that of the third
-    in a file of its own."""
+    in a separate file.
+    """
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
     plan = make_plan(workspace, "toy")
@@ -116,7 +118,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
 
 
 class Page:
-    """An open report: playwright's page with the steps that several tests take."""
+    """An open report: playwright's page with steps that several tests share."""
 
     def __init__(self, page: Any, url: str) -> None:
         self.page = page
@@ -137,11 +139,11 @@ class Page:
 
     @property
     def found(self) -> str:
-        """What stands above the table: `24 experiments`."""
+        """The count above the table: `24 experiments`."""
         return str(self.page.inner_text("#found"))
 
     def column(self, name: str) -> list[str]:
-        """The texts of a column, of the rows that are in the page."""
+        """The texts of a column in the rendered rows."""
         script = """name => {
             const heads = [...document.querySelectorAll('#grid th')];
             const rows = [...document.querySelectorAll('#grid tr[data-at]')];
@@ -150,7 +152,7 @@ class Page:
         return list(self.page.evaluate(script, name))
 
     def texts(self, selector: str) -> list[str]:
-        """The texts of all elements that are selected."""
+        """The texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def wait_for_rows(self, count: int) -> None:
@@ -168,7 +170,7 @@ Serve = Callable[..., AbstractContextManager[str]]
 
 @pytest.fixture(scope="session")
 def serve() -> Serve:
-    """Serves a library and runs in a thread of this process; the address is given, token included."""
+    """Serve a library in a thread of this process; return the address, including the token."""
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     from mutator.serve.app import Site
     from mutator.serve.runs import Runs
@@ -199,8 +201,9 @@ def serve() -> Serve:
 
 @pytest.fixture
 def visit(browser: Any) -> Iterator[Callable[..., Any]]:
-    """Opens an address as a visitor of its own; an error in the console fails the test, but for those that
-    a browser logs when a request fails."""
+    """Open an address as a separate visitor; an error in the console fails the test, except those that a
+    browser logs for a failed request.
+    """
     errors: list[str] = []
     contexts = []
 
@@ -230,8 +233,7 @@ SERIOUS = """async () => {
 
 @pytest.fixture(scope="session")
 def serious_faults() -> Callable[[Any], list[str]]:
-    """What axe-core finds of serious faults in a playwright page as it is, for people who see, hear or move
-    otherwise."""
+    """The serious accessibility faults that axe-core finds in the current state of a playwright page."""
     package = pytest.importorskip("axe_playwright_python", reason="extra `test` is not installed")
     source = (Path(package.__path__[0]) / "axe.min.js").read_text(encoding="utf-8")
 
@@ -245,7 +247,7 @@ def serious_faults() -> Callable[[Any], list[str]]:
 
 @pytest.fixture
 def open_report(browser: Any) -> Iterator[Callable[[Path], Page]]:
-    """Opens the report of a run folder on a wide screen."""
+    """Open the report of a run folder on a wide screen."""
     context = browser.new_context(viewport={"width": 1400, "height": 900}, reduced_motion="reduce")
     context.set_default_timeout(20_000)
     pages: list[Page] = []

@@ -17,7 +17,7 @@ COUNT = 150  # of each
 
 
 def term(rng: random.Random, depth: int = 3) -> str:
-    """A random number of at most so many levels."""
+    """A random number with at most that many levels."""
     if depth == 0:
         return rng.choice([*NAMES, "0", "1.5", "inf", "3e5"])
     a, b, c = (term(rng, depth - 1) for _ in range(3))
@@ -34,14 +34,14 @@ def condition(rng: random.Random) -> str:
 
 
 def formula(rng: random.Random) -> str:
-    """A random formula. `hypot` is outermost: its last digit is another in another language."""
+    """A random formula. `hypot` is outermost, because its last digit differs between languages."""
     a, b = term(rng, 2), term(rng, 2)
     return rng.choice([term(rng), f"{a} if {condition(rng)} else {b}", f"hypot({a}, {b})"])
 
 
 @pytest.fixture
 def values() -> dict[str, np.ndarray]:
-    """Forty steps of each variable, odd values among them."""
+    """Forty steps of each variable, including special values."""
     rng = np.random.default_rng(1)
     made = {name: rng.normal(0.0, 5.0, 40) for name in NAMES}
     for name in NAMES[1:]:
@@ -50,7 +50,7 @@ def values() -> dict[str, np.ndarray]:
 
 
 def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, np.ndarray]) -> None:
-    """Many formulas and conditions give the same in both, infinite and missing values too."""
+    """Many formulas and conditions have the same value in both, with infinite and missing inputs, too."""
     rng = random.Random(18)
     formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]

@@ -1,4 +1,4 @@
-"""An opened experiment: what is said of one that did not end well, and what closing it ends."""
+"""An opened experiment: what the page says if it did not end well, and what closing it stops."""
 
 from typing import TYPE_CHECKING
 
@@ -24,7 +24,9 @@ WITHOUT_EVENTS = """() => {
 def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
     page: "Page", status: str, said: str
 ) -> None:
-    """Neither that its fault was never active, nor that a command would drive it again for a replay."""
+    """The page claims neither that its fault was never active nor that a command can rerun it for a
+    replay.
+    """
     page.open(f"status={status}")
     page.page.evaluate(WITHOUT_EVENTS)
     page.page.click(FIRST)
@@ -36,7 +38,7 @@ def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
 
 
 def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
-    """Its replay would play on where nobody sees it."""
+    """Closing stops the replay."""
     page.page.click(FIRST)
     page.page.wait_for_selector("#experiment .again")
     page.page.keyboard.press("Escape")
@@ -45,7 +47,7 @@ def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
 
 
 def test_arrows_in_code_scroll_the_code(page: "Page") -> None:
-    """They do not go on to another experiment, as nothing says that they would."""
+    """The arrow keys scroll the code and do not open another experiment."""
     page.page.click(FIRST)
     page.page.focus("#experiment .spec pre")
     before = page.fragment

@@ -1,4 +1,4 @@
-"""Paths of faults in the report's page: the strip of an experiment, and the campaign's control structure."""
+"""Fault paths in the report's page: the strip of an experiment, and the campaign's control structure."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,7 +43,7 @@ QUIET = {"activation": None, "outcome": Outcome.NOT_ACTIVATED}
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Faults of the lane change the gap, those of the distance are held, silence was never active."""
+    """Lane faults change the gap, distance faults are held, silence is never active."""
     return {"lane": CHANGED, "distance": MASKED}.get(experiment.fault.fault_type, QUIET)
 
 
@@ -53,7 +53,7 @@ def report(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """The report of made-up records of the toy with a control structure."""
+    """The report of made-up toy records with a control structure."""
     folder = tmp_path_factory.mktemp("paths")
     workspace = copy_toycar(folder)
     manifest = workspace.library / "targets" / "toycar.yaml"
@@ -77,8 +77,9 @@ def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
 
 
 def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
-    """Boxes in causal order, each with its state as a word and the time of its first channel; a replay lights
-    up what the fault has come to."""
+    """Boxes are in causal order, each with its state as a word and the time of its first channel; a replay
+    lights up the boxes reached so far.
+    """
     opened.choose("kind", "sensor/lane")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-strip")
@@ -99,7 +100,7 @@ def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
 
 
 def test_a_held_fault_says_where(opened: "Page") -> None:
-    """A masked fault names the component that stopped it, one that was never active says so."""
+    """A masked fault names the component that stopped it; one that was never active says so."""
     opened.choose("kind", "sensor/distance")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-box.is-held")
@@ -110,8 +111,11 @@ def test_a_held_fault_says_where(opened: "Page") -> None:
 
 
 def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
-    """A link has the share that got through, of all faults or of the chosen type; it leads to the experiments
-    that got through, a box to those that it stopped; a table has the same numbers."""
+    """A link shows the share that got through, of all faults or of the chosen type.
+
+    A link leads to the experiments that got through, a box to those that it stopped; a table has the same
+    numbers.
+    """
     count = "#ways [data-link='commands'] .count"
     opened.choose("kind", "sensor/lane")
     lanes = int(opened.found.split()[0])

@@ -1,4 +1,4 @@
-"""The replay of an experiment: what it shows at a time, and how the time is changed."""
+"""The replay of an experiment: what it shows at a time, and how to change the time."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
     from .conftest import Page
 
-# A car that hits the one ahead at 4 s because its fault keeps it from braking from 2 s on.
+# A car hits the one ahead at 4 s because a fault prevents braking from 2 s on.
 STEPS, DT, BEGIN, END = 121, 0.05, 2.0, 4.0
 TIMES = [i * DT for i in range(STEPS)]
 SPEED = {"golden": [20.0 - 4.0 * max(0.0, t - BEGIN) for t in TIMES], "faulty": [20.0 for _ in TIMES]}
@@ -87,7 +87,7 @@ class Replayed:
         return float(self.page.evaluate(T))
 
     def settle(self) -> None:
-        """Wait until what is due is drawn."""
+        """Wait until everything due is drawn."""
         frames = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
         self.page.evaluate(frames)
 
@@ -101,7 +101,7 @@ class Replayed:
         return str(self.page.inner_text(selector))
 
     def texts(self, selector: str) -> list[str]:
-        """The texts of all elements that are selected."""
+        """The texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def pixels(self, selector: str) -> set[tuple[int, ...]]:
@@ -121,7 +121,7 @@ class Replayed:
 
 @pytest.fixture(scope="module")
 def replayed(browser: Any, run: "Path") -> Iterator[Replayed]:
-    """The replay on a wide screen in a page that may move."""
+    """The replay on a wide screen in a page that allows motion."""
     context = browser.new_context(viewport={"width": 1000, "height": 900}, reduced_motion="no-preference")
     page, errors = context.new_page(), list[str]()
     page.on("console", lambda m: errors.append(m.text) if m.type in ("error", "warning") else None)
@@ -142,7 +142,7 @@ def seek(replayed: Replayed, t: float) -> None:
 
 
 def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed) -> None:
-    """Nothing plays by itself; the scene and the plots of what differs are there, actuators come first."""
+    """The replay starts paused, with the scene and the plots of differing channels, actuators first."""
     replayed.show(FACTS)
     assert replayed.t == BEGIN - 1.0
     assert not replayed.page.evaluate("player.clock.isPlaying")
@@ -155,7 +155,9 @@ def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed
 
 
 def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
-    """An arrow is a sample, with Shift a second; End is the end of the drive; the page's events follow."""
+    """An arrow moves by a sample, with Shift by a second; End goes to the end of the drive; the page's events
+    follow.
+    """
     seek(replayed, 1.0)
     replayed.press("ArrowRight")
     assert replayed.t == 1.05
@@ -171,7 +173,7 @@ def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
 
 
 def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
-    """A drag to the middle is half of the run, a mark's button goes there, and the bar says the state."""
+    """A drag to the middle is half of the run, a mark's button jumps to it, and the bar shows the state."""
     bar = replayed.page.locator(".timebar").bounding_box()
     y = bar["y"] + bar["height"] / 2
     replayed.page.mouse.move(bar["x"] + 5, y)
@@ -188,7 +190,7 @@ def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replay
 
 
 def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
-    """At the time of the replay, and where the pointer is, without going there."""
+    """Plots show the values at the replay's time and under the pointer, without moving there."""
     seek(replayed, 3.0)
     at = TIMES.index(3.0)
     head = '.plot-of[data-channel="gap"] .value'
@@ -209,7 +211,7 @@ def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
 def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
     replayed: Replayed, high: float, note: str | None
 ) -> None:
-    """The axis is cut, which is said; it is not for values a hundred times the usual ones."""
+    """The axis is cut off, with a note, for huge values but not for those a hundred times the usual ones."""
     values = {"golden": [2.0] * STEPS, "faulty": [3.0 if t > BEGIN else 2.0 for t in TIMES]}
     values["faulty"][50] = high
     channel = SERIES["channels"][0] | {"name": "hwt"} | values
@@ -223,7 +225,7 @@ def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
 
 
 def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
-    """However many come at one time, no button lies on another."""
+    """No button covers another, however many marks share a time."""
     marks = [["alert", 2.5 + i / 1000, f"alert_{i}"] for i in range(6)]
     replayed.show(FACTS, SERIES | {"marks": marks})
     script = "all => all.map((e) => { const { x, y } = e.getBoundingClientRect(); return `${x} ${y}`; })"
@@ -232,7 +234,7 @@ def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
 
 
 def test_plots_are_chosen_and_zoomed(replayed: Replayed) -> None:
-    """An instrument is the switch of its plot; + and 0 zoom, and the bar shows which part is seen."""
+    """An instrument switches its plot on and off; + and 0 zoom, and the bar shows the visible part."""
     replayed.page.click(".gauge:has-text('calm')")
     assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
     assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
@@ -253,7 +255,7 @@ def vivid(colours: set[tuple[int, ...]]) -> bool:
 
 
 def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
-    """Up to the end the lines have colours; later there are none in the plots, and the scene is marked so."""
+    """After the end of the drive the plots have no colours, and the scene is marked."""
     seek(replayed, END)
     assert replayed.text(".state").endswith("H1: the car hits the one ahead")
     assert replayed.page.locator(".is-after").count() == 0
@@ -268,7 +270,7 @@ def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
 
 
 def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) -> None:
-    """A ghost 170 m ahead is beyond the view; that it is there, and how far, must be seen all the same."""
+    """A ghost 170 m ahead, beyond the view, is still shown with its distance."""
     ghost = ACTOR | {"name": "believed_lead", "x": 172.0, "believed": True}
     replayed.show(FACTS | {"scene": SCENE | {"actors": [*SCENE["actors"], ghost]}})
     replayed.page.evaluate("""() => {
@@ -282,7 +284,7 @@ def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) 
 
 
 def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
-    """It pauses at the end of the drive, and goes on if asked to; its frame rate is said."""
+    """It pauses at the end of the drive and continues on request; its frame rate is shown."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.press(" ")
@@ -299,7 +301,7 @@ def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
 
 
 def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
-    """While it plays, the time above the plots is that of the replay; only values are written less often."""
+    """During playback the time above the plots equals that of the replay; only values update less often."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.page.evaluate("""() => {
@@ -317,7 +319,7 @@ def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
 
 
 def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
-    """The state names what came up to the time, though its place on the road is out of sight long since."""
+    """The state names past events, even if their place on the road is out of sight."""
     replayed.show(FACTS)
     seek(replayed, 2.02)
     assert replayed.texts(".states .chip") == ["fault active"]
@@ -327,7 +329,7 @@ def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
 
 
 def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) -> None:
-    """Neither a missing scene nor one with a channel that the series lacks takes anything else away."""
+    """A missing scene, or one with a missing channel, leaves everything else in place."""
     replayed.show(FACTS | {"scene": None})
     assert replayed.page.locator("canvas.scene").count() == 0
     assert replayed.page.locator(".gauge").count() == 4
@@ -337,7 +339,7 @@ def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) 
 
 
 def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> None:
-    """Playing goes in steps of half a second."""
+    """With reduced motion, playback advances in steps of half a second."""
     page.page.evaluate(SHOW, [SERIES, FACTS])
     page.page.click(".replay-player .play")
     page.page.wait_for_function(f"{T} > 2")
@@ -348,7 +350,7 @@ def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> Non
 
 
 def test_a_replay_that_has_left_the_page_draws_no_more(replayed: Replayed) -> None:
-    """However many were opened before, playing or not, none of them asks for another frame."""
+    """However many replays were opened before, playing or not, none requests another frame."""
     for _ in range(3):
         replayed.show(FACTS)
         replayed.page.click(".replay-player .play")

@@ -1,4 +1,4 @@
-"""The report's page as a reader uses it."""
+"""The report's page in use."""
 
 import csv
 import re
@@ -36,7 +36,7 @@ def rows(run: Path) -> list[dict[str, str]]:
 
 
 def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Two facets and a search narrow the table to what results.csv says; Back takes each step back."""
+    """Two facets and a search narrow the table to the matching rows of results.csv; Back undoes each step."""
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     page.choose("outcome", "hazard")
     assert page.found == f"{len(hazards)} of {COUNT} experiments"
@@ -56,7 +56,7 @@ def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list
 
 
 def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Up, then down, then as it was; numbers by size."""
+    """A head sorts up, then down, then not; numbers by size, empty cells last."""
     before = page.column("experiment_id")
     times = sorted(f"{float(row['t_activation']):.2f}" for row in rows if row["t_activation"])
     head = '#grid th[data-column="t_activation"]'
@@ -72,8 +72,9 @@ def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: l
 
 
 def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
-    """The injected lines of its patch, side by side and unified; the folder it was opened from is in the
-    commands; Back closes it."""
+    """The injected lines of its patch are shown side by side and unified; the commands contain the opened
+    folder; Back closes it.
+    """
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
     name = page.fragment.removeprefix("e=")
@@ -100,7 +101,9 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
 
 
 def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
-    """Its head says which of the filtered rows it is, the title follows, and a click in the list goes on."""
+    """Its head shows its position among the filtered rows, the title follows, and a click in the list opens
+    another one.
+    """
     page.choose("outcome", "hazard")
     count, title = len(page.column("ending")), page.page.title()
     page.page.locator("#grid tr[data-at] >> nth=1").scroll_into_view_if_needed()
@@ -142,7 +145,7 @@ def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[
 
 
 def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
-    """Without a chosen order the list has the worst first: hazards before all that ended otherwise."""
+    """Without a chosen order the list starts with hazards."""
     endings = page.column("ending")
     assert endings == sorted(
         endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index
@@ -152,7 +155,7 @@ def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
 
 
 def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
-    """Neither a filter, a value nor a column that these results lack is passed over in silence."""
+    """A filter, value or column that these results lack is reported."""
     page.open("alert=none")
     assert page.found == f'{COUNT} experiments. This page has no filter "alert"'
     page.open("scenario=Q")
@@ -162,7 +165,7 @@ def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
 
 
 def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[dict[str, str]]) -> None:
-    """`alerts=none` finds experiments without an alert, behind # and in the search."""
+    """`alerts=none` finds experiments without an alert, in the address and in the search."""
     without = sum(row["alerts"] == "" for row in rows)
     for fragment in ("alerts=none", "q=alerts%3Dnone"):
         page.open(fragment)
@@ -171,7 +174,7 @@ def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[di
 
 
 def test_the_words_of_the_page_are_explained(page: "Page") -> None:
-    """How experiments end, what is counted, when a hazard is silent, what triggers wait for."""
+    """The page explains outcomes, counts, silent hazards and triggers."""
     page.page.click(".words summary")
     assert page.page.is_visible(".glossary")
     words = {"sdc", "masked", "golden run", "silent hazard", "guided", "rank", "near"}
@@ -179,15 +182,16 @@ def test_the_words_of_the_page_are_explained(page: "Page") -> None:
 
 
 def test_two_keys_lead_to_the_list(page: "Page") -> None:
-    """The first stop of Tab skips to the list of experiments."""
+    """The first Tab stop skips to the list of experiments."""
     page.page.keyboard.press("Tab")
     page.page.keyboard.press("Enter")
     assert page.page.evaluate("document.activeElement.dataset.at") == "0"
 
 
 def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
-    """An experiment whose series is packed, or in a file of its own, has its replay, with the numbers that
-    Python reads; one without says the command."""
+    """An experiment with a packed or separate series has a replay with the numbers that Python reads; one
+    without a series shows the command.
+    """
     series = SeriesFolder(run)
     assert series.index is not None
     names = {*series.index.entries, *series.kept_ids()}
@@ -220,7 +224,7 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
 def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_again(
     page: "Page", run: Path
 ) -> None:
-    """The opened experiment says what is damaged, and how to have its replay all the same."""
+    """The opened experiment says what is damaged and how to restore its replay."""
     name = SeriesFolder(run).kept_ids()[0]
     page.page.evaluate(
         "() => { SeriesFile.load = () => Promise.reject(new Error('series/x.js is damaged')); }"
@@ -233,7 +237,7 @@ def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_agai
 
 
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Its text is the counts, which no filter for results changes; pressed again it lets go."""
+    """Its text is the counts, which no filter for results changes; a second press releases it."""
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -267,7 +271,9 @@ MEDIANS = """async () => {
 
 
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Over the activated faults; medians and worst values can be chosen beside the shares."""
+    """The map shows the median over the activated faults; medians and worst values can be chosen as well as
+    shares.
+    """
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
     text, options = page.page.evaluate(MEDIANS)
@@ -276,7 +282,9 @@ def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str,
 
 
 def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A chosen column is shown, sorted by and in the address; a comparison in the search leaves what fits."""
+    """A chosen column is shown, can be sorted, and is in the address; a comparison in the search keeps the
+    matching rows.
+    """
     page.page.click("summary:has-text('Columns')")
     page.page.check(".option:has-text('max dev gas') input")
     page.page.uncheck(".option:has-text('variant') input")
@@ -299,7 +307,7 @@ def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict
 
 
 def test_a_shared_link_shows_the_same(page: "Page") -> None:
-    """Filter, order and opened experiment come back from the address alone."""
+    """The address alone restores filter, order and opened experiment."""
     page.choose("method", "guided")
     page.page.click('#grid th[data-column="scenario"] button')
     page.page.click("#grid tr[data-at] >> nth=2")
@@ -313,7 +321,7 @@ def test_a_shared_link_shows_the_same(page: "Page") -> None:
 
 
 def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
-    """`/` searches, j and k move, Enter opens, j goes on while it is open, Esc closes, ? helps."""
+    """`/` searches, j and k move, Enter opens, j continues while it is open, Esc closes, ? helps."""
     keys, focused = page.page.keyboard, "document.activeElement.dataset.at"
     keys.press("/")
     assert page.page.evaluate("document.activeElement.id") == "search"
@@ -328,7 +336,7 @@ def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
     keys.press("j")
     second = page.fragment
     assert second != first
-    keys.press("ArrowRight")  # a key of the open experiment: it still has the keyboard
+    keys.press("ArrowRight")  # a key of the open experiment, which still has the focus
     assert page.fragment not in (first, second)
     page.page.focus("#experiment header button >> nth=0")
     keys.press("Enter")
@@ -345,7 +353,7 @@ def test_all_can_be_done_with_the_keyboard(page: "Page") -> None:
 
 
 def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]]) -> None:
-    """What a crashed run said is shown as it is."""
+    """A crashed run's message is shown as plain text."""
     crashed = next(row["experiment_id"] for row in rows if row["status"] == "crashed")
     page.open(f"e={crashed}")
     assert page.page.inner_text("#experiment .detail") == "<b>the disk</b> is gone"
@@ -353,14 +361,14 @@ def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]])
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path, scheme: str) -> None:
-    """At 400 pixels nothing but tables is wider than the screen; an experiment fills it."""
+    """At 400 pixels only tables are wider than the screen; an experiment fills it."""
     context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
     page.wait_for_selector("html[data-ready]")
     width = "document.documentElement.scrollWidth"
     assert page.evaluate(width) == 400
-    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its words
+    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its text
     page.eval_on_selector_all(
         "#heat .cell", "all => all.forEach((c) => (c.textContent = '123456789/987654321'))"
     )
@@ -385,7 +393,9 @@ TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility
 def test_axe_finds_no_serious_fault(
     page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
 ) -> None:
-    """Wide and narrow, light and dark, with the list alone and with an experiment opened."""
+    """axe finds no serious fault wide and narrow, light and dark, with the list alone and with an open
+    experiment.
+    """
     page.page.set_viewport_size({"width": width, "height": 900})
     for scheme in ("light", "dark"):
         page.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
@@ -399,7 +409,7 @@ def test_axe_finds_no_serious_fault(
 
 
 def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:
-    """No title of a column is cut; beneath the last row of a table that has few there is next to nothing."""
+    """No column title is cut off; below the last row of a short table there is almost no space."""
     cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
     assert page.page.eval_on_selector_all("#grid thead button", cut) == []
     page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
@@ -418,14 +428,14 @@ FIRST_ROW = "Number(document.querySelector('#grid tr[data-at]').dataset.at)"
 
 @pytest.fixture
 def scrolled(page: "Page") -> Iterator["Page"]:
-    """The table scrolled so far that its first rows are not in the page."""
+    """The table, scrolled so far that its first rows are not in the page."""
     page.page.evaluate(SCROLLED)
     page.page.wait_for_function(f"{FIRST_ROW} === 2")
     yield page
 
 
 def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
-    """Paper gets every row that fits, up to a limit that it names, and nothing that is for a screen only."""
+    """Paper gets every matching row, up to a stated limit, and nothing that only a screen needs."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == COUNT
@@ -438,7 +448,7 @@ def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
 
 @pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
 def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due: str) -> None:
-    """A window scrolled or resized right before printing leaves paper the first rows, not those seen."""
+    """If the window is scrolled or resized right before printing, paper still gets the first rows."""
     printing = f"""async () => {{
         const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
         {due};
@@ -450,26 +460,26 @@ def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due:
 
 
 def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
-    """Printed by the browser right after a scroll: five rows are on paper, and the window keeps its place."""
+    """Printed by the browser right after a scroll, paper has five rows, and the window keeps its position."""
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))
     page.evaluate("document.querySelector('#grid').hidden = false")
     page.evaluate("document.querySelector('#grid').scrollTop = 310")
-    assert rows_of(page.pdf(tagged=True)) - others == 7  # with the head, and the line of what is not printed
+    assert rows_of(page.pdf(tagged=True)) - others == 7  # with the head, and the note on omitted rows
     assert page.evaluate(FIRST_ROW) == 2
     assert page.evaluate("document.querySelector('#grid').scrollTop") == 310
 
 
 def rows_of(pdf: bytes) -> int:
-    """How many rows the tables of a tagged PDF have."""
+    """The number of rows in the tables of a tagged PDF."""
     return len(re.findall(rb"/S\s*/TR\b", pdf))
 
 
 def test_a_target_without_alerts_has_no_column_for_them(
     page: "Page", run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Neither table, filters nor map speak of alerts where the target has none, and sorting still works."""
+    """If the target has no alerts, neither table, filters nor map mention them, and sorting still works."""
     other = tmp_path / "run"
     shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
     monkeypatch.setattr(RunFolder, "has_alerts", False)

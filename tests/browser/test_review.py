@@ -1,4 +1,4 @@
-"""The page of groups as a reviewer uses it."""
+"""The review page in use."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -26,7 +26,7 @@ def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
 
 @pytest.fixture
 def open_page(browser: Any, file: Path) -> Iterator[Callable[..., Any]]:
-    """Opens the page; an error in the console fails the test."""
+    """Open the page; an error in the console fails the test."""
     errors: list[str] = []
     contexts = []
 
@@ -50,14 +50,14 @@ def shown(page: Any) -> int:
 
 
 def unfold(page: Any) -> None:
-    """Open every stack of groups that are like each other."""
+    """Open every stack of similar groups."""
     closed = page.locator("[data-do=unfold][aria-expanded=false]:visible")
     while closed.count():
         closed.first.click()
 
 
 def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[..., Any]) -> None:
-    """Words and states narrow the list; the address of what is seen shows the same again."""
+    """Text and states narrow the list; the address restores the view."""
     page = open_page()
     unfold(page)
     assert (shown(page), page.inner_text("#found")) == (5, "5 groups")
@@ -73,7 +73,7 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
 
 
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
-    """Keys go from group to group and mark them; the commands name them as a shell needs it."""
+    """Keys move between groups and mark them; the commands name them with shell quoting."""
     page = open_page("q=gap")
     unfold(page)
     for key in "jajr":
@@ -92,7 +92,7 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 
 def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None:
-    """The first of them stands for all: a key opens the others, another marks them after a question."""
+    """The first of them stands for all: one key opens the others, another marks them after a question."""
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
@@ -108,7 +108,7 @@ def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None
 
 
 def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
-    """The question says how many there are and in which states; without a yes nothing is done."""
+    """The question states their number and states; without a yes nothing is marked."""
     page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"
@@ -120,7 +120,7 @@ def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable
 
 
 def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
-    """The diff has its holes; the table of values opens by key, with the span above it."""
+    """The diff has its holes; a key opens the table of values, with their range above it."""
     page = open_page("q=longer")
     page.keyboard.press("j")
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]
@@ -130,7 +130,7 @@ def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
 
 
 def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., Any]) -> None:
-    """What is wide scrolls in its own box."""
+    """Wide content scrolls in its own box."""
     page = open_page(viewport={"width": 400, "height": 800})
     assert page.evaluate("document.documentElement.scrollWidth") == 400
 
@@ -139,6 +139,6 @@ def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., An
 def test_axe_finds_no_serious_fault(
     open_page: Callable[..., Any], serious_faults: Callable[[Any], list[str]], scheme: str
 ) -> None:
-    """The list of groups and an opened one can be read by everyone."""
+    """axe finds no serious fault in the list of groups or in an opened one."""
     page = open_page(color_scheme=scheme, reduced_motion="reduce")
     assert serious_faults(page) == []

@@ -1,4 +1,4 @@
-"""Series as a page reads them: the same numbers as in Python, from a fixture of the format."""
+"""A page reads the same numbers from series as Python, from a fixture of the format."""
 
 import json
 import shutil
@@ -27,7 +27,7 @@ LOADED = """async (id) => {
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """The series of the fixture in a run folder with a page that can do nothing but load them."""
+    """The fixture's series in a run folder with a page that only loads them."""
     shutil.copytree(FIXTURE / "small" / "series", tmp_path / "series")
     facts = {"series": {"packed": True, "kept": SeriesFolder(tmp_path).kept_ids()}}
     (tmp_path / "report").mkdir()
@@ -47,7 +47,7 @@ def load(browser: Any, run: Path, name: str) -> Any:
 
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
-    """Channels as Python reads them, as bits, the points between the values among them."""
+    """Channels as Python reads them, as bits, including the points between the values."""
     read = SeriesFolder(run).read(name)
     assert read is not None
     golden, faulty = read
@@ -64,7 +64,7 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
 
 
 def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Path) -> None:
-    """Packed or in a file of its own: bit by bit those that were written down when the fixture was made."""
+    """Packed or in a separate file, the numbers are bit for bit those recorded with the fixture."""
     expected = json.loads((FIXTURE / "series.json").read_text())
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]
@@ -76,7 +76,9 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
 
 
 def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> None:
-    """Of a channel with a value at each second time, infinite values, and a run that lasts longer."""
+    """A page reads the points between values: a channel with a value at every second time, infinite values,
+    and a longer run.
+    """
     t = np.arange(9) / 20
     rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
     about = {"start": 0.0, "end": 0.3, "channels": [{"name": "a"}, {"name": "b"}]}
@@ -101,7 +103,9 @@ def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> No
 
 
 def test_a_damaged_series_is_said_to_be(browser: Any, run: Path) -> None:
-    """A flipped bit in the middle of a series gives words, no plot; an experiment without one gives null."""
+    """A flipped bit in the middle of a series gives a message and no plot; an experiment without one gives
+    null.
+    """
     name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
     for path in (run / "series").glob(f"{16 * '[0-9a-f]'}.js"):
         data = path.read_bytes()

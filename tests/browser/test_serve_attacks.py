@@ -1,4 +1,4 @@
-"""What a hostile page can do to a server: nothing, be it of another origin or in a run folder."""
+"""A hostile page, from another origin or in a run folder, cannot harm a server."""
 
 import json
 import shutil
@@ -29,7 +29,9 @@ def address(
 def test_a_served_report_is_the_page_that_the_file_is(
     address: str, visit: Callable[..., Any], run: Path, tmp_path: Path
 ) -> None:
-    """Its scripts, styles and series are let through: an experiment with series opens with its replay."""
+    """The server's policy allows the report's scripts, styles and series: an experiment with series opens
+    with its replay.
+    """
     series = json.loads((tmp_path / "runs/night/plan/experiments.jsonl").read_text().splitlines()[1])
     page = visit(address, f"/runs/night/report/index.html#e={series['id']}")
     page.wait_for_selector("html[data-ready]", state="attached")
@@ -38,8 +40,9 @@ def test_a_served_report_is_the_page_that_the_file_is(
 
 
 def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
-    """A report that was tampered with, stamp and all, is shown, and none of its scripts runs: inline, as a
-    handler, in a link, from a file of the run or from elsewhere."""
+    """A tampered report, including its stamp, is shown, and none of its scripts runs: inline, as a handler,
+    in a link, from a file of the run or from elsewhere.
+    """
     night = tmp_path / "runs" / "night"
     (night / "series/kept").mkdir(parents=True, exist_ok=True)
     (night / "series/kept/0123456789abcdef.js").write_text(f"{HACKED};")
@@ -74,7 +77,7 @@ def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: P
 
 
 def test_a_picture_of_a_run_is_no_page(address: str, browser: Any, tmp_path: Path) -> None:
-    """A plot that is opened by itself runs no script either."""
+    """A plot opened directly runs no script either."""
     plots = tmp_path / "runs/night/plots"
     plots.mkdir(exist_ok=True)
     (plots / "a.svg").write_text(
@@ -114,7 +117,7 @@ PIXEL = bytes.fromhex(
 
 
 class _Foreign(BaseHTTPRequestHandler):
-    """Another server of this machine, with a page for who visits it."""
+    """Another server of this machine, with a page for its visitors."""
 
     def do_GET(self) -> None:
         self.send_response(200)
@@ -127,8 +130,9 @@ class _Foreign(BaseHTTPRequestHandler):
 
 
 def test_a_page_of_another_origin_reads_nothing(address: str, browser: Any, tmp_path: Path) -> None:
-    """Another server of this machine, whose pages the browser sends the cookie for: it gets no answer, no
-    script and no picture, and shows no page of ours in a frame."""
+    """The browser sends the cookie for the pages of another local server, but they get no response, script or
+    image, and cannot frame a page of ours.
+    """
     picture = tmp_path / "runs/night/plots/picture.png"
     picture.parent.mkdir(exist_ok=True)
     picture.write_bytes(PIXEL)

@@ -1,4 +1,6 @@
-"""The first page and the report of a server: what would need a shell is asked for, and told of, there."""
+"""The first page and the report of a server: they start the actions that otherwise need a shell, and report
+on them.
+"""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -25,7 +27,7 @@ def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def address(
     folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
 ) -> Iterator[str]:
-    """Where it is served, with the library that it was made of, but for the faults that are no mutants."""
+    """The server's address, with the library of the run, without the faults that are no mutants."""
     module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
     root = run.parent / "toy"
     with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:
@@ -42,7 +44,7 @@ def module_patch() -> Iterator[pytest.MonkeyPatch]:
 def test_the_first_page_leads_to_all_that_there_is(
     address: str, visit: Visit, serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """Runs with their outcomes, the reviews of targets, forms to start something; on any screen."""
+    """It lists runs with their outcomes, the reviews of targets, and forms to start jobs, on any screen."""
     page = visit(address)
     page.wait_for_selector("form.order >> nth=1")
     assert page.inner_text("#runs th a") == "night"
@@ -56,7 +58,7 @@ def test_the_first_page_leads_to_all_that_there_is(
 
 
 def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
-    """The words of the server stand beside the button."""
+    """The server's message is shown next to the button."""
     page = visit(address)
     page.fill("[name=spec]", "no/such")
     page.click("text=Try it")
@@ -65,8 +67,9 @@ def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
 
 @pytest.mark.slow
 def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visit, folder: Path) -> None:
-    """The job is told of beside the experiment and at the foot of the page, with its log, and found by a
-    reload; the plot that it drew is in the report then."""
+    """The job is shown next to the experiment and at the foot of the page, with its log, also after a reload;
+    the report then has the new plot.
+    """
     page = visit(address, "/runs/night/report/index.html")
     page.wait_for_selector("html[data-ready]", state="attached")
     page.click("#grid tr[data-at] >> nth=0")
@@ -85,8 +88,9 @@ def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visi
 
 @pytest.mark.slow
 def test_a_try_a_campaign_and_a_cancelled_job(address: str, visit: Visit, folder: Path) -> None:
-    """A fault is tried and its plot shown; a small campaign becomes a run of the list; one that waits is
-    cancelled and leaves nothing."""
+    """A fault is tried and its plot shown; a small campaign becomes a listed run; a waiting one is cancelled
+    and leaves no files.
+    """
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")
     page.select_option("[name=variant]", "longer")

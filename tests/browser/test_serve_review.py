@@ -1,5 +1,4 @@
-"""The review page of a server: what is marked there is kept, whoever else is at work, whatever becomes of the
-server."""
+"""A server's review page keeps marks despite other reviewers and server failures."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -29,14 +28,14 @@ def library(
 
 @pytest.fixture(scope="module")
 def address(library: Workspace, serve: Callable[..., Any]) -> Iterator[str]:
-    """Where that library is served."""
+    """The address that serves that library."""
     with serve(library) as found:
         yield found
 
 
 @pytest.fixture
 def review(address: str, library: Workspace, visit: Visit) -> Callable[..., Any]:
-    """Opens the page as a reviewer; nothing was said of any group before."""
+    """Open the page as a reviewer; no group has a mark yet."""
     rmtree(library.library / "reviews", ignore_errors=True)
 
     def opened(by: str, fragment: str = "", **options: Any) -> Any:
@@ -67,7 +66,7 @@ def words(page: Any, group: str) -> str:
 
 
 def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], library: Workspace) -> None:
-    """A decision, a flag and a remark, made by keys, are in the library and on the page loaded anew."""
+    """A decision, a flag and a remark, made by keys, are in the library and on the reloaded page."""
     page = review("Jane <b>Doe</b>")
     for key in "jjaf":
         page.keyboard.press(key)
@@ -92,7 +91,7 @@ def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], lib
 
 
 def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], library: Workspace) -> None:
-    """The same key again, or `u`, leaves nothing said of the group."""
+    """The same key again, or `u`, removes the mark."""
     page = review("Jane")
     page.keyboard.press("j")
     for key in "rffu":
@@ -115,7 +114,7 @@ def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Work
 def test_two_reviewers_do_not_overwrite_each_other_unseen(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """Who comes second sees what the first one did, and decides again; the first one comes to see it."""
+    """The second reviewer sees what the first one did and decides again; the first one sees the result."""
     first, second = review("Jane"), review("Jim")
     for page in (first, second):
         page.keyboard.press("j")
@@ -132,7 +131,7 @@ def test_two_reviewers_do_not_overwrite_each_other_unseen(
 
 
 def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], library: Workspace) -> None:
-    """A remark overwrites nothing, so it needs no second look."""
+    """A remark overwrites nothing, so no second look is needed."""
     pages = [review(name) for name in ("Jane", "Jim")]
     for page in pages:
         page.keyboard.press("j")
@@ -144,7 +143,7 @@ def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], libr
 
 
 def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
-    """One question, with how many there are and in which states; then they are approved, and no others."""
+    """One question states number and states; then exactly these are approved."""
     page = review("Jane", "q=gap")
     page.keyboard.press("Shift+A")
     assert page.inner_text("#ask-title") == "Approve 2 groups?"
@@ -155,7 +154,7 @@ def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any]
 
 
 def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
-    """Before the effect, and after it at three levels, each with its value; they are loaded."""
+    """It shows frames before the effect and at three levels, each with its value, and they load."""
     page = review("Jane", "q=light")
     page.wait_for_selector(".pictures figure:nth-child(4)")
     pictures = page.locator(".pictures img")
@@ -174,8 +173,9 @@ def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
 def test_what_changed_since_an_approval_is_shown_as_a_diff(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """A changed line of an effect makes its approval stale, in an open page, too; the card shows the line as
-    it was and as it is."""
+    """A changed line of an effect makes its approval stale, also in an open page; the card shows the old and
+    the new line.
+    """
     page = review("Jane", "q=light")
     page.keyboard.press("j")
     page.keyboard.press("a")
@@ -202,7 +202,7 @@ def test_what_changed_since_an_approval_is_shown_as_a_diff(
 def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
-    """An approval that a server never got does not become one of code that came later, by way of a reload."""
+    """An approval that never reached a server does not become one of later code after a reload."""
     rmtree(library.library / "reviews", ignore_errors=True)
     lens = library.library.parent / "tree/toycar/lens.py"
     text = lens.read_text()
@@ -230,7 +230,9 @@ def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
 def test_marks_outlive_a_server_that_is_gone(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
-    """They wait in the tab, through a reload if the page is still there, and are sent to the next server."""
+    """Marks wait in the tab, also through a reload if the page is still available, and go to the
+    next server.
+    """
     rmtree(library.library / "reviews", ignore_errors=True)
     with serve(library, token="first") as address:
         page = visit(address, ADDRESS)
@@ -255,8 +257,9 @@ def test_marks_outlive_a_server_that_is_gone(
 def test_everyone_can_use_it_on_any_screen(
     review: Callable[..., Any], serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """With decisions, a flag, a remark and pictures: axe finds nothing serious in light and dark, and a
-    narrow screen needs no scrolling sideways."""
+    """With decisions, a flag, a remark and images, axe finds no serious fault in light and dark, and a narrow
+    screen does not scroll sideways.
+    """
     page = review("Jane")
     for key in "jajrjf":
         page.keyboard.press(key)

@@ -1,4 +1,4 @@
-"""The library that ships, reviewed in the browser: twenty groups, with a server that is killed in between."""
+"""The shipped library, reviewed in the browser: twenty groups, with a server that is killed in between."""
 
 import shutil
 import signal
@@ -16,14 +16,14 @@ from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[2]
 PORT_IN = "127.0.0.1:"
-KEYS = ("a", "r", "af", "rf")  # by turns: approve, reject, either with a flag
+KEYS = ("a", "r", "af", "rf")  # alternately: approve, reject, either with a flag
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the library, the templates and the target; nothing is reviewed in it."""
+    """A copy of the library, the templates and the target, without reviews."""
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     copy = tmp_path_factory.mktemp("whole")
     for name in ("fault_library", "templates", "target"):
@@ -35,7 +35,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def serving(root: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The command itself: its process, and the address that it prints."""
+    """The server command: its process, and the address that it prints."""
     words = ["serve", str(root / "runs"), "--root", str(root), "--no-browser", "--port", str(port)]
     process = subprocess.Popen([sys.executable, "-m", "mutator", *words], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -48,7 +48,7 @@ def serving(root: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], 
 
 
 def opened(context: Any, address: str) -> Any:
-    """The review page, in a tab of its own."""
+    """The review page, in its own tab."""
     page = context.new_page()
     page.goto(address)
     page.goto(address.partition("/?")[0] + "/review/openpilot")
@@ -69,15 +69,16 @@ def marked(page: Any, count: int) -> dict[str, str]:
 
 
 def shown(page: Any, group: str) -> str:
-    """Which marks the page shows of a group, as keys."""
+    """The marks that the page shows for a group, as keys."""
     pressed = f"#group-{group} .head [data-mark][aria-pressed=true]"
     kinds = page.eval_on_selector_all(pressed, "all => all.map((button) => button.dataset.mark)")
     return "".join(kind[0] for kind in kinds)
 
 
 def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
-    """Ten marks, a reload, a kill in the midst of five more, five after the restart: all twenty are there, in
-    the page and in the library."""
+    """Ten marks, a reload, a kill during five more, five after the restart: all twenty are in the page and in
+    the library.
+    """
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     marks: dict[str, str] = {}
@@ -110,7 +111,7 @@ def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Pa
 
 
 def test_an_effect_on_a_picture_of_the_road_is_seen(browser: Any, root: Path) -> None:
-    """Before and after, at three levels, as the camera sees the road."""
+    """The effect is shown on a camera frame of the road, before and at three levels."""
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     with serving(root) as (_, address):

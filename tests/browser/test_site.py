@@ -26,7 +26,7 @@ FOUND = {  # what a newcomer types, and the page that answers
     "load_run": "docs/reference/api",
     "film": "docs/how-to/film-an-experiment",
 }
-SHOWN = 5  # results that are seen without scrolling
+SHOWN = 5  # results visible without scrolling
 OVERFLOW = "document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
 pytestmark = pytest.mark.slow
@@ -52,7 +52,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def visited(browser: Any) -> Iterator[Any]:
-    """A page that fails the test for an error in its console, a request that fails and one to the network."""
+    """A page that fails the test on a console error, a failed request or a request to the network."""
     context = browser.new_context(reduced_motion="reduce")
     page, wrong = context.new_page(), []
     page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)
@@ -66,8 +66,8 @@ def visited(browser: Any) -> Iterator[Any]:
 
 @pytest.mark.parametrize("width", [WIDE, NARROW])
 def test_every_page_opens_from_its_file(site: Path, visited: Any, width: int) -> None:
-    """No page logs an error, misses a file, asks the network or is wider than the screen."""
-    pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")  # which leads on
+    """No page logs an error, misses a file, uses the network or is wider than the screen."""
+    pages = sorted(page for page in site.rglob("*.html") if page != site / "index.html")  # which redirects
     assert len(pages) > 60
     visited.set_viewport_size({"width": width, "height": 900})
     wider = {}
@@ -79,7 +79,7 @@ def test_every_page_opens_from_its_file(site: Path, visited: Any, width: int) ->
 
 
 def test_the_first_page_is_the_front_page(site: Path, visited: Any) -> None:
-    """index.html leads to the page of docs/README.md, whose sidebar has every page of the site."""
+    """index.html leads to the page of docs/README.md, which lists every page of the site in its sidebar."""
     visited.goto((site / "index.html").as_uri())
     visited.wait_for_url("**/docs/README.html")
     links = "all => all.map((a) => new URL(a.href).pathname)"
@@ -93,7 +93,7 @@ def test_the_first_page_is_the_front_page(site: Path, visited: Any) -> None:
 def test_pages_are_accessible(
     site: Path, browser: Any, page: str, scheme: str, serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """axe-core finds nothing serious in pages of each kind, light and dark."""
+    """axe-core finds no serious fault in pages of each kind, light and dark."""
     shown = browser.new_page(color_scheme=scheme, reduced_motion="reduce")
     shown.goto((site / f"{page}.html").as_uri())
     assert serious_faults(shown) == []
@@ -101,7 +101,7 @@ def test_pages_are_accessible(
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
-    """Each word leads to the page that answers it, among the first results."""
+    """For each word the page that answers it is among the first results."""
     missed = {}
     for words, page in FOUND.items():
         visited.goto(f"{(site / 'search.html').as_uri()}?q={words}")
@@ -114,7 +114,7 @@ def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
 
 
 def test_a_console_block_is_copied_without_prompts_and_output(site: Path, visited: Any) -> None:
-    """The copy button takes the commands of a console block, and all of any other block."""
+    """The copy button takes only the commands of a console block, and the whole of any other block."""
     visited.context.grant_permissions(["clipboard-read", "clipboard-write"])
     visited.goto((site / "docs" / "tutorial" / "first-campaign.html").as_uri())
     copied = []

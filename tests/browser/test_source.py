@@ -1,4 +1,4 @@
-"""The source of a run with operators' mutants in the report's page: marks that lead to experiments."""
+"""The source view of a run with operators' mutants in the report's page: marks lead to experiments."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Permanent mutants harm, transient ones are masked."""
+    """Permanent mutants do harm, transient ones are masked."""
     return HAZARD if experiment.trigger.name == "always" else {}
 
 
@@ -44,8 +44,9 @@ def report(
 def test_a_mark_lists_the_experiments_that_it_counts(
     report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """With the keyboard: the list has the experiments of the line, permanent or transient ones or, by the
-    line's number, both; nobody is shut out by colours or roles."""
+    """With the keyboard, the list shows a line's permanent or transient experiments or, by the line's number,
+    both; colours and roles are accessible.
+    """
     page = open_report(report)
     assert serious_faults(page.page) == []
     line = page.page.locator(".source tr", has_text="gas = min")
@@ -64,7 +65,7 @@ def test_a_mark_lists_the_experiments_that_it_counts(
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:
-    """Long lines are scrolled in their own box, in the dark, too; the page is no wider than the screen."""
+    """Long lines scroll in their own box, in the dark theme, too; the page is no wider than the screen."""
     page = open_report(report).page
     page.set_viewport_size({"width": 390, "height": 800})
     page.emulate_media(color_scheme="dark")

@@ -1,4 +1,4 @@
-"""Benchmarks are run by hand, so only a test notices that one has lost a name it imports."""
+"""Benchmarks are run by hand, so only this test notices a missing import."""
 
 import importlib
 from pathlib import Path
@@ -10,6 +10,6 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.py")))
 def test_every_benchmark_can_be_imported(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What it imports is there, and importing it measures nothing: it has a `main`."""
+    """Every benchmark imports without measuring anything, and has a `main`."""
     monkeypatch.syspath_prepend(FOLDER)
     assert callable(importlib.import_module(name).main)

@@ -1,4 +1,4 @@
-"""The harness is for any controller: it knows the names of none."""
+"""The harness serves any controller, so it contains no names of one."""
 
 import ast
 import re
@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 SOURCES = Path(__file__).parents[2] / "mutator"
-# `upgrade.py` reads manifests of the time when every target observed the same four values; the page is laid
-# beside copies of the shipped library
+# `upgrade.py` reads manifests from the time when every target observed the same four values;
+# `new_library.md` accompanies copies of the shipped library
 EXEMPT = {"paper", "upgrade.py", "new_library.md"}
 CARS = re.compile(
     r"(?<![a-z0-9])(d_rel|v_ego|v_lead|hwt|gas|brake|h[123]|lanes?|radars?|chaff|lead)(?![a-z0-9])", re.I
@@ -30,8 +30,7 @@ def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
 
 
 def found(code: str, suffix: str = ".py") -> list[tuple[int, str]]:
-    """Names of a car's: in identifiers and strings of Python, help examples apart, and anywhere in the lines
-    of other files."""
+    """Car names in Python identifiers and strings, except help examples, and anywhere in other files."""
     if suffix == ".py":
         texts = [(line, text) for line, text in words(ast.parse(code)) if "\nExamples:" not in text]
     else:
@@ -53,18 +52,18 @@ def found(code: str, suffix: str = ".py") -> list[tuple[int, str]]:
     ],
 )
 def test_a_name_of_a_car_is_found(code: str) -> None:
-    """Identifiers and strings are both read, and names of any spelling."""
+    """The check finds car names of any spelling in identifiers and strings."""
     assert found(code)
 
 
 @pytest.mark.parametrize("line", ["// #kind=radar%2Fchaff", "<p>no lane</p>", "const gasMax = 1;"])
 def test_a_name_of_a_car_is_found_in_other_files(line: str) -> None:
-    """Pages, scripts and templates are read whole, comments too."""
+    """Pages, scripts and templates are checked as a whole, including comments."""
     assert found(line, ".js")
 
 
 def test_the_harness_has_no_names_of_a_car() -> None:
-    """What a target observes, records and judges is told by its manifest alone."""
+    """Only the manifest says what a target observes, records and judges."""
     paths = [
         path
         for path in SOURCES.rglob("*.*")

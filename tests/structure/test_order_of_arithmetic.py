@@ -1,6 +1,6 @@
-"""What a run's bytes depend on is worked out in an order that is written down.
+"""Everything that a run's bytes depend on is computed in an explicit order.
 
-`selfdrive.common.ordered` and `selfdrive.common.array_math` say why, and have what to use instead.
+`selfdrive.common.ordered` and `selfdrive.common.array_math` give the reasons and the replacements.
 """
 
 import ast
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 TARGET = Path(__file__).parents[2] / "target"
-NO_RESULT = (  # draws, compares or trains; and symbols, which CasADi works out in the order that they have
+NO_RESULT = (  # draws, compares or trains; and symbols, which CasADi computes in their given order
     "selfdrive/sim/film/*",
     "selfdrive/sim/compare/*",
     "selfdrive/sim/effects/page.py",
@@ -39,8 +39,8 @@ FUNCTIONS = {
     *("hypot", "corrcoef", "cov", "arcsinh", "arccosh", "arctanh", "sinc", "logspace", "geomspace"),
 }
 UNORDERED = {"partition", "argpartition"}
-SORTS = {"argsort"}  # of equal values any may come first
-EXACT = {  # whole numbers, and sums that a double holds exactly: no order can matter
+SORTS = {"argsort"}  # the order of equal values does not matter
+EXACT = {  # whole numbers, and sums that a double holds exactly, where order does not matter
     ("can/packer.py", "sum(data.translate(_HALF_BYTE_SUMS))"),
     ("can/parser.py", "sum((field.mask << field.shift for field in self.fields))"),
     ("sim/recorder.py", "sum((1 << bit for bit, name in enumerate(COUNTED_ALERTS) if name in shown))"),
@@ -52,7 +52,7 @@ EXACT = {  # whole numbers, and sums that a double holds exactly: no order can m
 
 
 def found(source: str) -> Iterator[str]:
-    """Expressions whose order or last digits depend on Python or processor."""
+    """Expressions with an order or last digits that depend on Python or the processor."""
     for node in ast.walk(ast.parse(source)):
         is_product = isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult)
         by_name = isinstance(node, ast.ImportFrom) and node.module in {"numpy", "numpy.linalg"}
@@ -77,7 +77,7 @@ def _is_unordered(call: ast.Call) -> bool:
 
 
 def test_results_depend_on_no_order() -> None:
-    """No file that results depend on sums, multiplies or sorts in an order of its processor's."""
+    """No file that affects results sums, multiplies or sorts in a processor-dependent order."""
     wrong = []
     for path in sorted(TARGET.rglob("*.py")):
         name = path.relative_to(TARGET)

@@ -1,4 +1,4 @@
-"""How the house is built: which package may import which, and what no module may do."""
+"""The architecture: which package may import which, and what no module may do."""
 
 import ast
 import shutil
@@ -12,7 +12,7 @@ import pytest
 
 CLONE = Path(__file__).parents[2]
 TOP_MODULES = 12
-# may import the harness inside functions: they put off what a command does not need
+# may import the harness inside functions, to defer what a command does not need
 LAZY = ("mutator/__init__.py", "mutator/cli/", "mutator/execution/pytest_plugin.py")
 
 
@@ -21,7 +21,7 @@ def modules(root: Path) -> Iterator[Path]:
 
 
 def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
-    """(imported module, whether inside a function) of a module, below TYPE_CHECKING too."""
+    """(imported module, whether inside a function) of a module, including imports under TYPE_CHECKING."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {node for function in functions for node in ast.walk(function)}
@@ -46,7 +46,7 @@ def top_modules(root: Path) -> list[str]:
 
 
 def hidden_imports(root: Path) -> list[str]:
-    """Imports of the harness inside functions, where these are not allowed."""
+    """Disallowed imports of the harness inside functions."""
     return [
         f"{path.relative_to(root)}: {name}"
         for path in modules(root)
@@ -58,7 +58,7 @@ def hidden_imports(root: Path) -> list[str]:
 
 
 def cycle(root: Path) -> list[str]:
-    """The modules of a circle of imports; none if there is none."""
+    """The modules of an import cycle; empty if there is none."""
     edges: dict[str, set[str]] = {str(path.relative_to(root)): set() for path in modules(root)}
     for path in modules(root):
         for name, _ in imports(path, root):
@@ -72,7 +72,9 @@ def cycle(root: Path) -> list[str]:
 
 
 def strangers_in_target(root: Path) -> list[str]:
-    """Imports, in what runs inside a target's process, of more than the standard library and numpy."""
+    """Imports of anything except the standard library and numpy in code that runs inside a target's
+    process.
+    """
     allowed = {*sys.stdlib_module_names, "numpy"}
     package = root / "mutator"
     return [
@@ -84,7 +86,7 @@ def strangers_in_target(root: Path) -> list[str]:
 
 
 def namesakes(root: Path) -> list[str]:
-    """Modules with a function or class of their own name."""
+    """Modules that define a function or class with the module's name."""
     return [
         str(path.relative_to(root))
         for path in modules(root)
@@ -102,19 +104,19 @@ def lint(root: Path) -> subprocess.CompletedProcess[str]:
 
 
 def is_clean(root: Path) -> bool:
-    """Whether all that is checked here holds of a tree."""
+    """Whether a tree passes all checks of this file."""
     found = (hidden_imports(root), cycle(root), strangers_in_target(root), namesakes(root))
     return not any(found) and len(top_modules(root)) <= TOP_MODULES and lint(root).returncode == 0
 
 
 def test_contracts_hold() -> None:
-    """Packages import in one direction, without cycles, and harness and target do not know each other."""
+    """Packages import in one direction, without cycles, and harness and target do not import each other."""
     done = lint(CLONE)
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_shape_of_the_house() -> None:
-    """Few modules lie at the top, no modules import in a circle, and no import hides in a function."""
+    """Few modules lie at the top, no modules import in a circle, and no function hides an import."""
     top, hidden, circle = top_modules(CLONE), hidden_imports(CLONE), cycle(CLONE)
     print(
         f"modules at the top: {len(top)}, cycles: {bool(circle):d}, imports inside functions: {len(hidden)}"
@@ -168,7 +170,7 @@ VIOLATIONS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VIOLATIONS)
 def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
-    """What each contract forbids is noticed."""
+    """The linter reports a violation of each contract."""
     ignored = shutil.ignore_patterns("__pycache__", "*.npz")
     for folder in ("mutator", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=ignored)
@@ -180,7 +182,7 @@ def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
     assert not is_clean(tmp_path)
 
 
-# vocabulary of options and help texts, and how data are shown: no verb does its work by them
+# vocabulary of options and help texts, and presentation of data: no verb depends on them for its work
 SHOWN_BY_THE_COMMAND_LINE = {
     "mutator.config.yaml_files",
     "mutator.engines.kinds",
@@ -194,7 +196,7 @@ SHOWN_BY_THE_COMMAND_LINE = {
 
 
 def test_the_command_line_calls_the_api() -> None:
-    """What a verb does is a call of the public API: the command line imports no package behind it."""
+    """Verbs call the public API, and the command line imports no package behind it."""
     own = ("mutator.api.", "mutator.cli", "mutator._common.", "mutator.errors")
     for path in (CLONE / "mutator" / "cli").glob("*.py"):
         tree = ast.parse(path.read_text(encoding="utf-8"))
