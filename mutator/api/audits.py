@@ -122,7 +122,7 @@ def _workspace(given: WorkspaceLike) -> Workspace | None:
 
 def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
     """Rerun some experiments, and add their ids to the facts."""
-    what = "experiments driven again on the reference engine"
+    what = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the sources of the run")
     try:

@@ -83,7 +83,7 @@ def plan(
     *,
     place: Place,
 ) -> None:
-    """Fix a campaign's experiments without running any.
+    """Freeze a campaign's experiments without running any.
 
     Prints the expected time and disk space. `run` with the same folder then runs exactly these experiments.
     """

@@ -1,7 +1,6 @@
-"""The page of the Python API, written from the signatures and docstrings of `mutator.__all__`.
+"""Generates the page of the Python API from the signatures and docstrings of `mutator.__all__`.
 
-Signatures are printed as the source has them. An attribute is documented by a `#:` comment on its line, or on
-the lines above it.
+Signatures are printed as in the source. A `#:` comment on an attribute's line, or above it, documents it.
 """
 
 import ast
@@ -56,7 +55,7 @@ Function = ast.FunctionDef
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """A public attribute, property or method of a class: how it is written, its type, what is said of it."""
+    """A public attribute, property or method of a class: its form, type and meaning."""
 
     name: str
     written: str
@@ -65,7 +64,7 @@ class Member:
 
 
 def python_api(workspace: Workspace) -> str:
-    """docs/reference/api.md."""
+    """Return the text of docs/reference/api.md."""
     shared = Table(heads=("argument", "what you can pass"), rows=_ARGUMENTS).as_markdown(escape=False)
     parts = [generated("Python API"), _INTRO, shared, "\n## Functions\n"]
     for name in _functions():
@@ -79,7 +78,7 @@ def python_api(workspace: Workspace) -> str:
 
 
 def undocumented() -> list[str]:
-    """Public functions, classes, attributes and methods that say nothing of themselves."""
+    """Return the public functions, classes, attributes and methods without documentation."""
     missing = [name for name in (*_functions(), *_classes()) if not _parsed(getattr(mutator, name))[1]]
     for name, cls in _classes().items():
         missing += [f"{name}.{member.name}" for member in members(cls) if not member.meaning]
@@ -87,7 +86,8 @@ def undocumented() -> list[str]:
 
 
 def members(cls: type) -> list[Member]:
-    """What is public of a class: its own members, then those inherited from classes that are not public."""
+    """Return the public members of a class: its own, then those inherited from classes that are not
+    public."""
     public = set(_classes().values()) - {cls}
     found: dict[str, Member] = {}
     for base in cls.__mro__:
@@ -139,25 +139,25 @@ def _cell(text: str) -> str:
 
 
 def _type(text: str) -> str:
-    """A type as code, linked to the first public class in it."""
+    """Return a type as code, linked to the first public class in it."""
     code = f"`{text}`" if text else ""
     known = _public_in(text)
     return f"[{code}](#{known[0].lower()})" if known else code
 
 
 def _public_in(text: str) -> list[str]:
-    """The public classes that a type or signature names, each once."""
+    """Return the public classes that a type or signature names, each once."""
     return list(dict.fromkeys(name for name in re.findall(r"\w+", text) if name in _classes()))
 
 
 def _parsed(thing: Any) -> tuple[Any, str]:
-    """The syntax tree of a function or class, and its docstring."""
+    """Return the syntax tree of a function or class, and its docstring."""
     node: Any = ast.parse(dedent(inspect.getsource(thing))).body[0]
     return node, ast.get_docstring(node) or ""
 
 
 def _own_members(cls: type) -> Iterator[Member]:
-    """What the class's own source defines, in its order."""
+    """Yield the members that the class's own source defines, in order."""
     lines = dedent(inspect.getsource(cls)).splitlines()
     for node in _parsed(cls)[0].body:
         if isinstance(node, Function):
@@ -182,7 +182,7 @@ def _assigned_to_self(init: Function, lines: list[str]) -> Iterator[Member]:
 
 
 def _comment(node: ast.stmt, lines: list[str]) -> str:
-    """The `#:` comment on the lines of a statement, else on those just above it, as a sentence."""
+    """Return the `#:` comment on a statement's lines, or else just above them, as a sentence."""
     own = [
         found[1] for line in lines[node.lineno - 1 : node.end_lineno] if (found := _DOC_COMMENT.search(line))
     ]
@@ -215,17 +215,17 @@ def _annotation(node: ast.arg | ast.AnnAssign) -> str:
 
 
 def _plain(annotation: ast.expr) -> str:
-    """An annotation without the quotes of what is imported for types only."""
+    """Return an annotation without the quotes around names imported only for types."""
     return ast.unparse(annotation).strip("'")
 
 
 def _type_of(value: Any) -> str:
-    """The value of a member of an enumeration; the type of anything else."""
+    """Return the value of an enumeration's member, or the type of anything else."""
     return f'"{value.value}"' if isinstance(value, Enum) else type(value).__name__
 
 
 def _signature(node: Function, name: str, *, lines: bool = False) -> str:
-    """A call as it is written; with `lines` typed, each argument on a line of its own."""
+    """Return a call as written; with `lines`, typed and with one argument per line."""
     args = node.args
     positional = [*args.posonlyargs, *args.args]
     defaults: list[ast.expr | None] = [None] * (len(positional) - len(args.defaults))
