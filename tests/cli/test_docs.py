@@ -261,6 +261,12 @@ def test_every_page_can_be_reached() -> None:
     assert rest - shown == set(), "no page shows or links these"
 
 
+def test_no_two_pages_differ_in_their_suffix_alone() -> None:
+    """A page and a notebook of one folder have different names, since the site drops the suffix."""
+    names = [file.with_suffix("") for kind in ("*.md", "*.ipynb") for file in INDEX.parent.rglob(kind)]
+    assert len(set(names)) == len(names)
+
+
 def test_editors_are_told_of_every_schema() -> None:
     """The settings in the guide map each schema to its files."""
     page = (HOW_TO / "edit-with-completion.md").read_text(encoding="utf-8")
