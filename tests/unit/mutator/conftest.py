@@ -1,5 +1,6 @@
-"""A small foreign target with a library of its own, copied so that a test may change it; a fork engine on the
-toy target."""
+"""A small foreign target with its own library, copied so that a test may change it; a fork engine on the toy
+target.
+"""
 
 import shutil
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ def toy(tmp_path: Path) -> Workspace:
 
 @pytest.fixture(scope="session")
 def clone() -> Workspace:
-    """The workspace that ships: library, templates and target of this clone."""
+    """The shipped workspace: library, templates and target of this clone."""
     return Workspace.find(root=CLONE)
 
 
@@ -39,7 +40,7 @@ def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
 
 @pytest.fixture
 def edit(toycar: Workspace) -> Edit:
-    """Replaces text in a file of the toy."""
+    """Replace text in a file of the toy."""
 
     def replaced(name: str, old: str, new: str) -> None:
         path = toycar.library.parent / name

@@ -1,4 +1,4 @@
-"""Where caches lie, what is in them, and what is deleted first."""
+"""Location and content of caches, and the order of deletion."""
 
 import os
 from pathlib import Path
@@ -10,7 +10,9 @@ from mutator._common import caches
 
 @pytest.fixture
 def filled() -> Path:
-    """A cache with passed checks of two files, used last, and three files of a target, used one by one."""
+    """A cache with passed checks of two files, used last, and three files of a target, used at different
+    times.
+    """
     checks = caches.of_checks() / "ab12" / "golden" / "A"
     checks.mkdir(parents=True)
     (checks / "trace.npz").write_bytes(b"1" * 5000)
@@ -27,7 +29,7 @@ def filled() -> Path:
 def test_the_home_has_the_cache_unless_a_folder_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str
 ) -> None:
-    """XDG_CACHE_HOME is obeyed where it is a whole path, as its specification says; else ~/.cache."""
+    """An absolute XDG_CACHE_HOME counts, as its specification says; otherwise ~/.cache."""
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert caches.folder() == tmp_path / "mutator"
@@ -36,7 +38,7 @@ def test_the_home_has_the_cache_unless_a_folder_is_named(
 
 
 def test_without_a_home_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nobody knows the home folder the cache is one that cannot be made, and so empty."""
+    """Without a known home folder the cache path cannot be created, so the cache is empty."""
 
     def no_home() -> Path:
         raise RuntimeError("Could not determine home directory.")
@@ -50,13 +52,13 @@ def test_without_a_home_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None
 
 @pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain"])
 def test_any_name_of_a_target_is_one_folder(name: str) -> None:
-    """No target's folder lies outside the cache or inside another one's."""
+    """Every target's folder lies inside the cache and outside the other targets' folders."""
     place = caches.of_target(name)
     assert place.resolve().parent == (caches.folder() / "targets").resolve()
 
 
 def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
-    """Checks are kept as a whole, a target's files one by one; sizes are what they take on the disk."""
+    """Checks are listed as a whole, a target's files one by one; sizes are those on the disk."""
     found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in caches.entries()]
     files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
     assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]
@@ -64,7 +66,7 @@ def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
 
 
 def test_a_table_with_holes_counts_as_what_it_takes() -> None:
-    """A file of 800 MB that holds nothing yet does not have the rest of the cache deleted."""
+    """A sparse file of 800 MB that holds nothing yet does not cause the rest of the cache to be deleted."""
     place = caches.of_target("car")
     place.mkdir(parents=True)
     with (place / "table").open("wb") as file:
@@ -74,7 +76,7 @@ def test_a_table_with_holes_counts_as_what_it_takes() -> None:
 
 
 def test_the_least_recently_used_go_first(filled: Path) -> None:
-    """Pruning deletes from the oldest on until the rest is small enough, and no more."""
+    """Pruning deletes the oldest entries until the rest is small enough."""
     sizes = {entry.path.name: entry.size for entry in caches.entries()}
     kept = sizes["ab12"] + sizes["a.npy"]
     assert [entry.path.name for entry in caches.prune(kept)] == ["hog.so", "b.npy"]
@@ -83,7 +85,7 @@ def test_the_least_recently_used_go_first(filled: Path) -> None:
 
 
 def test_clearing_leaves_no_file(filled: Path) -> None:
-    """All is deleted, and only what is in the cache: a link goes, what it leads to stays."""
+    """Clearing deletes everything in the cache: a link goes, its target stays."""
     outside = filled.parent / "outside"
     outside.mkdir()
     (outside / "kept").write_text("kept")
@@ -96,7 +98,7 @@ def test_clearing_leaves_no_file(filled: Path) -> None:
 def test_a_target_that_is_driven_with_many_seeds_keeps_what_it_used_last(
     filled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What it used longest ago goes; nothing else does, and nothing while there is room."""
+    """Only the least recently used files go, and none while there is room."""
     assert caches.make_room("car") == []
     monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)
     assert [entry.path.name for entry in caches.make_room("car")] == ["hog.so"]

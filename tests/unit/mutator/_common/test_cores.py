@@ -1,4 +1,4 @@
-"""How many cores may be used."""
+"""The number of usable cores."""
 
 import os
 from pathlib import Path
@@ -22,7 +22,9 @@ from mutator._common import cores
 def test_a_quota_counts(
     quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As many as the process is bound to, less where a container has a smaller quota, and at least one."""
+    """The number is that of the process's affinity, less if a container has a smaller quota, and at least
+    one.
+    """
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
     monkeypatch.setattr(cores, "_QUOTA", tmp_path / "cpu.max")
     if quota is not None:

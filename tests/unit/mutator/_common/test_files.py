@@ -1,4 +1,4 @@
-"""The harness's own files: schema versions, whole writes, a full disk."""
+"""The harness's own files: schema versions, atomic writes, a full disk."""
 
 import errno
 import os
@@ -24,7 +24,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """A JSON object of the right schema comes back as it was."""
+    """A JSON object of the right schema is read back unchanged."""
     write_json(tmp_path / "a.json", {"schema": "a/1", "x": [1, None]})
     assert read_json(tmp_path / "a.json", "a/1") == {"schema": "a/1", "x": [1, None]}
 
@@ -33,7 +33,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     "text", ["", "{", "[]", "{}", '{"schema": "b/1"}', '{"schema": "a"}', '{"schema": 1}']
 )
 def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
-    """What is no JSON object of that schema is an error that names the file."""
+    """A file without a JSON object of that schema is an error that names the file."""
     path = tmp_path / "a.json"
     path.write_text(text)
     with pytest.raises(MutatorError, match=r"a\.json"):
@@ -41,7 +41,7 @@ def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
-    """A pipe in the place of a file is no file; a file is read as ever."""
+    """A pipe in the place of a file is refused without waiting; a regular file is read."""
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(MutatorError, match=r"a\.json: not a file"):
         read_json(tmp_path / "a.json", "a/1")
@@ -50,14 +50,16 @@ def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
 
 
 def test_newer_schema_is_refused() -> None:
-    """A newer version is told as such, with what to do; an older one is read."""
+    """A newer version is refused with a remedy; an older one is read."""
     check_schema("run/1", "run/2", Path("run.json"))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
         check_schema("run/3", "run/2", Path("run.json"))
 
 
 def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
-    """Deep, locked and strange folders go; what they link to stays, as does a link in place of the folder."""
+    """Deep, locked and unusual folders are deleted; the targets of links stay, as does a link in place of the
+    folder.
+    """
     kept, folder = tmp_path / "kept", tmp_path / "folder"
     kept.mkdir()
     (kept / "x").touch()
@@ -80,7 +82,7 @@ def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
 
 
 def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is gone after its `with` block, or with the object."""
+    """The folder is deleted after its `with` block, or with the object."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()
@@ -93,7 +95,9 @@ def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
 def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
-    """A pipe or device, and a link to one, is no file; a folder is told by who opens it."""
+    """A pipe or device, or a link to one, is refused without waiting; opening a folder gives the
+    usual error.
+    """
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match="No such device") as refused:
@@ -103,7 +107,7 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
 
 
 def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without room the old file stays whole, nothing is left over, and the answer says what to do."""
+    """On a full disk the old file stays whole, no temporary file is left, and the error has a remedy."""
     path = tmp_path / "results.csv"
     path.write_bytes(b"old")
 
@@ -119,7 +123,7 @@ def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_several_write_one_file_at_once(tmp_path: Path) -> None:
-    """Threads, like processes: who reads meanwhile gets what one of them wrote, and nothing is left over."""
+    """While threads or processes write, readers get one writer's content, and no temporary file is left."""
     path = tmp_path / "file"
     texts = [bytes([number]) * 100_000 for number in range(4)]
     write_atomic(path, texts[0])
@@ -132,7 +136,7 @@ def test_several_write_one_file_at_once(tmp_path: Path) -> None:
 
 
 def test_other_failures_are_not_called_a_full_disk(tmp_path: Path) -> None:
-    """A folder that is not there is not told as a full disk."""
+    """A missing folder is not reported as a full disk."""
     with pytest.raises(FileNotFoundError):
         write_atomic(tmp_path / "nosuch" / "file", b"")
 
@@ -142,8 +146,7 @@ def no_room(*_: object, **__: object) -> None:
 
 
 def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk or quota is told as one when `shutil` has put it into a list of texts, and when a library
-    has made another error of it."""
+    """A full disk or quota is recognized inside `shutil`'s list of texts and behind a library's own error."""
     (tmp_path / "from").mkdir()
     (tmp_path / "from" / "file").touch()
     monkeypatch.setattr(shutil, "copyfile", no_room)
@@ -157,7 +160,7 @@ def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     with pytest.raises(RuntimeError), raising_disk_full(tmp_path):
         raise RuntimeError("cannot encode")
     one, other = RuntimeError("one"), RuntimeError("other")
-    one.__context__, other.__context__ = other, one  # frameworks make circles of causes
+    one.__context__, other.__context__ = other, one  # frameworks create cycles of causes
     with pytest.raises(RuntimeError, match="one"), raising_disk_full(tmp_path):
         raise one
     with pytest.raises(MutatorError, match="mine"), raising_disk_full(tmp_path):

@@ -1,4 +1,4 @@
-"""Ids that outlive new fields."""
+"""Ids stay the same when records get new fields."""
 
 import json
 from dataclasses import dataclass, replace
@@ -62,13 +62,13 @@ OLD = experiment(model.Experiment, model.Trigger, OLD_FAULT)
 
 
 def test_ids_are_those_of_the_first_release() -> None:
-    """These ids stand in results that were cited: they are the same in every version."""
+    """Published results cite these ids, so every version computes the same ones."""
     assert (OLD_FAULT.id, OLD.id) == ("a128796d71e1fdf8", "876900fefe457b38")
     assert content_id([OLD_FAULT.injections[0], OLD.trigger]) == "f51174baeee5206c"
 
 
 def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
-    """Records with fields of a later version have the ids and plan lines of those without."""
+    """Records with later fields at their defaults have the same ids and plan lines as without them."""
     new_fault = fault(Fault, Injection)
     new = experiment(Experiment, Trigger, new_fault)
     assert (new_fault.id, new.id) == (OLD_FAULT.id, OLD.id)
@@ -77,7 +77,7 @@ def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
 
 
 def test_an_added_field_that_says_something_changes_the_id() -> None:
-    """Any other value than the default makes another fault and another experiment, wherever it stands."""
+    """Any value except the default makes another fault and another experiment, at any level."""
     tagged = fault(Fault, Injection, tags=("wet",))
     injection = Injection(location=LOCATION, model="offset", params=PARAMS, every=2)
     rarer = replace(fault(Fault, Injection), injections=(injection,))
@@ -91,12 +91,12 @@ def test_an_added_field_that_says_something_changes_the_id() -> None:
 
 
 def test_a_field_that_is_not_added_counts_also_with_its_default() -> None:
-    """The first release hashed every field; what it hashed stays in."""
+    """The first release hashed every field, so these fields are always hashed."""
     assert plain(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
 
 
 def test_digests_tell_kinds_of_values_apart() -> None:
-    """A number, its text, its truth value, and lists of these have digests of their own."""
+    """A number, its text, its truth value, and lists of these have different digests."""
     values = [1.0, 1, True, "1", None, [1], [[1]], {"a": 1}, b"1 "]
     assert len({digest(value) for value in values}) == len(values)
 
@@ -106,12 +106,12 @@ def test_digests_tell_kinds_of_values_apart() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """Also what the faster reader refuses: numbers that are none, half a pair."""
+    """Also values that the faster reader refuses: NaN, infinities, lone surrogates."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"\xff", b"[1,]"])
 def test_what_is_no_json_is_a_value_error(data: bytes) -> None:
-    """As of `json.loads`."""
+    """Invalid JSON raises ValueError, as in `json.loads`."""
     with pytest.raises(ValueError):
         from_json(data)

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command in order, and wait while native code is at work."""
+"""Ctrl-C and SIGTERM end a command cleanly, and wait for running native code."""
 
 import signal
 
@@ -27,7 +27,7 @@ def test_held_signal_waits_until_the_outermost_ends(number: signal.Signals) -> N
         done.append("outer")
     assert done == ["inner", "outer"]
     with terminable(), held():
-        pass  # it was asked once, and is answered once
+        pass  # one request gets one response
 
 
 def test_held_signal_goes_before_the_error_that_it_found() -> None:

@@ -1,4 +1,4 @@
-"""What ships with the harness: the clone's folders, or an archive that is unpacked and kept as it is."""
+"""What ships with the harness: the clone's folders, or an archive that is unpacked and kept unchanged."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +20,7 @@ FILES = {"target/selfdrive/a.py": b"A = 1\n", "fault_library/b.yaml": b"b: 1\n",
 
 @pytest.fixture
 def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An installation that came as a wheel, as far as what ships with it goes, and an empty data folder."""
+    """What a wheel installation ships, and an empty data folder."""
     path = tmp_path / "shipped.zip"
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
@@ -36,12 +36,12 @@ def as_in_a_new_process() -> Path:
 
 
 def test_a_clone_ships_its_own_folders() -> None:
-    """Without an archive, as in a clone or an editable install, the folders beside the package are meant."""
+    """Without an archive, as in a clone or an editable install, the folders next to the package are used."""
     assert shipped_folder() == CLONE
 
 
 def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
-    """Its files, and nothing else, are unpacked into the user's data folder and stay there."""
+    """Exactly its files are unpacked into the user's data folder and stay there."""
     folder = shipped_folder()
     assert folder.is_relative_to(tmp_path / "data" / "mutator")
     found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
@@ -78,7 +78,7 @@ def delete(folder: Path) -> None:
     ("change", "named"), [(edit, "selfdrive/a.py"), (add, "selfdrive/extra.py"), (delete, "templates/c.j2")]
 )
 def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
-    """What was edited there never runs as what ships: the file is named, and the way out."""
+    """A copy that was edited is refused: the error names the file and the remedy."""
     change(shipped_folder())
     with pytest.raises(
         MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"
@@ -87,7 +87,7 @@ def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None]
 
 
 def test_bytecode_is_no_change(archive: Path) -> None:
-    """Bytecode is never part of a tree, so what somebody left there by an import does no harm."""
+    """Bytecode is never part of a tree, so bytecode of an import does no harm."""
     folder = shipped_folder()
     (folder / "target/selfdrive/__pycache__").mkdir()
     (folder / "target/selfdrive/__pycache__/a.cpython-311.pyc").touch()
@@ -97,7 +97,7 @@ def test_bytecode_is_no_change(archive: Path) -> None:
 def test_a_folder_that_cannot_be_written(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error says which folder it is and how to choose another."""
+    """The error names the folder and how to choose another."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "file"))
     with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_DATA_HOME"):
@@ -105,7 +105,7 @@ def test_a_folder_that_cannot_be_written(
 
 
 def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """When another process has unpacked it meanwhile, its folder is taken, and nothing is left over."""
+    """If another process has unpacked it first, its folder is used, and no files are left over."""
     folder = shipped_folder()
     monkeypatch.setattr(Path, "is_dir", lambda path, **_: path.exists() and not _first(seen, path))
     seen: set[Path] = set()
@@ -115,14 +115,14 @@ def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def _first(seen: set[Path], path: Path) -> bool:
-    """True the first time: the folder is not there yet when it is looked for."""
+    """True the first time: the folder does not exist yet when it is checked."""
     new = path not in seen
     seen.add(path)
     return new
 
 
 def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
-    """Files of the unpacked library are refused for writing, others are not."""
+    """The harness refuses to write to files of the unpacked library, but not to others."""
     refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
     with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
         refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
@@ -131,7 +131,7 @@ def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
 def test_a_new_library_is_a_copy_that_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only the manifest's `root` is not as it ships, and the folder works wherever it is moved."""
+    """Only the manifest's `root` differs from the shipped library, and the folder can be moved."""
     write_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
@@ -149,7 +149,7 @@ def test_a_new_library_is_a_copy_that_finds_the_controller(
 
 
 def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
-    """An edited template and an edited spec show in the mutant's diff."""
+    """The mutant's diff shows an edited template and an edited spec."""
     write_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))
@@ -164,7 +164,7 @@ def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "full", "below a file"])
 def test_only_an_empty_folder_becomes_a_library(tmp_path: Path, kind: str) -> None:
-    """Nothing of the user's is mixed with a new library, let alone overwritten."""
+    """A new library is never mixed with existing files and overwrites none."""
     place = tmp_path / "place"
     if kind == "full":
         place.mkdir()

@@ -1,4 +1,4 @@
-"""What an error says of a machine that has no more to give."""
+"""Errors for exhausted machine resources."""
 
 import errno
 import os
@@ -22,7 +22,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_shortages(error: Exception, said: str) -> None:
-    """Each is told with what to do, also where another error came of it."""
+    """Each shortage is reported with a remedy, also as the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)
@@ -37,5 +37,5 @@ def test_shortages(error: Exception, said: str) -> None:
     "error", [ValueError("x"), ImportError("No module named 'x'"), OSError(errno.ENOENT, "")]
 )
 def test_other_errors(error: Exception) -> None:
-    """Anything else is none."""
+    """No other error counts as a shortage."""
     assert shortage(error) is None

@@ -6,13 +6,13 @@ from mutator._common.tables import Table
 
 
 def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
-    """Columns are as wide as their widest cell, and no line ends in spaces."""
+    """Columns are as wide as their widest cell, and no line ends with spaces."""
     table = Table(heads=("fault", "runs"), rows=[("radar/chaff", "7"), ("fog", "12")], right=(1,))
     assert table.as_text().splitlines() == ["fault        runs", "radar/chaff     7", "fog            12"]
 
 
 def test_a_table_without_rows_is_its_heads() -> None:
-    """An empty table still says what it would list."""
+    """An empty table still prints its heads."""
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
     assert table.as_markdown() == "| a | b |\n|---|---|"
@@ -20,7 +20,7 @@ def test_a_table_without_rows_is_its_heads() -> None:
 
 
 def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
-    """Whatever ends a line, or would be taken for an element, italics or bold, in a cell is text."""
+    """Line breaks and characters that Markdown would interpret stay text in a cell."""
     lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
     assert Table(heads=["said"], rows=lines).as_markdown().splitlines()[2:] == [
         "| a b c |",
@@ -39,7 +39,7 @@ def test_a_bar_in_a_cell_does_not_end_it() -> None:
 
 
 def test_html_escapes_texts_and_marks_continued_rows() -> None:
-    """A text is never an element, braces are text, and a row with an empty first cell has a class."""
+    """Text is never an element, braces are text, and a row with an empty first cell has a class."""
     html = Table(heads=["<b>"], rows=[["<i> & {0}"], [""]]).as_html("plain")
     assert '<table class="plain">' in html
     assert '<th scope="col">&lt;b&gt;</th>' in html
@@ -48,14 +48,14 @@ def test_html_escapes_texts_and_marks_continued_rows() -> None:
 
 
 def test_html_shows_markup_as_it_is() -> None:
-    """A cell may be a link; what a caller did not mark is text."""
+    """A cell may be a link; text that the caller did not mark as markup is escaped."""
     link = Markup('<a href="#e=1">{}</a>').format("<1>")
     html = Table(heads=["id", "said"], rows=[[link, "<b>"]]).as_html()
     assert '<tr><td><a href="#e=1">&lt;1&gt;</a></td><td>&lt;b&gt;</td></tr>' in html
 
 
 def test_html_has_heads_of_rows_and_columns_of_numbers() -> None:
-    """Facts have a head for each row and may have none for the columns; numbers have a class of their own."""
+    """Tables of facts have row heads and optional column heads; numbers have their own class."""
     html = Table(heads=("", ""), rows=[("runs", "7")], right=(1,), named=True).as_html()
     assert '<tr><th scope="row">runs</th><td class="number">7</td></tr>' in html
     assert "<thead>" not in html

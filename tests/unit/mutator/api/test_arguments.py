@@ -49,7 +49,7 @@ def drive(workspace: Workspace, **given: Any) -> mutator.Trial:
 def test_a_wrong_argument_is_named(
     toycar: Workspace, tmp_path: Path, call: Callable[[Any, Path], Any], argument: str
 ) -> None:
-    """What cannot be meant is a MutatorError that names the argument, and no option of the command line."""
+    """An invalid argument is a MutatorError that names the argument, and no option of the command line."""
     out = tmp_path / "out"
     with pytest.raises(MutatorError) as caught:
         call(toycar, out)
@@ -60,7 +60,7 @@ def test_a_wrong_argument_is_named(
 
 
 def test_an_id_is_text(toycar: Workspace, tmp_path: Path) -> None:
-    """A number is no start of an experiment's id, and is refused as such."""
+    """A number is refused as the start of an experiment's id."""
     mutator.plan("toy", tmp_path / "p", workspace=toycar)
     wrong: Any = 3
     with pytest.raises(MutatorError, match=r"^id: 3; expected the id of an experiment"):

@@ -29,7 +29,7 @@ def test_a_mutant_is_built(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_same_input_gives_the_same_id(toycar: Workspace) -> None:
-    """By name or as records, a fault under a trigger is the same mutant."""
+    """A fault under a trigger gives the same mutant by name and as records."""
     [fault, *_] = toycar.faults("sensor/distance/longer")
     by_record = mutator.build_mutant(fault, "near", workspace=toycar)
     assert isinstance(fault.value, int)
@@ -53,7 +53,7 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
 
 
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
-    """Without triggers every context is taken; a glob that fits nothing is an error."""
+    """Without triggers every context is used; a glob without a match is an error."""
     bench = Bench.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])
     assert {trigger.name for _, trigger in pairs} == {"near", "far"}

@@ -1,4 +1,4 @@
-"""Mutants reviewed from Python."""
+"""Review mutants from Python."""
 
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
-    """A group that was approved is found so again, and a page is written."""
+    """An approval is stored and found again, and the page is written."""
     found = mutator.load_review(specs=["sensor/lane"], workspace=toycar)
     group = found.undecided[0]
     assert found.find([group.id[:8]]) == [group]
@@ -23,6 +23,6 @@ def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_campaign_or_specs(toycar: Workspace) -> None:
-    """Both at once cannot be meant; the error names the argument."""
+    """A campaign plus specs is refused; the error names the argument."""
     with pytest.raises(MutatorError, match=r"^campaign: together with specs"):
         mutator.load_review(campaign="small", specs=["sensor/lane"], workspace=toycar)

@@ -36,7 +36,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-in-a-notebook.md"
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """Faults of the lane are hazardous, silence crashes the controller, the rest is masked."""
+    """Lane faults are hazardous, silence crashes the controller, the rest is masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0), ("H1", 4.5))}
@@ -49,15 +49,16 @@ def run(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Run:
-    """A toy run with made up records."""
+    """A toy run with made-up records."""
     folder = tmp_path_factory.mktemp("load")
     toycar = copy_toycar(folder)
     return mutator.load_run(write_run(toycar, folder / "first", became), workspace=toycar)
 
 
 def test_propagation_as_frames(run: Run) -> None:
-    """Of the run a row for each channel that left golden, of an experiment its channels by time; a run of
-    before there was any says so."""
+    """A run's frame has a row for each channel that left golden, an experiment's its channels by time; for
+    older runs an error says that it is missing.
+    """
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)
@@ -72,7 +73,7 @@ def test_propagation_as_frames(run: Run) -> None:
 
 
 def test_the_frame_is_typed(run: Run) -> None:
-    """Names are categories, flags are flags that may be unknown, times are floats with their unit."""
+    """Names are categories, flags are nullable, times are floats with their unit."""
     frame = run.results
     assert len(frame) == 24
     assert frame.index.name == "experiment_id"
@@ -88,7 +89,7 @@ def test_the_frame_is_typed(run: Run) -> None:
 
 
 def test_hazards_of_the_frame(run: Run) -> None:
-    """Any hazard and the first one are told; of a crash it is not known whether there would have been one."""
+    """The frame has any hazard and the first one; for a crash the hazard is unknown."""
     frame = run.results
     lane, silence = (frame[frame["fault_type"] == name] for name in ("lane", "silence"))
     assert lane["hazard"].all()
@@ -98,7 +99,7 @@ def test_hazards_of_the_frame(run: Run) -> None:
 
 
 def test_it_says_what_it_is(run: Run) -> None:
-    """A run is shown in one line; its faults and its provenance are at hand."""
+    """A run prints as one line, with access to its faults and provenance."""
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
@@ -112,7 +113,7 @@ def driven_once(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """A run of one experiment that was really driven, with golden run, patch and record, and no trace."""
+    """A run of one simulated experiment, with golden run, patch and record, and no trace."""
     root = tmp_path_factory.mktemp("driven")
     toycar = copy_toycar(root)
     folder = RunFolder.open(
@@ -142,8 +143,11 @@ def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
 
 
 def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
-    """Golden and faulty run are frames by time with units. Without a series the experiment is driven again,
-    once; exact ones are driven each time, and have all channels in double precision."""
+    """Golden and faulty run are frames by time with units.
+
+    Without a series the experiment is rerun once; exact traces are rerun each time, and have all channels in
+    double precision.
+    """
     [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
@@ -168,7 +172,7 @@ def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
 
 
 def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
-    """Diff, fault, record, verdict and plot are at hand, and a notebook gets a table and a picture."""
+    """An experiment has diff, fault, record, verdict and plot, and a notebook shows a table and a figure."""
     [name] = driven.results.index
     experiment = driven.experiment(name)
     assert "# fi:" in experiment.diff
@@ -182,8 +186,10 @@ def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
 
 
 def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
-    """A re-run says whether its record is the campaign's, and leaves nothing behind unless asked to. The
-    series of another one is not kept."""
+    """A rerun says whether its record equals the campaign's, and leaves no files unless requested.
+
+    The series of a differing one is not kept.
+    """
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
@@ -201,7 +207,7 @@ def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
 
 
 def test_two_processes_may_want_one_series(driven: Run) -> None:
-    """Both drive the experiment, one after the other, and each has the whole series."""
+    """Both rerun the experiment, one after the other, and each has the whole series."""
     [name] = driven.results.index
     library = driven.workspace.library
     look = (
@@ -223,7 +229,7 @@ def test_two_processes_may_want_one_series(driven: Run) -> None:
 
 
 def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The code of the page runs as it is printed, one block after the other, on a run in runs/first."""
+    """The page's code runs as printed, block by block, on a run in runs/first."""
     library = driven.workspace.library
     monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
     small = (library / "campaigns" / "small.yaml").read_text()
@@ -242,7 +248,7 @@ def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pyte
 
 
 def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
-    """Asking for what a run does not have names what it has."""
+    """An error about missing data lists what the run has."""
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
@@ -254,7 +260,7 @@ def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
 def test_a_planned_experiment_has_a_diff_and_no_traces(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """Before it ran, an experiment's mutant is made when asked for; its traces are an error that helps."""
+    """A planned experiment's mutant is built on request; asking for its traces is an error with a remedy."""
     run = mutator.load_run(write_run(toycar, tmp_path / "r", lambda e: None), workspace=toycar)
     experiment = run.experiment(next(iter(run.experiments)))
     assert "# fi:" in experiment.diff
@@ -265,7 +271,7 @@ def test_a_planned_experiment_has_a_diff_and_no_traces(
 
 
 def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> None:
-    """A run with harness errors says so where it is shown, and names the experiments."""
+    """A run with harness errors says so in its display and names the experiments."""
     run = mutator.load_run(
         write_run(
             toycar,
@@ -279,7 +285,7 @@ def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: C
 
 
 def test_reports_and_exports(run: Run) -> None:
-    """A run writes its report and its exports; what is exported as CSV is results.csv."""
+    """A run writes its report and its exports; the CSV export is results.csv."""
     assert run.export("csv").read_bytes() == (run.path / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match=r"'xls'.*expected one of mutation-elements, junit, csv, parquet"):
         run.export("xls")

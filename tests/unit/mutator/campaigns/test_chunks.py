@@ -1,4 +1,4 @@
-"""Chunks: how a plan is cut, and what is left of it."""
+"""Chunks: how a plan is cut, and what remains to run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,14 +35,14 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def test_everything_is_pending_at_first(folder: RunFolder) -> None:
-    """Without records every place of every chunk is left."""
+    """Without records, every place of every chunk is pending."""
     left = pending(folder, {})
     assert [item.chunk for item in left] == list(range(8))
     assert sum(len(item.places) for item in left) == 24
 
 
 def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Record]) -> None:
-    """What has a record is not run again, but for harness errors; whole chunks disappear."""
+    """An experiment with a record is not pending, except after a harness error; complete chunks disappear."""
     faults = read_faults(folder.path)
     chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
@@ -55,7 +55,7 @@ def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Recor
 
 
 def test_a_chunk_is_read_alone(folder: RunFolder) -> None:
-    """Each chunk's bytes give its experiments, all together the plan."""
+    """Each chunk's bytes give its experiments; together they are the plan."""
     faults = read_faults(folder.path)
     found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24

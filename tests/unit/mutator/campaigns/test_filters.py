@@ -1,4 +1,4 @@
-"""Filter expressions: what they accept, what they refuse, and that they are never run as code."""
+"""Filter expressions: what they accept and refuse, and that they are never run as code."""
 
 import pytest
 
@@ -30,7 +30,7 @@ ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": No
     ],
 )
 def test_expressions(text: str, expected: bool) -> None:
-    """Comparisons, membership, globs and logic mean what they do in Python; an empty cell compares false."""
+    """Comparisons, membership, globs and logic work as in Python; an empty cell compares false."""
     assert compile_filter(text, ROW)(ROW) is expected
 
 
@@ -59,21 +59,21 @@ def test_expressions(text: str, expected: bool) -> None:
     ],
 )
 def test_anything_else_is_refused(text: str) -> None:
-    """Whatever is not on the list is an error that shows what was written."""
+    """Any other syntax is an error that shows the text."""
     with pytest.raises(MutatorError) as error:
         compile_filter(text, ROW)
     assert "filter" in str(error.value)
 
 
 def test_unknown_column_lists_the_known_ones() -> None:
-    """A misspelt column is answered with the columns there are."""
+    """An error for a misspelt column lists the existing columns."""
     with pytest.raises(MutatorError, match=r"unknown column `speed`.*fault_type.*value"):
         compile_filter("speed > 1", ROW)
 
 
 @pytest.mark.parametrize("text", ['value > "S1"', "scenario in 5"])
 def test_comparing_unlike_things_is_told(text: str) -> None:
-    """A comparison that makes no sense for a row's values is a MutatorError, not a TypeError."""
+    """A comparison of incompatible values is a MutatorError, not a TypeError."""
     accepts = compile_filter(text, ROW)
     with pytest.raises(MutatorError):
         accepts(ROW)

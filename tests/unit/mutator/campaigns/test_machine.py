@@ -1,4 +1,4 @@
-"""What computes here, as run folders have it."""
+"""The machine's description in run folders."""
 
 import os
 import subprocess
@@ -18,14 +18,16 @@ def git(folder: Path, *words: str) -> None:
 
 
 def test_required_packages_are_those_of_the_harness_and_theirs() -> None:
-    """What mutator requires, and what that requires, by its usual name; nothing of its extras, nor itself."""
+    """The list has mutator's requirements and theirs, by canonical name; neither its extras nor mutator
+    itself.
+    """
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
 
 
 def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package that is needed on Windows alone, or by an extra that nobody asked for, is no requirement."""
+    """A package needed only on Windows, or by an unused extra, is no requirement."""
     told = {
         "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
@@ -36,24 +38,24 @@ def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPa
 
 
 def test_where_mutator_is_not_installed_every_package_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nobody says what it requires, so nothing may change."""
+    """If mutator is not installed, its requirements are unknown, so every package counts."""
     monkeypatch.setattr(machine, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
     assert machine.required() == {"numpy", "stranger"}
 
 
 def test_versions_are_those_installed() -> None:
-    """The version that Python's own metadata has; none of what is not there."""
+    """The version is that of Python's metadata; missing packages have none."""
     found = machine.versions(["numpy", "no-such-package"])
     assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
 
 
 def test_modules_are_named_by_their_packages() -> None:
-    """A module may be named otherwise than what it is installed by; what nothing installed is left out."""
+    """A module may have another name than its package; modules without a package are left out."""
     assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
 
 
 def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """One thread, whatever the user's environment says: the target's process gets another one."""
+    """BLAS has one thread, whatever the user's environment says: the target's process gets its own."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     machine.blas.cache_clear()
     (library,) = machine.blas()
@@ -62,14 +64,14 @@ def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_processor_is_named() -> None:
-    """The model that /proc/cpuinfo has, where it has one."""
+    """The model from /proc/cpuinfo, if it has one."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
     assert not models or machine.cpu() in models
 
 
 def test_the_state_of_a_clone(tmp_path: Path) -> None:
-    """The commit, and whether something in that folder changed: elsewhere in the clone does not count."""
+    """The commit, and whether that folder has changes; changes elsewhere in the clone do not count."""
     library, other = tmp_path / "library", tmp_path / "other"
     for folder in (library, other):
         folder.mkdir()
@@ -81,12 +83,12 @@ def test_the_state_of_a_clone(tmp_path: Path) -> None:
     git(tmp_path, "commit", "-qm", "one")
     found = machine.clone_state(library)
     assert found is not None and len(found["commit"]) == 40 and found["changed"] is False
-    assert machine.clone_state(other) is None  # in the clone's folder, and in no commit
+    assert machine.clone_state(other) is None  # in the clone's folder, but in no commit
     (library / "b.yaml").write_text("new")
     assert machine.clone_state(library) == found | {"changed": True}
 
 
 def test_without_git_nothing_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """A machine without git has no commit to tell."""
+    """Without git no commit is reported."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert machine.clone_state(Path(__file__).parent) is None

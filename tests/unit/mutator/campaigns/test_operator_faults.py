@@ -1,4 +1,4 @@
-"""Campaigns with mutants of operators: what is planned, when it is active, what is refused."""
+"""Campaigns with operators' mutants: the plan, the times of activity, the refusals."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 
 @pytest.fixture(autouse=True)
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a golden run would tell, without driving one: the driver's lines up to the one of its gas."""
+    """The executed lines of a golden run, without running one: the driver's lines up to the gas."""
 
     def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
@@ -32,7 +32,7 @@ def lines(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Path:
-    """A campaign of mutants of operators alone, with random times of half a second."""
+    """A campaign of operators' mutants only, with random times of half a second."""
     text = toycar.campaign("small").read_text()
     begin, end = text.index("faults:"), text.index("methods:")
     text = f"{text[:begin]}faults:\n{ENTRY}\n{text[end:]}".replace("[guided, random]", "[random]")
@@ -50,8 +50,9 @@ def _edited(campaign: Path, old: str, new: str) -> Path:
 
 
 def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) -> None:
-    """Each drawn mutant is planned under `always` and at a random time; ids, order and digest are the same
-    each time, and the plan tells what was left out."""
+    """Each drawn mutant is planned under `always` and at a random time; ids, order and digest are
+    reproducible, and the plan lists what was left out.
+    """
     plan = make_plan(toycar, campaign)
     assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
     found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
@@ -65,7 +66,7 @@ def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) 
 
 
 def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    """What the plan told when it was made is known of the frozen one; other plans have no such key."""
+    """The frozen plan keeps the list of what was left out; other plans have no such key."""
     plan = make_plan(toycar, campaign)
     folder = freeze(plan, tmp_path / "run", toycar)
     assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])
@@ -73,7 +74,7 @@ def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path,
 
 
 def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
-    """`when` takes permanent ones or transient ones alone; context rows and specs stand beside them."""
+    """`when` selects only permanent or only transient ones, in addition to context rows and specs."""
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
     kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
@@ -85,7 +86,7 @@ def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
 
 
 def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaign: Path) -> None:
-    """Mutants that one selection takes as permanent and another as transient are driven both ways."""
+    """Mutants that one selection takes as permanent and another as transient run both ways."""
     both = {one.id for one in make_plan(toycar, campaign).experiments}
     entry = ENTRY.removesuffix("}")
     _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
@@ -93,7 +94,7 @@ def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaig
 
 
 def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
-    """The draw follows from the seed: another one takes other mutants."""
+    """Another seed draws other mutants."""
     drawn = [
         {one.fault.id for one in make_plan(toycar, campaign, Choices(seed=seed)).experiments}
         for seed in (3, 4)
@@ -102,7 +103,7 @@ def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
 
 
 def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
-    """There is a group for each operator in each function, whichever mutants were drawn."""
+    """There is one group for each operator in each function, whichever mutants were drawn."""
 
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
@@ -129,7 +130,7 @@ def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
     ],
 )
 def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: str) -> None:
-    """What does not go together, and unknown words, are told with file and line."""
+    """Contradictions and unknown terms are reported with file and line."""
     with pytest.raises(MutatorError, match=r"operators\.yaml:\d+") as caught:
         load_campaign(_edited(campaign, old, new))
     assert said in str(caught.value)
@@ -144,7 +145,7 @@ def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: 
     ],
 )
 def test_a_place_without_mutants_is_refused(toycar: Workspace, campaign: Path, place: str, said: str) -> None:
-    """A place that is not there, or that no golden run comes to, is told at the selection's line."""
+    """A missing place, or one that no golden run reaches, is reported at the selection's line."""
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
         make_plan(toycar, campaign)

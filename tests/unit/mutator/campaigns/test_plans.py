@@ -1,4 +1,4 @@
-"""Plans: what is in them, and that they are the same each time."""
+"""Plans: their content and reproducibility."""
 
 import shutil
 from collections import Counter
@@ -16,7 +16,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def whole(toycar: Workspace) -> Workspace:
-    """A workspace whose campaign `toy` takes everything."""
+    """A workspace whose campaign `toy` has everything."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("sample: 24\n", ""))
     return toycar
@@ -27,7 +27,9 @@ def pair_key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
-    """Every guided experiment has one random partner of the same scenario, fault and row, and the reverse."""
+    """Every guided experiment has exactly one random partner of the same scenario, fault and row, and the
+    reverse.
+    """
     experiments = make_plan(whole, "toy").experiments
     guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
     random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
@@ -37,7 +39,7 @@ def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
 
 
 def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
-    """Guided triggers wait until they are armed; random times lie on steps from there to the last."""
+    """Guided triggers wait until they are armed; random times lie on steps from then to the last."""
     for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
         times = set()
         for experiment in make_plan(whole, "toy", Choices(reading=reading)).experiments:
@@ -53,14 +55,14 @@ def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
 
 
 def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> None:
-    """A fault's random times are drawn anew for each scenario and row."""
+    """A fault's random times are drawn separately for each scenario and row."""
     experiments = [e for e in make_plan(whole, "toy").experiments if e.method is Method.RANDOM]
     silent = [e for e in experiments if e.fault.fault_type == "silence"]
     assert len({e.trigger.condition for e in silent}) == len(silent) == 4
 
 
 def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    """Ids, order, chunks and digest depend on campaign, library and seed, not on the place."""
+    """Ids, order, chunks and digest depend on campaign, library and seed, not on the location."""
     plan = make_plan(toycar, "toy")
     elsewhere = make_plan(copy_toycar(tmp_path / "elsewhere"), "toy")
     assert (plan.experiments, plan.chunks, plan.digest) == (
@@ -84,7 +86,7 @@ def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
 
 
 def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
-    """Experiments that share a golden run are neighbours, and no chunk crosses from one to another."""
+    """Experiments with a common golden run are neighbours, and no chunk spans two golden runs."""
     plan = make_plan(whole, "toy")
     keys = [(e.scenario, e.fault.changes) for e in plan.experiments]
     assert len(dict.fromkeys(keys)) == 1 + sum(a != b for a, b in pairwise(keys))
@@ -97,7 +99,9 @@ def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
 
 
 def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
-    """A campaign's setting joins every run's changes once, canary and goldens included, and their ids."""
+    """A campaign's setting joins every run's changes once, including canary and goldens, and enters their
+    ids.
+    """
     before = make_plan(whole, "toy")
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
@@ -112,7 +116,7 @@ def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
 
 
 def test_filters_and_limit(whole: Workspace) -> None:
-    """--only keeps, --exclude drops, --limit takes an even part of what is left."""
+    """--only keeps, --exclude drops, --limit takes an even part of the rest."""
     plan = make_plan(
         whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
@@ -124,7 +128,7 @@ def test_filters_and_limit(whole: Workspace) -> None:
 
 
 def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
-    """A limited plan of both methods is whole pairs, which the statistics of pairs can use."""
+    """A limited plan of both methods consists of whole pairs, which paired statistics can use."""
     plan = make_plan(whole, "toy", Choices(limit=10))
     keys = Counter(
         (e.fault.id, e.scenario, e.trigger.name.removeprefix("random/"), e.seed) for e in plan.experiments
@@ -143,7 +147,7 @@ def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
     ],
 )
 def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> None:
-    """Choices that cannot be are errors before anything is expanded."""
+    """Impossible options are errors before anything is expanded."""
     with pytest.raises(MutatorError, match=told):
         make_plan(toycar, "toy", Choices(**choices))
 
@@ -164,7 +168,7 @@ def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> 
 def test_names_that_do_not_exist_are_told(
     toycar: Workspace, old: str, new: str, line: int, told: str
 ) -> None:
-    """A name of something that is not there is answered with the campaign's file and line."""
+    """An unknown name is reported with the campaign's file and line."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(MutatorError) as error:
@@ -174,7 +178,7 @@ def test_names_that_do_not_exist_are_told(
 
 
 def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
-    """A scenario file from anywhere is no scenario of a campaign; one in a folder of the library is."""
+    """A campaign cannot use a scenario file from outside the library; a subfolder of the library is fine."""
     path, file = toycar.campaign("toy"), toycar.scenario("A")
     text = path.read_text()
     path.write_text(text.replace("[A, B]", f"[A, {file}]"))
@@ -187,7 +191,7 @@ def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
 
 
 def test_faults_for_a_time(toycar: Workspace) -> None:
-    """With `hold_s` every fault, guided or random, stays active for that time once triggered."""
+    """With `hold_s` every fault, guided or random, stays active for that time after its trigger."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("  random_until_s", "  hold_s: 1.5\n  random_until_s"))
     triggers = {e.trigger for e in make_plan(toycar, "toy").experiments}
@@ -195,7 +199,7 @@ def test_faults_for_a_time(toycar: Workspace) -> None:
 
 
 def test_some_values_of_a_variant(whole: Workspace) -> None:
-    """`values` takes that many of each variant's values."""
+    """`values` takes that many values of each variant."""
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
     faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
@@ -208,7 +212,7 @@ def test_some_values_of_a_variant(whole: Workspace) -> None:
 
 
 def test_cost_is_stated(toycar: Workspace) -> None:
-    """Expected time falls with workers; a measured rate goes before the default one."""
+    """Expected time falls with workers; a measured rate replaces the default one."""
     plan = make_plan(toycar, "toy")
     one, two = plan.cost(1), plan.cost(2)
     assert one.cpu_s == two.cpu_s > 0
@@ -220,7 +224,7 @@ def test_cost_is_stated(toycar: Workspace) -> None:
     assert measured.cpu_s > 100 * one.cpu_s / 10
 
 
-BEYOND = ("software", "vision_weather")  # modules of faults that are not published ones
+BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 
 def test_quickstart_shows_everything(clone: Workspace) -> None:
@@ -243,7 +247,7 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
 
 
 def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without a sample they are the published 11,280: each value in each scenario and context."""
+    """Without a sample they are the 11,280 published ones: each value in each scenario and context."""
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
     assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
     assert len({e.id for e in described.experiments}) == len(described.experiments)
@@ -267,14 +271,14 @@ def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp
 def test_published_plans_keep_their_digests(
     clone: Workspace, campaign: str, reading: str, promised: str
 ) -> None:
-    """Whoever cites a plan's digest, and with it all its experiments' ids, finds it in every version."""
+    """The digest of a cited plan, and so all its experiments' ids, is the same in every version."""
     assert make_plan(clone, campaign, Choices(reading=reading)).digest == promised
 
 
 def test_the_run_schema_is_no_part_of_the_plan_digest(
     toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plan keeps its digest when the schema of the run folder rises."""
+    """A new run-folder schema does not change a plan's digest."""
     before = make_plan(toycar, "small").digest
     monkeypatch.setattr("mutator.store.run_head.SCHEMA", "run/9")
     monkeypatch.setattr("mutator.campaigns.plans.SCHEMA", "run/9", raising=False)  # where it is imported

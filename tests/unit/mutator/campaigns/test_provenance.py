@@ -1,4 +1,4 @@
-"""What a session notes of itself in run.json, and when it is refused."""
+"""What a session records about itself in run.json, and when it is refused."""
 
 import json
 from collections.abc import Iterable
@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    """A planned run whose checks say that its golden runs loaded `iniconfig` and `hypothesis`."""
+    """A planned run with checks that list `iniconfig` and `hypothesis` as loaded by its golden runs."""
     planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))
@@ -26,7 +26,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
-    """Other versions of some packages; None: not installed."""
+    """Pretend other versions of some packages; None: not installed."""
     real = machine.versions
 
     def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
@@ -37,7 +37,9 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -> None:
-    """Python, platform, processor, BLAS, threads, and the packages of harness and golden runs."""
+    """A stretch has Python, platform, processor, BLAS, threads, and the packages of harness and
+    golden runs.
+    """
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
@@ -48,13 +50,13 @@ def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -
 
 
 def _clone() -> dict[str, object] | None:
-    """Of the places of a stretch only the harness may lie in a clone: the toy is a copy."""
+    """Of a stretch's paths only the harness may lie in a clone: the toy is a copy."""
     state = machine.clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
 
 def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
-    """A later session adds to what is there, and changes nothing else of run.json."""
+    """A later session appends its stretch and changes nothing else in run.json."""
     before = json.loads((folder.path / "run.json").read_text())
     for session in ("0001-*", "0002-*"):
         begin_stretch(RunFolder.open(folder.path), toycar, records=session, accept=False)
@@ -66,7 +68,7 @@ def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
 def test_before_anything_was_driven_any_version_will_do(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plan is the same whatever froze it, so it binds no versions."""
+    """Any version may freeze a plan, so a plan binds no versions."""
     use(monkeypatch, numpy="2.1.0")
     assert check_versions(folder) == ()
 
@@ -87,7 +89,9 @@ def test_other_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    """The error lists what differs, and is the user's; accepted, it is noted in the stretch."""
+    """The error lists the differences as the user's to resolve; if accepted, they are recorded in the
+    stretch.
+    """
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
@@ -114,7 +118,7 @@ def test_another_python_is_refused(
 def test_another_machine_is_noted_and_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    """Processor, kernel and threads are recorded only: golden runs decide whether machines are alike."""
+    """Processor, kernel and threads are only recorded: golden runs decide whether machines compute alike."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"

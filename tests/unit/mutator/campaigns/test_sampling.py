@@ -27,7 +27,9 @@ def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
 
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count: int) -> None:
-    """A sample shows each variant, method, scenario and trigger as often, however many values each has."""
+    """A sample has equal numbers of each variant, method, scenario and trigger, however many values
+    each has.
+    """
     picked = pick(many, count, seed=1)
     assert len(picked) == count
     assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
@@ -37,7 +39,7 @@ def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count
 
 
 def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
-    """When a variant has no more experiments the others fill up, and no experiment is picked twice."""
+    """If a variant runs out of experiments, the others fill up, and no experiment is picked twice."""
     picked = pick(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
     assert counts["radar/jamming/no_data"] == 8
@@ -45,7 +47,7 @@ def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
 
 
 def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> None:
-    """The same seed picks the same, in the order they came; another seed picks others."""
+    """A seed picks the same experiments in their original order; another seed picks others."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
@@ -56,7 +58,9 @@ def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> 
 def test_runs_that_stop_are_a_sample_of_the_same_faults(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
-    """A campaign that ends its runs at a hazard can be compared with one that does not: it draws the same."""
+    """A campaign that stops runs at a hazard draws the same sample as one that does not, so they can be
+    compared.
+    """
     stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
     picked = [many.index(e) for e in draw(many, 11, seed=1)]
     assert [stopping.index(e) for e in draw(stopping, 11, seed=1)] == picked
@@ -72,12 +76,14 @@ def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
     [(10, 1, [5]), (10, 2, [2, 7]), (3, 3, [0, 1, 2]), (2, 5, [0, 1]), (1, 1, [0])],
 )
 def test_values_are_spread(count: int, wanted: int, indices: list[int]) -> None:
-    """Some of a variant's values are taken evenly from its range, never one twice."""
+    """Values are taken evenly from a variant's range, none twice."""
     assert spread(count, wanted) == indices
 
 
 def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experiment]) -> None:
-    """Half of all: half of each fault type in each scenario, every guided experiment with its partner."""
+    """Half of all means half of each fault type in each scenario, and every guided experiment with its
+    partner.
+    """
     picked = pick_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
@@ -89,8 +95,9 @@ def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experi
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
 def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    """Every guided experiment has its random partner, variants, scenarios and rows come as evenly as ever,
-    and the same seed picks the same, whatever the order."""
+    """Every guided experiment has its random partner, variants, scenarios and rows are evenly spread, and a
+    seed picks the same in any input order.
+    """
     picked = pick_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
@@ -105,14 +112,14 @@ def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
 
 @pytest.mark.parametrize("count", [1, 11, 55])
 def test_an_odd_number_cuts_one_pair(many: list[Experiment], count: int) -> None:
-    """One guided experiment has no partner; the number is what was asked for."""
+    """With an odd number, one guided experiment has no partner."""
     picked = pick_pairs(many, count, seed=1)
     guided, random = ({key(e) for e in picked if e.method is m} for m in (Method.GUIDED, Method.RANDOM))
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
 def test_without_partners_pairs_are_single_experiments(many: list[Experiment]) -> None:
-    """Of guided experiments alone the pick is that of `pick`."""
+    """For guided experiments alone the result is that of `pick`."""
     guided = [e for e in many if e.method is Method.GUIDED]
     assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
 
@@ -123,6 +130,6 @@ def key(experiment: Experiment) -> tuple[str, str, str]:
 
 @pytest.mark.parametrize("count", [10, 57])
 def test_in_proportion_refuses_what_does_not_come_out(many: list[Experiment], count: int) -> None:
-    """A number that is odd, or too small for a pair of each type in each scenario, is refused."""
+    """An odd number, or one too small for a pair of each type in each scenario, is refused."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
         pick_in_proportion(many, count, seed=1)

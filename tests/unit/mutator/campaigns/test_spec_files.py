@@ -1,4 +1,4 @@
-"""Campaigns with fault specs that are not in the library."""
+"""Campaigns with fault specs from outside the library."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def mine(toycar: Workspace, tmp_path: Path) -> Path:
-    """A campaign outside of the library, with a spec file in a folder beside it."""
+    """A campaign outside the library, with a spec file in a folder next to it."""
     spec = (toycar.library / "faults" / "sensor" / "lane.yaml").read_text()
     (tmp_path / "specs").mkdir()
     spec = spec.replace("fault_type: lane", "fault_type: drifting")
@@ -28,8 +28,9 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
 def test_a_spec_file_is_found_from_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Faults of a named spec file join those of the library, wherever one works; so may the canary. Random
-    times need a latest one, guided triggers none."""
+    """Faults of a named spec file join those of the library, from any current folder; the canary may come
+    from one, too. Random times need a latest time, guided triggers do not.
+    """
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)
@@ -40,7 +41,7 @@ def test_a_spec_file_is_found_from_the_campaign(
 
 
 def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
-    """A spec file that is not there is called a missing file, at the campaign's line."""
+    """A missing spec file is reported at the campaign's line."""
     (mine.parent / "specs" / "drifting.yaml").unlink()
     with pytest.raises(
         MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected a spec file"
@@ -49,7 +50,9 @@ def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
 
 
 def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> None:
-    """Two different specs of one name would be one in every table; the library's own file may be named."""
+    """Two different specs with one name are refused, since tables could not distinguish them; naming the
+    library's own file is fine.
+    """
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name sensor/lane of a spec in the library"):

@@ -1,4 +1,4 @@
-"""Campaigns with triggers of their own, and libraries without a hazard analysis."""
+"""Campaigns with their own triggers, and libraries without a hazard analysis."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
 
 
 def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
-    """It needs no method, is armed as the manifest says, and means what the same list in a mapping does."""
+    """A plain list needs no method, is armed as the manifest says, and equals the same list in a mapping."""
     path = listed(pole, "triggers: [always, {when: angle > 0.1}]\n")
     path.write_text(path.read_text().replace("methods: [guided]\n", ""))
     manifest = pole.library / "targets" / "pole.yaml"
@@ -85,7 +85,7 @@ def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
     ],
 )
 def test_lists_that_cannot_be(pole: Workspace, triggers: str, methods: str, said: str) -> None:
-    """Each mistake is told at the line of its item, conditions over what the target does not observe too."""
+    """Each mistake is reported at the line of its item, including conditions over unobserved values."""
     path = listed(pole, triggers, methods)
     with pytest.raises(MutatorError, match=said) as caught:
         make_plan(pole, "upright")
@@ -93,7 +93,7 @@ def test_lists_that_cannot_be(pole: Workspace, triggers: str, methods: str, said
 
 
 def test_check_knows_the_conditions(pole: Workspace) -> None:
-    """A library without a hazard analysis is well; a condition that its target does not know is found."""
+    """A library without a hazard analysis passes; a condition unknown to its target is reported."""
     assert check_library(pole, "pole") == []
     listed(pole, "triggers: [{when: speed > 1}]\n")
     (problem,) = check_library(pole, "pole")
@@ -101,7 +101,9 @@ def test_check_knows_the_conditions(pole: Workspace) -> None:
 
 
 def test_mutants_without_a_table(pole: Workspace) -> None:
-    """Where there is no context, mutants of specs are made under `always`; an unknown trigger names none."""
+    """Without contexts, mutants of specs are built under `always`; an error about an unknown trigger lists no
+    rows.
+    """
     triggers = {trigger.name for _, trigger in MutantSet.of_specs(["sensor/angle"], workspace=pole).pairs}
     assert triggers == {"always"}
     with pytest.raises(MutatorError, match=r"expected a time in s, `always`, or a condition"):

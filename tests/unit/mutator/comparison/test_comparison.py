@@ -1,4 +1,4 @@
-"""Two run folders compared, and the comparison written down."""
+"""Two run folders are compared, and the comparison is written."""
 
 import csv
 import json
@@ -26,7 +26,9 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),
 
 
 def lane_is_left(e: Experiment) -> dict[str, Any]:
-    """Faults of the lane lead out of it, a crash among them says <so>; nothing else does anything."""
+    """Lane faults lead out of the lane, with the given message for a crash among them; the others have no
+    effect.
+    """
     if e.fault.fault_type != "lane":
         return {}
     if e.fault.value == 0.8:
@@ -38,7 +40,7 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> tuple[Path, Path]:
-    """Two runs of the toy: in `before` nothing happens, in `after` the target is another one and worse."""
+    """Two runs of the toy: in `before` nothing happens; `after` has a changed target and is worse."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     before = write_run(toycar, place / "before")
@@ -57,14 +59,14 @@ def lanes(found: Comparison) -> int:
 
 
 def test_what_differs_is_told(found: Comparison) -> None:
-    """Of the sources only those that changed differ, and the changed file is named."""
+    """Only changed sources differ, and the changed file is named."""
     assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
     assert pages.files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
 
 
 def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
-    """An alert that one run alone waited for is not lost: that its partner ended earlier is remarked."""
+    """If one run stops early, a missing alert of the pair gets a remark instead of counting as lost."""
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
@@ -74,7 +76,7 @@ def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
 def test_a_run_planned_before_files_were_written_down(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """Runs whose head has no list of files are compared; that it is not known is told."""
+    """Runs without a list of files in their head can be compared, with a remark that it is unknown."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
@@ -85,7 +87,7 @@ def test_a_run_planned_before_files_were_written_down(
 
 
 def test_gates_name_what_is_worse(found: Comparison) -> None:
-    """Each experiment that became hazardous is named once; a gate that nothing fails finds nothing."""
+    """Each experiment that became hazardous is named once; without one the gate finds nothing."""
     new = findings(found, [Gate.NEW_HAZARD])
     assert 0 < len(new) <= lanes(found)
     assert all("sensor/lane/shifted" in f.words and "masked -> hazard (H3 2.00 s" in f.words for f in new)
@@ -114,7 +116,7 @@ def test_the_whole_is_in_the_tables(found: Comparison) -> None:
 
 
 def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
-    """A run compared with itself has no change, no fact that differs, and passes every gate."""
+    """A run compared with itself has no changes or differing facts, and passes every gate."""
     found = compare(runs[1], runs[1])
     assert found.changed == ()
     assert not any(fact.differs for fact in found.facts)
@@ -123,8 +125,9 @@ def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
 
 
 def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
-    """Python, processor and packages of all stretches of a run are facts that may differ; of a folder that
-    lists every installed package only those count that the other one lists, too."""
+    """Python, processor and package versions of all stretches are compared; if a folder lists every installed
+    package, only those count that the other one lists, too.
+    """
     sides = [read_side(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
@@ -140,7 +143,7 @@ def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
 
 
 def test_only_some(runs: tuple[Path, Path]) -> None:
-    """A filter chooses among the experiments of both runs."""
+    """A filter selects from the experiments of both runs."""
     found = compare(*runs, only='fault_type == "lane"')
     assert len(found.pairs) == lanes(found) > 0
     assert found.unmatched == ()
@@ -155,7 +158,7 @@ def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
 def test_a_failed_proof_is_not_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """A run whose engine was proved wrong is refused."""
+    """A run with a failed proof is refused."""
     after = shutil.copytree(runs[1], tmp_path / "after")
     (after / "proof").mkdir()
     lines = (after / "records" / "0001-a.jsonl").read_text().replace('"outcome":"masked"', '"outcome":"sdc"')
@@ -166,7 +169,7 @@ def test_a_failed_proof_is_not_compared(
 
 
 def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Harness errors and experiments not run are told, and are in no rate."""
+    """Harness errors and experiments not run are reported and enter no rate."""
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
     a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
     b = write_run(
@@ -183,7 +186,7 @@ def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write
 
 
 class Page(HTMLParser):
-    """What a page loads from elsewhere, its texts, and its tags."""
+    """A page's external resources, its texts, and its tags."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -198,7 +201,7 @@ class Page(HTMLParser):
 
 
 def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
-    """Page, Markdown and CSV have every pair that changed; the page needs nothing else and escapes texts."""
+    """Page, Markdown and CSV have every pair that changed; the page is self-contained and escapes text."""
     written = pages.write(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
@@ -225,7 +228,7 @@ def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, P
 def test_a_page_of_many_changes_shows_the_first(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also without scripts no more rows than the limit are seen, and the page says so; none is left out."""
+    """Even without scripts, the page shows at most the limit's rows and says so; it contains all of them."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

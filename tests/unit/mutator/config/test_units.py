@@ -12,7 +12,7 @@ CLONE = Path(__file__).parents[4]
 
 
 def test_a_key_gives_up_its_unit() -> None:
-    """The longest suffix that is a unit is the key's, else the key stays whole."""
+    """The longest suffix that is a unit is the key's unit; otherwise the key stays whole."""
     assert units.split("offset_m") == ("offset", units.UNITS["m"])
     assert units.split("per_step_kph") == ("per_step", units.UNITS["kph"])
     assert units.split("by_per_m") == ("by", units.UNITS["per_m"])
@@ -43,14 +43,14 @@ def test_a_key_gives_up_its_unit() -> None:
     ],
 )
 def test_conversion(number: float, source: str, target: str, expected: float) -> None:
-    """A quantity is the same in either unit, and exactly itself in its own."""
+    """A quantity is the same in either unit, and exactly preserved in its own."""
     result = units.convert(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)
 
 
 def test_dimensions_do_not_mix() -> None:
-    """Metres are no speed."""
+    """Units of different dimensions do not convert."""
     with pytest.raises(ValueError, match="m is not a unit of speed"):
         units.convert(1, units.UNITS["m"], units.UNITS["mps"])
     with pytest.raises(ValueError, match="degC is not a unit of temperature in kelvin"):
@@ -58,7 +58,7 @@ def test_dimensions_do_not_mix() -> None:
 
 
 def test_every_suffix_ends_a_key() -> None:
-    """Whatever unit a key ends in is the one that is found in it, and no unit is there twice."""
+    """Each unit is found as a key's suffix, and no unit is listed twice."""
     assert {suffix: units.split(f"by_{suffix}") for suffix in units.UNITS} == {
         suffix: ("by", unit) for suffix, unit in units.UNITS.items()
     }
@@ -66,7 +66,7 @@ def test_every_suffix_ends_a_key() -> None:
 
 
 def test_keys_of_the_library_are_what_they_were() -> None:
-    """No key of a shipped fault or fault model that had no unit ends in one; those with one keep it."""
+    """Shipped keys of faults and fault models keep their unit, or their lack of one."""
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):

@@ -1,4 +1,4 @@
-"""Strict YAML: every mistake is answered with file, line, what was got, what was expected, and a remedy."""
+"""Strict YAML: every mistake is reported with file, line, finding, expectation and remedy."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ def read(tmp_path: Path, text: str | bytes) -> Car:
 
 
 def test_a_good_file_is_read(tmp_path: Path) -> None:
-    """Types are kept, words that YAML 1.1 takes for booleans or times are words."""
+    """Types are kept, and words that YAML 1.1 reads as booleans or times stay words."""
     car = read(
         tmp_path, "schema: car/2\nname: on\nwheels: {left: {radius: 3}}\ntags: ['1', 1:30, no, 1_0, 0x1]\n"
     )
@@ -101,7 +101,7 @@ def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int,
 
 @pytest.mark.parametrize("text", ["", "- a\n", "word\n"])
 def test_a_file_that_is_no_mapping(tmp_path: Path, text: str) -> None:
-    """An empty file, a list or a word is not a mapping of keys."""
+    """An empty file, a list or a word is no mapping of keys."""
     with pytest.raises(MutatorError, match="expected a mapping of keys to values"):
         read(tmp_path, text)
 
@@ -113,7 +113,7 @@ def test_bytes_that_are_no_text(tmp_path: Path) -> None:
 
 
 def test_a_file_made_to_hurt(tmp_path: Path) -> None:
-    """Very deep nesting and very large files are refused, not suffered."""
+    """Very deep nesting and very large files are refused at once."""
     with pytest.raises(MutatorError):
         read(tmp_path, "[" * 20_000)
     with pytest.raises(MutatorError, match="at most 1000000 bytes"):
@@ -121,12 +121,12 @@ def test_a_file_made_to_hurt(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    """A missing file is an error of the user, not a traceback."""
+    """A missing file is a user's error, not a traceback."""
     with pytest.raises(MutatorError, match="cannot be read"):
         yaml_files.load(tmp_path / "none.yaml")
 
 
 def test_several_mistakes_are_counted(tmp_path: Path) -> None:
-    """The first is shown, and how many more there are."""
+    """The first mistake is shown, with the number of others."""
     with pytest.raises(MutatorError, match="1 more mistake after this one"):
         read(tmp_path, "schema: car/2\nname: 1\ntags: 2\n")

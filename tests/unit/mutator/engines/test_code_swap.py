@@ -1,4 +1,4 @@
-"""What a mutant changes in a loaded program, and what keeps it from being swapped in."""
+"""What a mutant changes in a loaded program, and what prevents a swap."""
 
 import re
 from collections.abc import Callable
@@ -58,7 +58,7 @@ GUARDED = 'if _fi.active("abc"):\n    y = y + 1.0'
 
 
 def test_functions_that_changed_are_found(changes: Changes) -> None:
-    """Each changed function is named by module and path, with the code it has and the code it gets."""
+    """Each changed function is listed by module and path, with its old and new code."""
     found = changes(
         ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
     )
@@ -73,7 +73,7 @@ def test_functions_that_changed_are_found(changes: Changes) -> None:
 
 
 def test_imports_of_injected_lines(changes: Changes) -> None:
-    """Modules that injected lines import can be loaded beforehand."""
+    """Modules that injected lines import can be loaded in advance."""
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
     assert changes(("return [value", lines)).imports == ("car.rain",)
 
@@ -91,8 +91,9 @@ def test_imports_of_injected_lines(changes: Changes) -> None:
     ],
 )
 def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
-    """A statement that acts without its trigger, a generator, an inner function: each is refused with its
-    reason. Code outside functions needs no swap."""
+    """A statement that acts without its trigger, a generator and an inner function are refused with their
+    reasons. Code outside functions needs no swap.
+    """
     if why is None:
         assert changes((before, lines)).functions == ()
         return
@@ -102,7 +103,7 @@ def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: 
 
 @pytest.mark.parametrize(("kept", "swappable"), [(1, True), (0, False)])
 def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
-    """What a guard keeps whole beneath `else:` asks the probe as the other branch does."""
+    """The whole statement that a guard keeps under `else:` asks the probe like the other branch."""
     guarded = "".join(
         f"        {line}  # fi:abc guard:1\n" for line in ('if _fi.active("abc"):', "    y = x", "else:")
     )

@@ -1,4 +1,4 @@
-"""The fork engine: its server's processes, where they start, and what a kill leaves."""
+"""The fork engine's server processes: their number, their starting points, and what a kill leaves."""
 
 import os
 import signal
@@ -34,7 +34,9 @@ def gone(pid: int) -> bool:
 
 
 def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
-    """Every process that forks has one OS thread; when the engine is closed, none is left, and no scratch."""
+    """Every forking process has one OS thread; after the engine is closed, no process or scratch file is
+    left.
+    """
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
@@ -48,7 +50,7 @@ def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
 
 
 def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
-    """The golden run drives the steps before the activation, and the waiting processes are few."""
+    """The golden run simulates the steps before the activation, and few processes wait."""
     starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
@@ -57,33 +59,33 @@ def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
 
 
 def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
-    """What a run imports on its way to its end is found, and is there in each process that waits."""
+    """Libraries that a run imports late are found and loaded in each waiting process."""
     fork.run(fork.job(at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)
-    assert "zipfile" in seen.libraries  # with which it writes its trace
+    assert "zipfile" in seen.libraries  # to write its trace
     assert not any(name.startswith("toycar") for name in seen.libraries)
     assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
 
 
 def test_a_never_active_fault_is_not_run(fork: Fork) -> None:
-    """An experiment whose trigger never holds has golden's files as its own, and costs nothing."""
+    """An experiment with a trigger that never holds gets golden's files without a run."""
     execution = fork.run(fork.job(at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
 def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
-    """Killing server or waiting processes is told as the harness's failure; the next job has new ones."""
+    """A killed server or waiting process is a harness error; the next job gets new ones."""
     job = fork.job(at_time(2.0))
-    for place in (0, -1):  # the first process, and one that waits
+    for place in (0, -1):  # the first process, and a waiting one
         assert fork.run(job).status is Status.OK
         victims = fork.processes()
         os.kill(victims[place], signal.SIGKILL)
         assert gone(victims[place])
         time.sleep(0.1)
         execution = fork.run(job)
-        if execution.status is Status.OK:  # a process that waits had been left in peace
+        if execution.status is Status.OK:  # otherwise a waiting process had been unharmed
             assert place == 0
             execution = fork.run(fork.job(Trigger(name="x", condition="t >= 0.01")))
         assert execution.status is Status.HARNESS_ERROR
@@ -93,7 +95,7 @@ def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
-    """All that waits, and what guards it, ends when the first process is killed."""
+    """All waiting processes, and their guard, end when the first process is killed."""
     fork.run(fork.job(at_time(2.0)))
     guard, first, *waiting = fork.processes()
     assert guard == fork.pool._process.pid
@@ -103,7 +105,7 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
 
 
 def test_a_server_without_its_guard_is_not_used(fork: Fork) -> None:
-    """When the process that guards a server is killed, the next run says so, and nothing of it is left."""
+    """If the server's guard process is killed, the next run reports it, and no process is left."""
     fork.run(fork.job(at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
@@ -129,7 +131,7 @@ time.sleep(60)
 
 @pytest.mark.slow
 def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> None:
-    """Killing the process of the engine ends the server and all that waits."""
+    """Killing the engine's process ends the server and all waiting processes."""
     arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parents[1]]
     engine = subprocess.Popen(
         [sys.executable, "-c", ENGINE, *map(str, arguments)], stdout=subprocess.PIPE, text=True
@@ -147,7 +149,7 @@ def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> N
 
 @pytest.mark.slow
 def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
-    """A child's limit of CPU time counts from its fork, not what the processes before it took."""
+    """A child's CPU time limit counts from its fork, without the time of earlier processes."""
     edit(
         "tree/toycar/world.py",
         "        now = self.frame",

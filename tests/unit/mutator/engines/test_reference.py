@@ -1,4 +1,4 @@
-"""The reference engine: isolation, limits, and how each way to end is named."""
+"""The reference engine: isolation, limits, and the status of each way to end."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def manifest(toycar: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
-    """Runs scenario A on a tree with changed files; `limits` as given."""
+    """Run scenario A on a tree with changed files and the given `limits`."""
     work = tmp_path / "work"
     work.mkdir()
     base = prepare_base(manifest, tmp_path / "base")
@@ -57,7 +57,7 @@ def entry(body: str) -> dict[str, str]:
 def test_a_mutant_of_what_runs_read_shares_nothing(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """A mutant of a file in `reads_itself` is given the arguments of an independent run; no other is."""
+    """Only a mutant of a file in `reads_itself` gets the arguments of an independent run."""
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
@@ -70,7 +70,7 @@ def test_a_mutant_of_what_runs_read_shares_nothing(
 
 
 def test_a_good_run_leaves_its_files(run: Run) -> None:
-    """A run that ends well has trace and record in its output folder, and its cost is known."""
+    """A run that ends well has trace and record in its output folder, and its CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
@@ -101,46 +101,46 @@ def test_a_good_run_leaves_its_files(run: Run) -> None:
     ],
 )
 def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
-    """Each way to end badly has its status and words that are the same each time."""
+    """Each way to end badly has its status and a reproducible message."""
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (status, detail)
 
 
 def test_a_target_that_does_not_parse_crashes(run: Run) -> None:
-    """A syntax error in what is run is the tree's failure, told with its place."""
+    """A syntax error in executed code is the tree's failure, reported with its place."""
     execution = run(entry("if :"))
     assert execution.status is Status.CRASHED
     assert "go.py" in execution.detail
 
 
 def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
-    """A loop without end is a timeout after the CPU time it was given."""
+    """An endless loop is a timeout after its CPU time."""
     execution = run(entry("while True: pass"), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_who_ignores_the_cpu_limit_is_killed(run: Run) -> None:
-    """Ignoring the signal of the CPU limit does not help."""
+    """A run that ignores the signal of the CPU limit is killed."""
     body = "import signal; signal.signal(signal.SIGXCPU, signal.SIG_IGN)\nwhile True: pass"
     execution = run(entry(body), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_sleeping_hits_the_wall_limit(run: Run) -> None:
-    """A run that waits for ever is a timeout after the wall time it was given."""
+    """A run that waits for ever is a timeout after its wall time."""
     execution = run(entry("import time; time.sleep(100)"), replace(LIMITS, wall_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
 
 
 def test_who_does_not_end_after_its_work_is_a_timeout(run: Run) -> None:
-    """A run that did its work but leaves a thread behind, and so never ends, did not end well."""
+    """A run that finishes its work but never ends because of a thread is a timeout."""
     body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
     execution = run(entry(body), replace(LIMITS, wall_s=2))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
 def test_steps_are_limited(run: Run) -> None:
-    """More observed steps than allowed are a timeout, the same on every machine."""
+    """Exceeding the allowed observed steps is a timeout, the same on every machine."""
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
         "def limit(n): global most; most = n\n"
@@ -167,7 +167,7 @@ def test_a_huge_file_is_refused(run: Run) -> None:
 
 
 def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManifest) -> None:
-    """A run that finds the package anywhere but in its own tree is a harness error."""
+    """A run that finds the package outside its own tree is a harness error."""
     body = (
         f"import sys; sys.path.insert(0, {str(manifest.root)!r})\n"
         "for name in [n for n in sys.modules if n.startswith('toycar')]: del sys.modules[name]\n"
@@ -179,7 +179,7 @@ def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManif
 
 
 def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
-    """A run whose files were other than the job's is a harness error, not a result."""
+    """A run with files other than the job's is a harness error."""
     body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -188,7 +188,7 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
 
 
 def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp_path: Path) -> None:
-    """A run that writes to the bytecode in its tree does no harm to the runs after it."""
+    """Writing to bytecode in its own tree does not affect later runs."""
     body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
     assert run(entry(body)).status is Status.OK
     (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
@@ -197,7 +197,9 @@ def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp
 
 
 def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
-    """A log or report that a run takes away, or makes a folder or pipe of, is none; nobody waits for it."""
+    """If a run removes its log or report, or replaces it with a folder or pipe, it counts as missing; the
+    engine does not wait for it.
+    """
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
@@ -218,7 +220,7 @@ def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
     ],
 )
 def test_half_a_report_is_none(run: Run, more: dict[str, object]) -> None:
-    """What a run puts into the place of its report counts only if it is one."""
+    """A file in place of the report counts only if it is a valid report."""
     report = {"ended": "ok", "error": None, "disk_full": False, "outside": [], "probe": None, **more}
     body = f"import json, os\nopen('../report.json', 'w').write(json.dumps({report!r}))\nos._exit(0)"
     execution = run(entry(body))
@@ -226,7 +228,7 @@ def test_half_a_report_is_none(run: Run, more: dict[str, object]) -> None:
 
 
 def test_names_that_are_no_text(run: Run) -> None:
-    """Whatever a target calls its classes and files: the names that are kept of them are printable."""
+    """Names of the target's classes and files are stored as printable text."""
     body = (
         "import os\nname = os.path.join(os.path.dirname(__file__), '\\udcff\\n')\n"
         "exec(compile('raise type(\"a\\\\n\", (Exception,), {})', name, 'exec'))"
@@ -237,7 +239,7 @@ def test_names_that_are_no_text(run: Run) -> None:
 
 
 def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
-    """A run minds signals that whoever started it was deaf to, as programs in the background are."""
+    """A run receives signals that its parent ignored, as background programs do."""
     body = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
@@ -250,7 +252,7 @@ def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
 
 
 def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
-    """A source file that belongs to no tree of this job makes a harness error; a cache of data does not."""
+    """A source file from outside the job's tree is a harness error; a data cache is not."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -259,7 +261,7 @@ def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
 
 
 def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
-    """A changed file of the same size and time as the original runs changed."""
+    """A changed file with the original's size and time runs as changed."""
     pristine = manifest.tree.files["toycar/world.py"].decode()
     changed = pristine.replace("STEP = 0.05", "STEP = 0.06")
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
@@ -271,7 +273,9 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
 
 
 def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PYTHONPATH and the like do not reach a run; the hash seed is the job's; threads are one."""
+    """PYTHONPATH and similar variables do not reach a run; the job sets the hash seed; there is one
+    thread.
+    """
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("MUTATOR_SECRET", "x")
     body = (
@@ -283,12 +287,12 @@ def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPa
 
 
 def test_what_a_run_printed_is_kept(run: Run) -> None:
-    """The end of what a run printed is at hand for people."""
+    """The end of a run's output is available to the user."""
     assert "hello" in run(entry("print('hello')")).log
 
 
 def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
-    """What a run left behind in the background is killed when the run is over."""
+    """Background processes of a run are killed when the run is over."""
     note = tmp_path / "pid"
     body = (
         "import subprocess, pathlib\n"
@@ -299,7 +303,7 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
 
 
 def ended(pid: int) -> bool:
-    """Whether the process is gone, or gone but for being reaped, within some seconds."""
+    """Whether the process is gone, or only waits to be reaped, within some seconds."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:
@@ -329,7 +333,7 @@ engine.execute(job, folder / "work" / "x")
 
 
 def test_a_run_dies_with_its_engine(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
-    """Killing the process of the engine kills the run: no orphan goes on computing."""
+    """Killing the engine's process kills the run."""
     note = tmp_path / "pid"
     (tmp_path / "work").mkdir()
     prepare_base(manifest, tmp_path / "base")
@@ -352,7 +356,7 @@ def ended_now(pid: int) -> bool:
 
 
 def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that fails for want of room raises DiskFull instead of being a crash."""
+    """A run that fails for lack of space raises DiskFull instead of counting as a crash."""
     with pytest.raises(DiskFull):
         run(entry("import errno; raise OSError(errno.ENOSPC, 'No space left on device')"))
     real = os.statvfs
@@ -369,7 +373,7 @@ def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.Mo
 
 
 def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
-    """`run` yields each job with its execution and leaves no scratch behind."""
+    """`run` yields each job with its execution and leaves no scratch files."""
     work = tmp_path / "work"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -385,7 +389,7 @@ def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManif
 def test_engines_run_side_by_side(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Two threads may use one engine at once, each in a folder of its own."""
+    """Two threads may use one engine at once, each in a separate folder."""
     work = tmp_path / "side"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -404,13 +408,17 @@ def test_engines_run_side_by_side(
 
 
 def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
-    """Neither its own package's, nor the standard library's, nor what Python itself had loaded."""
+    """The report lists imported packages, except its own, the standard library's, and what Python itself had
+    loaded.
+    """
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
 def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
-    """Though it did not import the package: its version says what was calculated all the same."""
+    """The report lists packages with used shared libraries even without an import, since their versions
+    affect results.
+    """
     code = (
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
@@ -422,7 +430,9 @@ def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
 def test_a_limit_of_this_process_that_is_lower(
     manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
 ) -> None:
-    """No engine is made where runs may not have what their limits say: they would end here, not elsewhere."""
+    """An engine is refused if this process's own limits are lower than a run's: runs would end differently
+    here.
+    """
     number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
 

@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 
 
 def test_each_engine_can_be_made() -> None:
-    """The factory of every engine in the list is there, and the name is the one it is listed under."""
+    """Every engine in the list has a working factory, and is listed under its own name."""
     for name, kind in ENGINES.items():
         assert kind.name == name and kind.about
         assert callable(resolve_name(kind.factory))

@@ -1,4 +1,4 @@
-"""Threads that prevent forking, in words."""
+"""The message about threads that prevent forking."""
 
 import re
 import threading
@@ -11,7 +11,7 @@ from mutator.engines.in_target.threads import others
 
 
 def test_threads_are_found_by_name() -> None:
-    """The main thread is left out; every other one of the process is there, by its name in Python."""
+    """Every thread except the main one is listed by its Python name."""
     before = others()
     done = threading.Event()
     started = [threading.Thread(target=done.wait, name=name) for name in ("poll", "radar")]
@@ -42,6 +42,6 @@ def test_threads_are_found_by_name() -> None:
     ],
 )
 def test_each_thread_is_told_with_what_turns_it_off(names: list[str], told: str, remedy: str) -> None:
-    """Number and names of the threads are said, and what is known to turn such a thread off."""
+    """The message has the number and names of the threads, and the known ways to switch them off."""
     assert re.search(told, threads.too_many(names))
     assert remedy in threads.turned_off(names)

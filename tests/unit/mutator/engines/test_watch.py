@@ -1,4 +1,6 @@
-"""What a watched run notes of a tree, in a process of its own: the watcher replaces what it watches."""
+"""What a watched run records about a tree, in a separate process, because the watcher replaces what it
+watches.
+"""
 
 import json
 import subprocess
@@ -72,7 +74,7 @@ print(json.dumps(watcher.found()["noted"]))
 
 @pytest.fixture(scope="module")
 def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, str]]]:
-    """What is noted of each line of a controller, by the line."""
+    """The findings for each line of a controller."""
     folder = tmp_path_factory.mktemp("tree")
     lines = [*NOTED, *SOUND]
     body = "".join(f"    {line}\n" for line in lines)
@@ -88,7 +90,7 @@ def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, 
 
 @pytest.mark.parametrize("line", NOTED)
 def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """Clocks, draws without a seed, salted hashes and threads are told with file, line and function."""
+    """Clocks, unseeded draws, salted hashes and threads are reported with file, line and function."""
     (one,) = noted[line]
     assert one["what"].startswith(NOTED[line])
     assert (one["file"], one["function"], one["via"]) == ("controller.py", "drive", "")
@@ -96,12 +98,12 @@ def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, l
 
 @pytest.mark.parametrize("line", SOUND)
 def test_what_is_the_same_in_each_run_is_not(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """What has a seed, or a time that it is given, is nobody's fault."""
+    """Seeded draws and given times are not reported."""
     assert noted[line] == []
 
 
 def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
-    """A clock that a package reads is noted at the target's line, and the package's is told beside it."""
+    """A clock that a package reads is recorded at the target's line, together with the package's."""
     package, tree = tmp_path / "site-packages" / "pid", tmp_path / "tree"
     for folder in (package, tree):
         folder.mkdir(parents=True)
@@ -123,7 +125,7 @@ def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
 
 
 def test_compiled_code_has_its_classes(tmp_path: Path) -> None:
-    """pandas, which dies of another `datetime`, is imported as ever; the tree's own dates are watched."""
+    """pandas, which breaks with a replaced `datetime`, imports normally; the tree's own dates are watched."""
     (tmp_path / "controller.py").write_text(
         "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
         "    datetime.date.today()\n"

@@ -1,4 +1,4 @@
-"""What the process of a run tells of its modules, of how it ended, and of its probe."""
+"""What a run's process reports about its modules, its end and its probe."""
 
 import errno
 import os
@@ -66,7 +66,7 @@ class StepLimit(RuntimeError):
 
 
 def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those that came later, and the one itself; also one that was there before and is imported anew."""
+    """Modules imported later, and the module itself; also one imported again."""
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     assert imported_since("_fi") == ["late", "_fi"]
@@ -76,13 +76,13 @@ def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_module_that_never_came_hides_none() -> None:
-    """Where the probe was not installed, all modules are looked at."""
+    """If the probe was not installed, all modules count."""
     assert set(imported_since("never.imported")) == set(sys.modules)
 
 
 @pytest.fixture
 def described() -> Callable[..., dict[str, Any]]:
-    """How a run is said to have ended in which a function of the tree was called, from outside of it."""
+    """The description of the end of a run that called a function of the tree from outside."""
     names: dict[str, Any] = {}
     for file, text in CODE.items():
         exec(compile(text, file, "exec"), names)
@@ -115,8 +115,9 @@ def test_exceptions_are_described(
     message: str,
     stacks: list[list[tuple[str, int]]],
 ) -> None:
-    """Type, text and the lines of the tree that it passed, each once, innermost first; then those of what it
-    came of."""
+    """An exception is described by type, text and the tree's lines that it passed, each once, innermost
+    first; then those of its cause.
+    """
     found = described(name, *arguments)
     assert found["ended"] == "error"
     error = found["error"]
@@ -125,14 +126,14 @@ def test_exceptions_are_described(
 
 
 def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
-    """A group of exceptions comes of those that are in it."""
+    """The exceptions in a group count as its causes."""
     error = described("several")["error"]
     assert error["kind"] == "ExceptionGroup"
     assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]
 
 
 def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]) -> None:
-    """The probe's own limit is told apart from an exception, whoever else may have a class of that name."""
+    """The probe's own limit is distinguished from an exception of the same class name."""
     assert described("stop") == {"ended": "steps"}
 
 
@@ -148,8 +149,9 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     ],
 )
 def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
-    """An error for want of room says so, in whatever words; also as one that others came of, even if these
-    came of each other."""
+    """An error for lack of space says so, however it is worded and wherever it is in a chain of causes, even
+    a cyclic one.
+    """
     assert describe(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
@@ -160,13 +162,13 @@ def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
 
 
 def test_a_full_disk_in_a_group_is_told(described: Callable[..., dict[str, Any]]) -> None:
-    """A group of exceptions tells of a full disk if one of them does; one without a text tells of none."""
+    """A group of exceptions reports a full disk if one of them does; one without a text reports none."""
     assert described("several")["disk_full"]
     assert not described("unspeakable")["disk_full"]
 
 
 def test_the_first_activation_is_noted(tmp_path: Path) -> None:
-    """The file goes when an injection is first active, and the probe is itself again."""
+    """The file is deleted when an injection is first active, and the probe is restored."""
     inactive = tmp_path / "inactive"
     inactive.touch()
     answers = [False, False, True, False]
@@ -180,7 +182,7 @@ def test_the_first_activation_is_noted(tmp_path: Path) -> None:
 
 
 def test_a_probe_is_asked() -> None:
-    """What it reports is passed on, what it raises is how the run ended, the rest is no report."""
+    """The probe's report is passed on, its exception ends the run, and anything else is no report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

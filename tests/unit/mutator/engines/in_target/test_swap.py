@@ -1,4 +1,4 @@
-"""Putting code into loaded modules: every way to hold a function, and every reason to leave it."""
+"""Putting code into loaded modules: every way to hold a function, and every reason to refuse."""
 
 import sys
 import types
@@ -80,7 +80,7 @@ def loaded() -> Iterator[types.ModuleType]:
 
 
 def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.CodeType, types.CodeType]]:
-    """The functions that differ, where a text is replaced in the module's source."""
+    """The functions that differ after a text is replaced in the module's source."""
     before = compile(LOADED, "car.py", "exec", dont_inherit=True)
     after = compile(LOADED.replace(old, new), "car.py", "exec", dont_inherit=True)
     return [
@@ -106,8 +106,9 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_everyone_who_holds_a_function_gets_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """Plain, wrapped, cached, static, class, private functions, methods and properties do as their new code,
-    after they ran hot with the old."""
+    """Plain, wrapped, cached, static, class and private functions, methods and properties run the new code,
+    even after they ran hot with the old.
+    """
     kept = call
     for _ in range(200):
         if word != "cached":
@@ -118,7 +119,7 @@ def test_everyone_who_holds_a_function_gets_the_new_code(
 
 
 def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType) -> None:
-    """A name imported elsewhere and a bound method are the same function as ever, with new code."""
+    """A name imported elsewhere and a bound method keep their function, with new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)
@@ -126,7 +127,7 @@ def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType)
 
 
 def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
-    """If one function is not the one that was loaded, no code is swapped at all."""
+    """If one function is not the loaded one, no code is swapped at all."""
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
     with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
@@ -141,7 +142,7 @@ def test_a_function_that_there_are_two_of_is_left_alone(loaded: types.ModuleType
 
 
 def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
-    """A function on the stack would go on with its old code, so it is not swapped."""
+    """A function on the stack would continue with its old code, so it is not swapped."""
 
     def work() -> None:
         swap_code(functions('"old walk"', '"new walk"'), PROBE)

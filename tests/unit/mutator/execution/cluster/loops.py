@@ -1,4 +1,4 @@
-"""An event loop for a test, in a thread of its own: a browser's, in this one, may be running."""
+"""An event loop for a test in a separate thread, because a browser's loop may run in this one."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -9,6 +9,6 @@ T = TypeVar("T")
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """As `asyncio.run`."""
+    """Like `asyncio.run`."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, work).result()

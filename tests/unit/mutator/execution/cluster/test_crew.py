@@ -1,4 +1,4 @@
-"""Who may take part in a run, and what is told of those who do."""
+"""Which workers may join a run, and what is reported about them."""
 
 import pytest
 
@@ -30,19 +30,19 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_versions_decide(change: dict[str, object], objection: str) -> None:
-    """What would keep a machine from resuming the run keeps a worker out, with the difference."""
+    """A difference that would keep a machine from resuming the run keeps a worker out, and is reported."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 
 def test_other_versions_can_be_accepted() -> None:
-    """Of Python and packages, not of mutator."""
+    """Other versions of Python and packages can be accepted, but not of mutator."""
     crew = Crew(STRETCH, accept=True)
     assert crew.objection(FACTS | {"packages": {"numpy": "1.0"}}) == ""
     assert crew.objection(FACTS | {"mutator": "0.0.1"})
 
 
 def test_rates_are_told_by_machine() -> None:
-    """Two workers of one machine are told as one rate, a refused one by number."""
+    """Two workers of one machine are reported as one rate, a refused one by number."""
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):

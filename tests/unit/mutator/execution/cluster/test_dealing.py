@@ -1,4 +1,4 @@
-"""Work dealt out to workers that fail in many ways: nobody's fault is taken for another's."""
+"""Work dealt out to workers that fail in many ways: each failure is blamed on its true cause."""
 
 import asyncio
 import json
@@ -37,7 +37,7 @@ Work = Callable[[Piece], Result]
 
 
 def healthy(piece: Piece) -> Result:
-    """What a worker makes of a piece."""
+    """A healthy worker's result for a piece."""
     line = {"detail": "", "hazards": [], "max_dev": [], "outcome": "masked", "status": "ok", "tree": ""}
     line |= {"activation": None, "alerts": [], "t_manifest": None, "trace_digest": ""}
     records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.lines]
@@ -50,7 +50,7 @@ def healthy(piece: Piece) -> Result:
 
 
 def sick(ending: Ending, deadly: str = "") -> Work:
-    """A worker on which each piece ends like this, or only those with this experiment."""
+    """A worker on which each piece, or only those with this experiment, ends like this."""
 
     def work(piece: Piece) -> Result:
         if deadly and deadly not in piece.lines:
@@ -61,7 +61,7 @@ def sick(ending: Ending, deadly: str = "") -> Work:
 
 
 class Answer:
-    """A future of Dask's."""
+    """Stands for a Dask future."""
 
     def __init__(self, future: "asyncio.Future[Any]") -> None:
         self.future = future
@@ -74,7 +74,7 @@ class Answer:
 
 
 class Workers:
-    """A client of a scheduler with these workers, who answer at once."""
+    """Stands for a client of a scheduler with these workers, which respond at once."""
 
     dashboard_link = None
 
@@ -85,14 +85,14 @@ class Workers:
         self._open: list[asyncio.Future[Any]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
-        """As the scheduler tells it."""
+        """As the scheduler returns it."""
         told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
         return {"workers": {f"tcp://{name}": one for name, one in told.items()}}
 
     def submit(
         self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
     ) -> Answer:
-        """As Dask's."""
+        """Like Dask's."""
         future = asyncio.get_running_loop().create_future()
         self._open.append(future)
         if function.__name__ == "work":
@@ -120,7 +120,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 @pytest.fixture
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A session in which all is to be run; the workers' versions do not matter."""
+    """A session with everything left to run; the workers' versions do not matter."""
     monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(Crew, "objection", lambda *given: "")
     folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
@@ -141,7 +141,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
 
 
 def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[dict[str, Record], list[str]]:
-    """The records that the run folder has afterwards, and what was remarked."""
+    """The resulting records of the run folder, and the remarks."""
     remarks: list[str] = []
 
     async def deal() -> None:
@@ -159,8 +159,9 @@ def errors(records: dict[str, Record]) -> list[str]:
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
 def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending) -> None:
-    """What ends badly on one worker alone is done by the other; the sick one is refused by name with the
-    reason, and no experiment is blamed."""
+    """If pieces fail on one worker only, the other completes them; the sick one is refused by name with the
+    reason, and no experiment is blamed.
+    """
     records, remarks = dealt(session, Workers(odd=sick(ending), alpha=healthy))
     assert (len(records), errors(records), session.problem) == (12, [], "")
     assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
@@ -168,7 +169,9 @@ def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending)
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
 def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Ending) -> None:
-    """What ends badly on every worker gets a harness error with the reason; both workers go on."""
+    """An experiment that fails on every worker gets a harness error with the reason; both workers
+    continue.
+    """
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
@@ -176,8 +179,9 @@ def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Endin
 
 
 def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
-    """When the command's connection breaks for a moment, the scheduler forgets all tasks, and the command
-    gives its work again instead of waiting for ever."""
+    """When the command's connection breaks briefly, the scheduler forgets all tasks, and the command submits
+    its work again.
+    """
     workers = Workers(alpha=healthy, beta=healthy)
     workers.cut_at = 2
     records, remarks = dealt(session, workers)
@@ -185,7 +189,7 @@ def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
 
 
 def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> None:
-    """A cluster file asks for two workers: the work waits for the second one when the first is refused."""
+    """A cluster file requests two workers: if the first is refused, the work waits for the second."""
     workers = Workers(odd=sick(Ending.UNLIKE))
 
     async def late() -> None:
@@ -203,13 +207,13 @@ def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> No
 
 
 def test_a_refused_worker_is_the_last_where_nobody_queues(session: Any) -> None:
-    """The command ends with the reason."""
+    """Without a queue the command ends with the reason."""
     dealt(session, Workers(odd=sick(Ending.UNLIKE)))
     assert session.problem == "no worker is left that may do the work: the reason"
 
 
 def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is given up is not written while results are: both append to the same file."""
+    """Experiments are not given up while results are written, since both append to the same file."""
     inside, most = [0], [0]
 
     def slow(real: Callable[..., None]) -> Callable[..., None]:
@@ -232,7 +236,7 @@ def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_remark_that_is_an_error_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where warnings are errors, nothing goes on in the background after the first one."""
+    """If warnings are errors, no background work continues after the first one."""
 
     class Place:
         @asynccontextmanager

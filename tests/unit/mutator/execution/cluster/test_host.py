@@ -1,4 +1,4 @@
-"""A worker's side of a run: pieces are run in a process of its own, which goes when nobody wants it."""
+"""A worker's side of a run: a separate process runs the pieces and ends when it is no longer wanted."""
 
 import os
 import signal
@@ -37,7 +37,7 @@ def children(host: Host) -> list[int]:
 
 @contextmanager
 def attended(host: Host) -> Iterator[threading.Event]:
-    """While it is attended; the event says that it is not wanted any more."""
+    """The host, attended; the event means that it is no longer wanted."""
     unwanted = threading.Event()
     thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
     thread.start()
@@ -50,7 +50,7 @@ def attended(host: Host) -> Iterator[threading.Event]:
 
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple[Bundle, Piece]:
-    """What a worker is sent of the toy's small campaign: the bundle and a piece of work."""
+    """What a worker receives for the toy's small campaign: the bundle and a piece of work."""
     folder = tmp_path_factory.mktemp("sent")
     toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
     with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
@@ -68,7 +68,7 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
 
 
 def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """Two pieces are run by one process; once the host is not wanted, process and folder are gone."""
+    """Two pieces run in one process; once the host is not wanted, process and folder are gone."""
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
@@ -82,8 +82,9 @@ def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundl
 
 
 def test_a_process_that_dies_is_told_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """A killed process is no error of the host: the result says how it ended and at which experiment, and the
-    next piece has a new one."""
+    """If the process is killed, the result says how it ended and at which experiment, and the next piece gets
+    a new one.
+    """
     with attended(host):
         killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
         killer.start()
@@ -103,8 +104,7 @@ def _first(host: Host) -> int:
 def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
     host: Host, sent: tuple[Bundle, Piece]
 ) -> None:
-    """A worker whose process does not get ready, as without room on its disk, says why, and did not die of
-    the piece."""
+    """If a worker's process does not start, as on a full disk, it says why, and the piece is not blamed."""
     (host.folder / "meta.json").unlink()
     with attended(host):
         result = host.run(sent[1].packed(), lambda: True)
@@ -113,7 +113,7 @@ def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
 
 
 def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """A piece that nobody waits for ends within a second, with its process."""
+    """A cancelled piece ends within a second, with its process."""
     asked: list[float] = []
 
     def wanted() -> bool:
@@ -127,7 +127,7 @@ def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece
 
 
 def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
-    """Of a bundle that arrived damaged nothing is laid out; a damaged piece is not begun."""
+    """A damaged bundle is not unpacked; a damaged piece is not begun."""
     with pytest.raises(MutatorError, match="damaged parcel"):
         Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
     assert not [*(tmp_path / "other").iterdir()]
@@ -137,7 +137,7 @@ def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Where a machine keeps golden runs; empty."""
+    """The machine's cache of golden runs; empty."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache" / "mutator" / "goldens"
 
@@ -154,8 +154,10 @@ def written(entry: Path) -> int:
 
 
 def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path) -> None:
-    """A second host finds the golden run that the first one drove; a damaged one is driven again and
-    replaced. The records are the same each time."""
+    """A second host finds the golden run of the first one; a damaged one is rerun and replaced.
+
+    The records are the same each time.
+    """
     first = run_once(sent, tmp_path / "a")
     (entry,) = cache.iterdir()
     before = written(entry)
@@ -169,7 +171,7 @@ def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: P
 def test_a_kept_golden_run_must_be_the_campaigns(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """A kept golden run whose digest is not the campaign's is not used, nor is one of other sources."""
+    """A cached golden run with another digest than the campaign's, or of other sources, is not used."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")
