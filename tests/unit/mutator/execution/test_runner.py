@@ -1,4 +1,4 @@
-"""From executions to records: what is believed, and what is a harness error."""
+"""From executions to records: what is accepted, and what is a harness error."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +19,7 @@ Outputs = dict[str, Any]
 
 
 class PlayedEngine:
-    """An engine that runs nothing: every job leaves the outputs it is given."""
+    """An engine that runs nothing: every job leaves the given outputs."""
 
     def __init__(self, out: Path, status: Status, outputs: Outputs) -> None:
         self.out = out
@@ -55,7 +55,7 @@ def write(out: Path, **channels: np.ndarray) -> None:
 
 @pytest.fixture
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
-    """The record of an experiment whose run left the given outputs."""
+    """The record of an experiment with the given outputs."""
     manifest = toycar.manifest("toycar")
     experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     (tmp_path / "golden").mkdir()
@@ -86,7 +86,7 @@ NEVER = {"a": {"first": None, "last": None, "count": 0}}
 
 
 def test_masked(judged: Callable[..., Record]) -> None:
-    """Activated without any difference: masked, with the activation of all injections together."""
+    """A run activated without any difference is masked, with the activation of all injections together."""
     record = judged(ran=RAN)
     assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
     assert record.activation == Activation(first=0.2, last=0.5, count=5)
@@ -94,14 +94,14 @@ def test_masked(judged: Callable[..., Record]) -> None:
 
 
 def test_sdc_from_the_moment_of_activation(judged: Callable[..., Record]) -> None:
-    """A difference in the very step of the activation is the fault's."""
+    """A difference in the step of the activation is caused by the fault."""
     record = judged(ran=RAN, trace={"brake": stepped(4, 0.5)})
     assert (record.outcome, record.t_manifest) == (Outcome.SDC, T[4])
     assert dict(record.max_dev)["brake"] == 0.5
 
 
 def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
-    """Hazards and counted alerts at or after the activation are kept, in the order of time."""
+    """Hazards and counted alerts at or after the activation are kept in order of time."""
     said = {
         "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
         "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],
@@ -113,13 +113,13 @@ def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
 
 
 def test_never_active(judged: Callable[..., Record]) -> None:
-    """A mutant that never ran its fault and equals golden is not_activated."""
+    """A mutant that never executed its fault and equals golden is not_activated."""
     assert judged(ran=NEVER).outcome is Outcome.NOT_ACTIVATED
 
 
 @pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
 def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], ran: dict, told: str) -> None:
-    """A difference before the activation, or without one, is the harness's failure, not a result."""
+    """A difference before the activation, or without one, is a harness error."""
     record = judged(ran=ran, trace={"gas": stepped(3)})
     assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
     assert told in record.detail
@@ -127,8 +127,9 @@ def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], r
 
 @pytest.mark.parametrize("outputs", [{"trace": {}}, {"said": []}, {"trace": {"gas": np.zeros(3)}}])
 def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs) -> None:
-    """A run that ended without a usable trace and record broke down, if its fault was active; if it was not,
-    the harness did."""
+    """A run without a usable trace and record crashed if its fault was active; otherwise it is a harness
+    error.
+    """
     record = judged(ran=RAN, **outputs)
     assert (record.status, record.outcome) == (Status.CRASHED, None)
     assert record.activation is not None
@@ -141,14 +142,14 @@ def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs)
     ("status", "kept"), [(Status.CRASHED, True), (Status.TIMEOUT, False), (Status.HARNESS_ERROR, False)]
 )
 def test_other_statuses(judged: Callable[..., Record], status: Status, kept: bool) -> None:
-    """A crash keeps its activation; a time-out does not, since its count depends on the machine's speed."""
+    """A crash keeps its activation; a timeout does not, since its count depends on the machine's speed."""
     record = judged(status, ran=RAN)
     assert (record.status, record.outcome, record.detail) == (status, None, "why")
     assert (record.activation is not None) == kept
 
 
 def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
-    """A mutant that does not compile is invalid, an anchor that is gone a harness error; the others run."""
+    """A mutant that does not compile is invalid, a missing anchor is a harness error; the others run."""
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})

@@ -1,4 +1,4 @@
-"""Campaigns on a way of one's own to deal out the work."""
+"""Campaigns with a custom distributor of the work."""
 
 from pathlib import Path
 
@@ -34,7 +34,7 @@ class Idle:
 
 @pytest.mark.usefixtures("kept_checks")
 def test_another_distributor_gives_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
-    """Who deals out the work changes no byte of the results, and resume takes over what another one left."""
+    """The distributor changes no byte of the results, and resuming works across distributors."""
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
     assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")

@@ -1,4 +1,4 @@
-"""Runs as mutation testing reports: the structure that their schema asks for, and what statuses mean."""
+"""Runs as mutation testing reports: the schema's structure, and the meaning of statuses."""
 
 import json
 import re
@@ -36,7 +36,7 @@ IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
 def report(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> dict[str, Any]:
-    """The report of a toy run whose faults of the lane are hazardous."""
+    """The report of a toy run with hazardous lane faults."""
     tmp_path = tmp_path_factory.mktemp("report")
     toycar = copy_toycar(tmp_path)
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD if e.fault.fault_type == "lane" else {})
@@ -55,7 +55,7 @@ def mutants(report: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
-    """What the schema requires is there, of the type and in the range it asks for."""
+    """Every part that the schema requires is present, with its type and range."""
     assert re.fullmatch(r"([1-2]\d*|0)(\.(([1-9]\d*)|0)){0,2}", report["schemaVersion"])
     assert all(0 <= report["thresholds"][name] <= 100 for name in ("high", "low"))
     assert all(type(report["thresholds"][name]) is int for name in ("high", "low"))
@@ -75,7 +75,7 @@ def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
 
 
 def test_tests_are_drives(report: dict[str, Any]) -> None:
-    """Every drive that a mutant names is a test of its scenario, named once."""
+    """Every drive that a mutant names is a test of its scenario, listed once."""
     tests = [test["id"] for file in report["testFiles"].values() for test in file["tests"]]
     assert len(tests) == len(set(tests))
     named = {test for _, m in mutants(report) for test in (*m["coveredBy"], *m["killedBy"])}
@@ -84,7 +84,7 @@ def test_tests_are_drives(report: dict[str, Any]) -> None:
 
 
 def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
-    """Source and location give the statement; the replacement has it, and the injected lines beside it."""
+    """Source and location give the statement; the replacement has it together with the injected lines."""
     for source, mutant in mutants(report):
         start, end = mutant["location"]["start"], mutant["location"]["end"]
         lines = source.splitlines()[start["line"] - 1 : end["line"]]
@@ -99,8 +99,9 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
 def test_a_mutant_of_an_operator_replaces_its_expression(
     toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
 ) -> None:
-    """It has the operator's name, the exact columns of the expression, and what stands there instead; a
-    statement that is left out gives way to `pass`."""
+    """It has the operator's name, the exact columns of the expression, and the replacement; a deleted
+    statement becomes `pass`.
+    """
 
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
@@ -120,7 +121,7 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
     made = json.loads(export(run, Format.MUTATION_ELEMENTS, workspace=toycar).read_text())
     *changes, (_, minus), (source, omission) = mutants(made)
     assert minus["replacement"] == "(1.5 - speed)"  # after `gap - 5.0 -`
-    assert len(changes) == 9  # operations with two sides in the file
+    assert len(changes) == 9  # binary operations in the file
     found = set()
     for source, mutant in changes:
         start, end = mutant["location"]["start"], mutant["location"]["end"]
@@ -138,7 +139,7 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
 
 
 def test_killed_means_hazard(report: dict[str, Any]) -> None:
-    """A fault that led to a hazard in a drive is killed by that drive, the others survive."""
+    """A drive in which a fault led to a hazard kills it; the other faults survive."""
     for _, mutant in mutants(report):
         lane = mutant["description"].startswith("sensor/lane/")
         assert mutant["status"] == ("Killed" if lane else "Survived")
@@ -146,7 +147,7 @@ def test_killed_means_hazard(report: dict[str, Any]) -> None:
 
 
 def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Sources that are not those of the run are not shown as if they were."""
+    """Sources that differ from the run's are refused."""
     run = write_run(toycar, tmp_path / "run")
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -175,7 +176,7 @@ def test_status(
     experiment: Callable[..., Experiment],
     record: Callable[..., Record],
 ) -> None:
-    """The status of a fault follows from what became of its drives, hazards first."""
+    """The status of a fault follows from its drives' outcomes, hazards first."""
     drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None

@@ -55,7 +55,7 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
 
 
 def test_a_hazard_is_data(run: Path) -> None:
-    """Hazards pass, harness errors are errors, what did not act or run is skipped; counts agree."""
+    """Hazards pass, harness errors are errors, faults that did not act or run are skipped; counts agree."""
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}
@@ -75,20 +75,20 @@ def test_a_hazard_is_data(run: Path) -> None:
 
 
 def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
-    """Who wants to see hazards as failures says so; they then name hazard and time."""
+    """With the option, hazards are failures that name hazard and time."""
     found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=Parts(failures=["hazard"])))
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
 
 def test_an_error_cannot_be_a_failure(run: Path) -> None:
-    """A harness error says nothing about the controller, so it is no failure of its."""
+    """A harness error says nothing about the controller, so it cannot be selected as a failure."""
     with pytest.raises(MutatorError, match="harness_error"):
         export(run, Format.JUNIT, parts=Parts(failures=["harness_error"]))
 
 
 def test_tables_are_those_of_the_run(run: Path, tmp_path: Path) -> None:
-    """CSV and Parquet are the run's own tables, brought up to date."""
+    """CSV and Parquet are the run's own tables, updated."""
     for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
         file = export(run, format, tmp_path / "new" / name)
         assert file.read_bytes() == (run / name).read_bytes()

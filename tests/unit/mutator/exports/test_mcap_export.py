@@ -41,7 +41,7 @@ GOLDEN = Series(
     every=[1, 1],
     about={"start": 0.0, "end": 1.0, "channels": CHANNELS},
 )
-FAULTY = Series(  # it ended after 0.5 s; between the two times gas was 1 for a step
+FAULTY = Series(  # it ended after 0.5 s; in between, gas was 1 for one step
     t=np.array([0.0, 0.5]),
     rows=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
     every=[1, 1],
@@ -56,7 +56,7 @@ FAULTY = Series(  # it ended after 0.5 s; between the two times gas was 1 for a 
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """A hazard with all that can happen, for some."""
+    """A hazard with every kind of event, for some experiments."""
     if e.fault.fault_type != "lane":
         return {}
     return {
@@ -76,7 +76,7 @@ def run(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """Eight experiments, of which those with hazards and no others have a series."""
+    """Eight experiments; exactly those with hazards have a series."""
     folder = tmp_path_factory.mktemp("mcap")
     run = write_run(copy_toycar(folder), folder / "run", became, limit=8)
     golden = encode(GOLDEN)
@@ -92,7 +92,8 @@ def hazardous(run: Path) -> list[str]:
 
 def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
     """Each run's channels are topics with a schema and a unit, each value is a message at its time, and each
-    thing that happened is an event; values that are not finite are null."""
+    event is a message; values that are not finite are null.
+    """
     only = 'outcome == "hazard" and fault_type == "lane"'
     out = export(run, Format.MCAP, tmp_path / "out", parts=Parts(only=only))
     assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
@@ -131,7 +132,7 @@ def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
 
 
 def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -> None:
-    """Log times have no sign: all move together, and the metadata say by how much."""
+    """Log times are unsigned: all are shifted together, and the metadata give the shift."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
@@ -153,8 +154,9 @@ def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -
 def test_a_kept_trace_of_another_run_is_refused(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A kept trace that is damaged, or not the campaign's, is an error with its file: the series in its place
-    would be another result."""
+    """A stored trace that is damaged, or not the campaign's, is an error with its file, because the series
+    would give another result.
+    """
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     faulty = copy / "traces" / name / "faulty"
@@ -170,14 +172,14 @@ def test_a_kept_trace_of_another_run_is_refused(
 
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
-    """An export is the same each time."""
+    """Exporting a run twice gives the same bytes."""
     parts = Parts(only=f'experiment_id == "{hazardous(run)[0]}"')
     first, again = (next(export(run, Format.MCAP, tmp_path / x, parts=parts).iterdir()) for x in "ab")
     assert first.read_bytes() == again.read_bytes()
 
 
 def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> None:
-    """What is left out is counted, with the command that drives it again; nothing at all is an error."""
+    """Experiments left out are counted, with the command that reruns them; an empty export is an error."""
     left = 8 - len(hazardous(run))
     with pytest.warns(
         MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"
@@ -202,13 +204,13 @@ def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> Non
 def test_what_a_format_has_no_use_for_is_refused(
     run: Path, tmp_path: Path, format: Format, parts: Parts, name: str
 ) -> None:
-    """An option without effect would promise something."""
+    """An option without effect on a format is refused."""
     with pytest.raises(MutatorError, match=f"leave `{name}` out"):
         export(run, format, tmp_path / "x", parts=parts)
 
 
 def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
-    """What a run folder has as Parquet alone is written as CSV, too, with the same cells."""
+    """Tables that a run folder has only as Parquet are also written as CSV, with the same cells."""
     parts = Parts(table=Table.PROPAGATION)
     written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
     rows = pd.read_csv(written)
@@ -224,7 +226,7 @@ def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
-    """Whatever `export` writes into it belongs to the run."""
+    """Everything that `export` writes into a run folder belongs to the run."""
     for table in Table:
         export(run, Format.CSV, None, parts=Parts(table=table))
         export(run, Format.PARQUET, None, parts=Parts(table=table))

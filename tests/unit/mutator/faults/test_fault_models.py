@@ -57,7 +57,9 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
 
 
 def test_the_models_that_ship(clone: Workspace) -> None:
-    """These models, two of which wrap statements, and those of operators, each with at least one example."""
+    """These models ship, two of which wrap statements, and those of operators, each with at least one
+    example.
+    """
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
@@ -66,7 +68,7 @@ def test_the_models_that_ship(clone: Workspace) -> None:
 
 @pytest.mark.parametrize("name", NAMES + OF_OPERATORS)
 def test_examples_hold(clone: Workspace, name: str) -> None:
-    """Each model's examples give exactly what they say, and un-splice."""
+    """Each model's examples give exactly the stated text, and un-splice."""
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:
@@ -74,8 +76,10 @@ def test_examples_hold(clone: Workspace, name: str) -> None:
 
 
 def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on which models are there to raise, so the digest does, too. Those that carry out
-    the target's own code in another way than it stands are."""
+    """Verdicts depend on which models raise on purpose, so the digest does, too.
+
+    Those models run the target's own code differently from how it is written.
+    """
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)
     path = folder / "scale.yaml"
@@ -88,7 +92,7 @@ def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> No
 
 
 def test_an_example_that_does_not_hold(folder: Path) -> None:
-    """A template that gives something else than its example says is a problem with file and line."""
+    """A template whose output differs from its example is a problem with file and line."""
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = check_examples(load_fault_models(folder))
@@ -106,7 +110,7 @@ def test_an_example_that_fails(folder: Path) -> None:
 
 
 def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
-    """Whatever a mutant's text depends on changes the digest."""
+    """Any change to what a mutant's text depends on changes the digest."""
     before = load_fault_models(folder).digest
     for name in ("offset.py.j2", "_fi.py.j2"):
         (folder / name).write_text((folder / name).read_text() + "\n")
@@ -146,7 +150,7 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
     ],
 )
 def test_a_mistake_is_answered(folder: Path, name: str, old: str, new: str, said: str) -> None:
-    """A model's YAML is as strict as any other."""
+    """A model's YAML is read as strictly as any other."""
     assert said in broken(folder, name, old, new)
 
 
@@ -158,6 +162,6 @@ def test_a_missing_template(folder: Path) -> None:
 
 
 def test_an_empty_folder(tmp_path: Path) -> None:
-    """A folder without models is no templates folder."""
+    """A folder without models is not a templates folder."""
     with pytest.raises(MutatorError, match="no fault model"):
         load_fault_models(tmp_path)

@@ -29,7 +29,7 @@ variants:
 
 
 def answer(toy: Workspace, name: str) -> str:
-    """What is said of a spec with an effect of that name; empty when it expands."""
+    """The error for a spec with an effect of that name; empty if it expands."""
     path = toy.library / "faults" / "sensor" / "weather.yaml"
     path.write_text(SPEC.replace("toycar.sensor.NAME", name))
     try:
@@ -59,7 +59,7 @@ def test_a_name_that_the_target_defines(toy: Workspace) -> None:
     ],
 )
 def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
-    """Anything but a name that a module of the target defines is answered at its line."""
+    """Any name that no target module defines is reported at its line."""
     assert answer(toy, name).startswith(f"weather.yaml:16: {said}")
 
 
@@ -67,13 +67,13 @@ def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
     "line", ["from toycar.road import Rain", "import x as Rain", "Rain = Snow", "def Rain(): 0"]
 )
 def test_names_are_defined_in_many_ways(toy: Workspace, line: str) -> None:
-    """A package that only passes a name on defines it too."""
+    """A package that only re-exports a name defines it, too."""
     (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
     check_import(toy.manifest("toy"), "toycar.sky.Rain")
 
 
 def test_a_module_that_does_not_parse(toy: Workspace) -> None:
-    """A module of the target that is not Python is an error at its line, not a traceback."""
+    """A target module that is not Python is an error at its line, not a traceback."""
     path = Path(toy.manifest("toy").root) / "toycar" / "sky.py"
     path.write_text("class Rain:\n    x = = 1\n")
     with pytest.raises(MutatorError, match="not valid Python: invalid syntax") as caught:

@@ -24,7 +24,7 @@ def declare(workspace: Workspace, first: str, second: str) -> None:
 
 
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
-    """The order of the file counts, not that of the alphabet."""
+    """The file's order counts, not the alphabet's."""
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
     assert (readings.names, readings.default) == (("printed", "measured"), "printed")
@@ -32,7 +32,7 @@ def test_the_first_reading_is_the_default(toy: Workspace) -> None:
 
 
 def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
-    """Its faults keep the ids that they have where the same reading is the first of several."""
+    """Its faults have the same ids as when that reading is the first of several."""
     spec = next(iter(toy.spec_files()))
     spec.write_text(spec.read_text().partition("  both:")[0])
 
@@ -47,7 +47,7 @@ def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
 
 
 def test_specs_are_written_in_the_names_that_are_declared(toy: Workspace) -> None:
-    """With other names a spec has other keys, and its faults another reading."""
+    """With other reading names a spec has other keys, and its faults another reading."""
     for path in toy.spec_files():
         text = path.read_text().replace("as_described:", "printed:").replace("as_coded:", "measured:")
         path.write_text(text)
@@ -70,7 +70,7 @@ def test_specs_are_written_in_the_names_that_are_declared(toy: Workspace) -> Non
     ],
 )
 def test_a_mistake_is_answered_with_its_line(tmp_path: Path, text: str, said: str) -> None:
-    """No reading, a name that is none, a misspelt key."""
+    """A missing reading, an invalid name and a misspelt key are reported with their line."""
     (tmp_path / FILE).write_text(text)
     with pytest.raises(MutatorError) as error:
         load_readings(tmp_path)

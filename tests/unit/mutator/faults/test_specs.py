@@ -1,4 +1,4 @@
-"""Fault specs: read strictly, expanded with a seed, every mistake answered at its line."""
+"""Fault specs: read strictly, expanded with a seed, and every mistake is reported at its line."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
 
 
 def test_a_spec_is_read(toy: Workspace) -> None:
-    """Variants keep their order; the number of faults is known before any is made."""
+    """Variants keep their order; the number of faults is known before any is built."""
     spec = toy.spec(NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
     assert [v.count for v in spec] == [3, 1, 2]
@@ -38,7 +38,7 @@ def test_a_spec_is_read(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    """Integers from whole ranges stay integers, in the order of the ranges, with the unit of the key."""
+    """Integer ranges give integers, in the order of the ranges, with the unit of the key."""
     found = of(faults(toy), "longer")
     assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
@@ -48,7 +48,7 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
 
 
 def test_expansion_converts_units(toy: Workspace) -> None:
-    """A value in km/h reaches a variable in m/s as m/s, its sign as the spec says; the table keeps km/h."""
+    """A value in km/h reaches a variable in m/s as m/s, with the spec's sign; the table keeps km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
         assert by == pytest.approx(-float(fault.value) / 3.6)
@@ -57,7 +57,7 @@ def test_expansion_converts_units(toy: Workspace) -> None:
 
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
-    """As coded the same number is taken for one of another unit; without an own part nothing differs."""
+    """As coded, the same number is taken in another unit; without a part for the reading nothing differs."""
     described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == "as_coded" for f in coded)
@@ -67,7 +67,7 @@ def test_both_readings_share_their_draws(toy: Workspace) -> None:
 
 
 def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
-    """A fault that latches, or needs another scenario, says so itself."""
+    """A fault declares that it latches, or needs another scenario."""
     (silent,) = of(faults(toy), "silent")
     assert silent.hold is Hold.TO_END
     assert silent.changes == ("alone",)
@@ -75,7 +75,7 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
 
 
 def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
-    """What a reading says of it overrides the variant; a reading that is not written is the default one."""
+    """A reading's setting overrides the variant's; a reading that is not written is the default one."""
     path = toy.spec(NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
@@ -87,7 +87,7 @@ def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
 
 
 def test_ids_are_contents(toy: Workspace) -> None:
-    """The same seed gives the same ids, another seed others, and no two faults share one."""
+    """The same seed gives the same ids, another seed other ones, and no two faults share one."""
     again = [f.id for f in faults(toy)]
     assert again == [f.id for f in faults(toy)]
     assert len(set(again)) == 6
@@ -96,7 +96,7 @@ def test_ids_are_contents(toy: Workspace) -> None:
 
 
 def test_a_cap_is_kept_and_keys_share_draws() -> None:
-    """The cap cuts what is above it; equal keys and ranges give equal values, other keys others."""
+    """The cap limits values; equal keys and ranges give equal values, other keys other values."""
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
     draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
@@ -112,7 +112,7 @@ def test_a_cap_is_kept_and_keys_share_draws() -> None:
 )
 @pytest.mark.parametrize("unit", ["          unit: m\n", ""])
 def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, value: object) -> None:
-    """A variable may be stuck at a truth value, at nothing or at a text, whatever its unit is."""
+    """A variable may be stuck at a truth value, at None or at a text, whatever its unit."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()
@@ -123,7 +123,7 @@ def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, 
 
 
 def test_constants_that_are_drawn(toy: Workspace) -> None:
-    """A text that is the draw's name is the drawn value, converted, as it always was."""
+    """A text that equals the draw's name stands for the drawn value, converted."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset", "model: stuck", 1)
     path.write_text(text.replace("by_m: error", "value_m: -error", 1))
@@ -132,7 +132,7 @@ def test_constants_that_are_drawn(toy: Workspace) -> None:
 
 
 def edited(workspace: Workspace, old: str, new: str) -> str:
-    """What loading and expanding says after one edit of the spec, without the file's name."""
+    """The error of loading and expanding after one edit of the spec, without the file's name."""
     path = workspace.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text()
     assert text.count(old) >= 1
@@ -315,7 +315,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """The message has file and line, the offending value, what was expected, and a remedy."""
+    """The message has file and line, the offending value, the expectation and a remedy."""
     assert said.replace("{KNOWN}", KNOWN) in edited(toy, old, new)
 
 
@@ -327,6 +327,6 @@ def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Works
 
 
 def test_an_unknown_reading(toy: Workspace) -> None:
-    """The error lists the readings that the library declares."""
+    """The error lists the library's declared readings."""
     with pytest.raises(MutatorError, match="reading 'as_built'; expected one of as_described, as_coded"):
         faults(toy, reading="as_built")

@@ -34,12 +34,14 @@ def texts(file: Path) -> list[str]:
 
 
 def test_a_run_has_one_hazard_several_or_none(frame: pd.DataFrame) -> None:
-    """The sets by which a bar is cut: every run is in one of them."""
+    """A bar is divided by the set of hazards: every run is in exactly one."""
     assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
 def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
-    """Bars are as long as the counts, labelled with the injected; a type never activated has no rate."""
+    """Bars are as long as the counts, labelled with the number injected; a type never activated has
+    no rate.
+    """
     figure = hazards.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
@@ -50,7 +52,7 @@ def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
 
 
 def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.DataFrame) -> None:
-    """Colour is hazards per activated fault; where there is none the cell has no colour."""
+    """Colour is hazards per activated fault; a cell without activated faults has no colour."""
     guided = heat_map.draw(frame).axes[0]
     assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
     cells = guided.images[0].get_array()
@@ -59,7 +61,7 @@ def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.Data
 
 
 def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None:
-    """Each panel has a bar where there is such a run, with their number; the mean is where it belongs."""
+    """Each panel has a bar if there is such a run, with the number of runs and the mean at its place."""
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
@@ -69,7 +71,7 @@ def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None
 
 
 def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """SVG and PNG of a figure, the same bytes when drawn again; names are text in the SVG."""
+    """SVG and PNG of a figure have the same bytes when drawn again; names are text in the SVG."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)
@@ -80,7 +82,7 @@ def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> No
 
 
 def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> None:
-    """One fault type has no figure of fault types, one scenario none of scenarios, no results none."""
+    """A single fault type or scenario has no comparison figure, and empty results have none."""
     chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
     assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
     one_scenario = frame.assign(scenario="S1")
@@ -89,7 +91,7 @@ def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> Non
 
 
 def test_runs_without_any_hazard_or_time_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """A campaign in which nothing happened has its figures, too."""
+    """A campaign without hazards or times still has its figures."""
     nothing = results({}, BLUR | {"scenario": "S2"})
     write_drawings(drawings(nothing), tmp_path)
     assert len(list((tmp_path / "figures").iterdir())) == 6

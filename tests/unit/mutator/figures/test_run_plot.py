@@ -1,4 +1,4 @@
-"""Plots of golden against faulty."""
+"""Plots of golden and faulty runs."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -26,7 +26,7 @@ TIME = np.arange(300) * 0.01
 
 @pytest.fixture
 def manifest() -> SimpleNamespace:
-    """As much of a manifest as a plot asks for."""
+    """The parts of a manifest that a plot needs."""
     gas, speed = Channel(name="gas", unit="0..1"), Channel(name="v_ego", unit="m/s")
     gone = Channel(name="not_recorded", unit="m")
     return SimpleNamespace(compared=(gas,), plotted=(speed, gone), time_channel="t", path=Path("m.yaml"))
@@ -39,7 +39,7 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
 
 
 def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Every channel both runs have is a panel with its unit; every mark stands there with its time."""
+    """Every channel that both runs have is a panel with its unit; every mark is shown with its time."""
     mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
     figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
     save(figure, [tmp_path / "p.svg"])
@@ -61,7 +61,7 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
 
 
 def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
-    """Lines and marks after the end are grey, and no axis reaches for them; without an end nothing is."""
+    """Lines and marks after the end are grey, and the axes ignore them; without an end nothing is grey."""
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
     marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
@@ -78,7 +78,7 @@ def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace
 
 
 def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """A plot made again is the same file, byte for byte."""
+    """A plot drawn again has the same bytes."""
     for name in ("a.svg", "b.svg"):
         save(draw_run(trace(), trace(0.1), manifest, title="x"), [tmp_path / name])
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
@@ -91,7 +91,7 @@ def test_a_png_is_a_png(tmp_path: Path, manifest: SimpleNamespace) -> None:
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Nothing to draw is an error that names the manifest, not an empty picture."""
+    """Runs without a common channel are an error that names the manifest, not an empty figure."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
         draw_run(trace(), {"t": TIME}, manifest, title="x")
 

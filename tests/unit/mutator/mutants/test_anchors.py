@@ -95,7 +95,7 @@ def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line
     ],
 )
 def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]) -> None:
-    """What an index was is not known afterwards if the same statement sets it after the item."""
+    """An index that the same statement sets after the item is unknown afterwards."""
     for source in (
         f"def f(self):\n    {targets} = g()\n",
         f"def f(self):\n    for {targets} in g():\n        h()\n",
@@ -105,7 +105,7 @@ def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]
 
 
 def test_heads_of_blocks_count_last() -> None:
-    """A `nth` that chose a statement, or none where there was one, still means the statement."""
+    """With a block's head as a new candidate, an existing `nth`, or none, still means the same statement."""
     source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
     source += "    with xs as y:\n        y = 2\n        y = 3\n"
 
@@ -118,7 +118,7 @@ def test_heads_of_blocks_count_last() -> None:
 
 
 def test_functions_are_found_by_qualified_name() -> None:
-    """Nested functions have their own statements, with `<locals>` or without."""
+    """Nested functions have their own statements, written with `<locals>` or without."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
@@ -157,7 +157,7 @@ def test_functions_are_found_by_qualified_name() -> None:
 def test_no_hit_or_several_is_an_error(
     kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
 ) -> None:
-    """The error names the place, the candidates or the reason, and what to do."""
+    """The error names the place, the candidates or the reason, and the remedy."""
     with pytest.raises(MutatorError) as caught:
         lines(kind, name, function, nth)
     for piece in pieces:
@@ -165,7 +165,7 @@ def test_no_hit_or_several_is_an_error(
 
 
 def test_entry_goes_below_the_docstring() -> None:
-    """The first place in a function is after its docstring, also when that is all there is."""
+    """The first place in a function is after its docstring, even if the function has nothing else."""
     assert lines(AnchorKind.ENTRY, "") == (15, 14)
     assert lines(AnchorKind.ENTRY, "", "empty") == (37, 36)
     assert lines(AnchorKind.ENTRY, "", "A.width", 2) == (11, 10)
@@ -201,7 +201,7 @@ def test_where_an_import_goes(source: str, line: int) -> None:
     ],
 )
 def test_a_file_that_cannot_be_a_target(source: bytes, piece: str) -> None:
-    """What does not parse, or was instrumented before, is refused by name."""
+    """A file that does not parse, or was instrumented before, is refused by name."""
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source, Path("root"))
     assert piece in str(caught.value)

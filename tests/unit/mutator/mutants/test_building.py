@@ -37,7 +37,7 @@ def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> Mu
 
 
 def one(**location: object) -> Fault:
-    """A fault by hand: `gap = 3.0`, somewhere."""
+    """A hand-written fault: `gap = 3.0`, at some place."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     values = {"path": "toycar/sensor.py", "function": "Sensor.measure", "anchor": anchor, **location}
     params = (("target", "gap"), ("value", 3.0))
@@ -56,7 +56,7 @@ def one(**location: object) -> Fault:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_golden_diffs(toy: Workspace, variant: str) -> None:
-    """The diff of each kind of fault is, to the letter, the one on file (probe apart, but for its head)."""
+    """The diff of each kind of fault equals the stored one exactly (of the probe, only the head)."""
     fault = None if variant == "null" else toy_faults(toy)[variant]
     made = build(toy, fault)
     patch = made.patch.replace(made.id, "<id>")
@@ -70,7 +70,7 @@ def test_golden_diffs(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
-    """Changed files un-splice to the original bytes; the probe is the one new file; everything compiles."""
+    """Changed files un-splice to the original bytes; the probe is the only new file; everything compiles."""
     manifest = toy.manifest("toy")
     made = build(toy, None if variant == "null" else toy_faults(toy)[variant])
     assert set(made.files) - set(manifest.tree.files) == {"toycar/_fi.py"}
@@ -83,7 +83,7 @@ def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("name", ["toycar/_fi.py", "toycar/_fi/__init__.py"])
 def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
-    """A module or package of the target that is called as the probe is refused by its path."""
+    """A target module or package with the probe's name is refused by its path."""
     path = toy.manifest("toy").root / name
     path.parent.mkdir(exist_ok=True)
     path.write_text("x = 1\n")
@@ -92,7 +92,7 @@ def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
 
 
 def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
-    """The patched copy, the written tree and the digest agree, and the target itself is untouched."""
+    """The patched copy, the written tree and the digest agree, and the target is unchanged."""
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
@@ -107,7 +107,9 @@ def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
-    """Same fault, trigger, target and templates: same id and bytes; any other: another id."""
+    """Same fault, trigger, target and templates give the same id and bytes; any difference gives
+    another id.
+    """
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])
@@ -131,7 +133,7 @@ def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
 
 
 def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str, object]:
-    """Drive the mutated toy; its positions and the probe's report."""
+    """Run the mutated toy; return its positions and the probe's report."""
     write_tree(toy.manifest("toy"), made, place / "tree")
     program = (
         "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
@@ -175,14 +177,14 @@ def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_locations_are_checked_again(toy: Workspace, location: dict[str, object], said: str) -> None:
-    """A fault that did not come through expansion gets no further than one that did."""
+    """A fault that skipped expansion passes the same location checks."""
     with pytest.raises(MutatorError) as caught:
         build(toy, one(**location))
     assert said in str(caught.value)
 
 
 def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
-    """Valid lines in a place where they are not allowed make an invalid mutant, which names line and file."""
+    """Lines that are not allowed at their place make an invalid mutant, which names line and file."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
     broken = Workspace(library=toy.library, templates=templates)
@@ -193,7 +195,7 @@ def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_triggers_are_checked_again(toy: Workspace) -> None:
-    """A condition that is no condition does not get into a probe, nor a time without its length."""
+    """An invalid condition does not get into a probe, nor a time without its length."""
     with pytest.raises(MutatorError, match="is no truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="expected hold_s with it"):
@@ -201,7 +203,7 @@ def test_triggers_are_checked_again(toy: Workspace) -> None:
 
 
 def test_a_target_with_a_probe_of_its_own(toy: Workspace) -> None:
-    """A tree that has a file where the probe goes is refused."""
+    """A tree with a file at the probe's path is refused."""
     (toy.manifest("toy").root / "toycar" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file toycar/_fi.py"):
         build(toy, None)

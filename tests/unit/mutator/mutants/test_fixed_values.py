@@ -1,4 +1,4 @@
-"""Constants and defaults: which there are, what is refused, and what the probe makes of them in a run."""
+"""Constants and defaults: which exist, which are refused, and what the probe does to them in a run."""
 
 import sys
 import types
@@ -110,7 +110,9 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
 
 @pytest.fixture
 def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
-    """Loads the module with these injections; it and its probe, of time `t` and the condition `t < 2`."""
+    """Load the module with these injections; return it and its probe, with time `t` and the condition `t <
+    2`.
+    """
     names = ("_fi", "fixed_values_m")
 
     def made(*locations: FaultLocation) -> tuple[Any, Any]:
@@ -132,8 +134,9 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], place: str) -> None:
-    """A constant or default has another value from the first active step to the next inactive one, is put
-    back when a run begins anew, and each active step counts once."""
+    """A constant or default differs from the first active step to the next inactive one and is restored when
+    a run starts again; each active step counts once.
+    """
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -146,8 +149,7 @@ def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], pla
 
 
 def test_all_stand_beside_each_other(clone: Workspace) -> None:
-    """A tagged line follows the statement that makes the value, in the block that has it, the inner one
-    first."""
+    """A tagged line follows the statement that makes the value, in the same block, the innermost first."""
     lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
     assert [lines[i - 1].strip() for i in tagged if i - 1 not in tagged] == [
@@ -178,13 +180,15 @@ def test_all_stand_beside_each_other(clone: Workspace) -> None:
     ],
 )
 def test_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
-    """What is not there is refused with what is; what the program makes in another way, with the reason."""
+    """A missing value is refused with a list of the existing ones; one that the program makes in another way,
+    with the reason.
+    """
     with pytest.raises(MutatorError, match=words):
         mutant(clone, location)
 
 
 def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
-    """So is a variable: there is no function that would have it."""
+    """A model that changes no value is refused, and so is a variable, which belongs to no function here."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
         with pytest.raises(MutatorError, match=r"changes no value|expected no variable"):
@@ -194,7 +198,7 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
 
 
 def test_importers(tmp_path: Path) -> None:
-    """Modules that import a constant are found, through others, too; what a function imports is no matter."""
+    """Modules that import a constant are found, also indirectly; imports inside functions do not matter."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",
@@ -214,7 +218,9 @@ def test_importers(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """A star, a class, and a name that the module sets itself, are refused together, each with its line."""
+    """A star import, a class, and a name that the module sets itself are refused together, each with its
+    line.
+    """
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

@@ -1,4 +1,4 @@
-"""Injected lines: what is written is found again."""
+"""Injected lines: what is written can be recognized."""
 
 import re
 
@@ -8,7 +8,7 @@ from mutator.workspace import Workspace
 
 
 def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
-    """What is written is recognized: import, observation, guards, and the ids in them."""
+    """Import, observation, guards, and the ids in them are recognized."""
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
@@ -33,7 +33,7 @@ def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
 
 
 def test_what_is_no_tag(clone: Workspace) -> None:
-    """A tag ends its line, in lower case; a comment that only resembles one is the target's own."""
+    """A tag ends its line, in lower case; a similar comment belongs to the target."""
     for line in (
         b"x = 1",
         b"x = 1  # fi",
@@ -47,7 +47,7 @@ def test_what_is_no_tag(clone: Workspace) -> None:
 
 
 def test_pages_are_told_the_tags() -> None:
-    """The script that shows diffs spells no tag: the page carries the mark and the probe's own tags."""
+    """The script that shows diffs contains no tag: the page carries the mark and the probe's own tags."""
     words = injected_lines.tag_words()
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"

@@ -1,4 +1,4 @@
-"""An injection that would disturb a name of the target is refused before there is a mutant."""
+"""An injection that would disturb a name of the target is refused before a mutant is built."""
 
 import shutil
 from pathlib import Path
@@ -48,7 +48,7 @@ class _Car:
 def injected(
     models: FaultModels, function: str, anchor: Anchor | None = None, model: str = "stuck", **params: Value
 ) -> str:
-    """The source with one injection, at the function's entry if nothing else is said."""
+    """The source with one injection, by default at the function's entry."""
     file = parse_file("m.py", SOURCE.encode(), Path("root"))
     place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
     given = {"value": 1.0, **params} if model == "stuck" else params
@@ -93,14 +93,14 @@ def test_a_name_from_outside(function: str, target: str, line: int, said: str) -
     ],
 )
 def test_a_name_that_may_be_set(function: str, anchor: Anchor | None, target: str) -> None:
-    """Variables of the function, attributes, and names that it declares global or nonlocal are set."""
+    """Variables of the function, attributes, and declared global or nonlocal names can be set."""
     line = f"{target} = _fi.like({target}, 1.0)  # fi:ab12\n"
     assert line in injected(MODELS, function, anchor, target=target)
 
 
 @pytest.fixture
 def models(tmp_path: Path) -> FaultModels:
-    """The fault models; `stuck` sets names of its own, too."""
+    """The fault models; `stuck` also sets its own names."""
     workspace = Workspace.find(root=Path(__file__).parents[4])
     templates = Path(shutil.copytree(workspace.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
@@ -111,7 +111,7 @@ def models(tmp_path: Path) -> FaultModels:
 
 
 def test_names_of_a_template(models: FaultModels) -> None:
-    """A template may set names of its own, unless the function has them for something else."""
+    """A template may set its own names, unless the function uses them."""
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
@@ -124,7 +124,9 @@ def test_names_of_a_template(models: FaultModels) -> None:
 
 
 def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
-    """A template that sets a name within an expression would make it one of the function's own."""
+    """A template may not set a name within an expression, because the name would become the
+    function's own.
+    """
     templates = Path(shutil.copytree(MODELS.folder, tmp_path / "templates"))
     (templates / "sign_flip.py.j2").write_text("(limit := -{{ original }})\n")
     place = Anchor(kind=AnchorKind.RETURN_VALUE)

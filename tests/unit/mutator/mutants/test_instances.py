@@ -1,4 +1,4 @@
-"""One instance among several, one execution, every so many: how a mutant asks, and what then acts."""
+"""One instance among several, one execution, every n-th: how a mutant asks, and what then acts."""
 
 import types
 from pathlib import Path
@@ -44,8 +44,9 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
 
 
 def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list[list[int]], Any]:
-    """What each step saw of three lanes, at these times, with a fault that is active from 1 to 3; the probe's
-    report on it."""
+    """Each step's view of three lanes, at these times, with a fault active from 1 to 3; the probe's report on
+    it.
+    """
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
@@ -79,28 +80,29 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
 def test_what_acts(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """An instance is the one for which the condition holds; executions count from the activation, those of
-    the instance alone; only what acted is counted as an activation."""
+    """An instance is one for which the condition holds; executions count from the activation, for the
+    instance alone; only executions that acted count as activations.
+    """
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
 
 
 def test_executions_count_anew_in_each_stretch(clone: Workspace) -> None:
-    """The second execution is one of each stretch of activity, and of each run."""
+    """Executions are counted separately for each stretch of activity and each run."""
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "of the newest run"
 
 
 def test_a_guard_leaves_out_one(clone: Workspace) -> None:
-    """A statement is left out for one instance alone."""
+    """A statement is omitted for one instance only."""
     data = mutant(clone, SENT, "omission", where="index == 0")
     assert drive(clone, data, (0.0, 1.0, 3.0))[0] == [[1, 2, 3], [2, 3], [1, 2, 3]]
 
 
 def test_how_it_reads(clone: Workspace) -> None:
-    """The target's names are asked only while the fault is active, and the probe counts last."""
+    """The target's names are evaluated only while the fault is active, and the probe counts last."""
     lines = {
         AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
         VALUE: b'gap = (lane["gap"] + 10 if _fi.on() and (index == 2) and _fi.every("a", 5) and '
@@ -114,7 +116,9 @@ def test_how_it_reads(clone: Workspace) -> None:
 
 
 def test_tags_know_what_asks(clone: Workspace) -> None:
-    """A line that asks for an instance asks the probe, and what chooses the instance is the injection's."""
+    """A line that asks for an instance asks the probe, and the choice of the instance belongs to the
+    injection.
+    """
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
@@ -144,14 +148,15 @@ def test_tags_know_what_asks(clone: Workspace) -> None:
     ],
 )
 def test_other_conditions_are_refused(text: str) -> None:
-    """A condition neither calls nor calculates nor sets anything, and does not know the probe."""
+    """A condition may not call, calculate or set anything, or use the probe."""
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
 def test_unknown_names_and_models_that_ask_twice_are_refused(clone: Workspace) -> None:
-    """A name that the function does not know is told with those that it does; so is a model that acts longer
-    than the fault is active."""
+    """A name that the function does not know is reported with the known ones; a model that acts longer than
+    the fault is active is refused, too.
+    """
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
@@ -166,7 +171,7 @@ def read(**given: Any) -> InjectionSpec:
 
 
 def test_as_yaml_writes_them() -> None:
-    """A condition is kept as Python writes it, whatever its spaces and quotes."""
+    """A condition is stored in Python's canonical form, whatever its spaces and quotes."""
     found = read(where='name=="left"  and not (index < 2)', every=3)
     assert (found.where, found.call, found.every) == ("name == 'left' and (not index < 2)", None, 3)
 
@@ -185,6 +190,6 @@ def test_as_yaml_writes_them() -> None:
     ],
 )
 def test_refused_in_yaml(given: dict[str, Any], words: str) -> None:
-    """What no condition is, what excludes each other, and what is set for all is refused, and says why."""
+    """Invalid conditions, contradictions, and settings for all instances are refused with the reason."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

@@ -1,4 +1,4 @@
-"""What `mutator places` lists: each place is found again, and takes the models that it is said to take."""
+"""Each place that `mutator places` lists is found again, and accepts its listed models."""
 
 from collections import Counter
 from pathlib import Path
@@ -46,7 +46,7 @@ VALUES: dict[str, Value] = {
 
 
 def value(param: ParamSchema) -> Value:
-    """A value that the template takes."""
+    """A value that the template accepts."""
     if param.type == "variable":
         return "gap"
     if param.type == "choice":
@@ -67,7 +67,7 @@ def shipped() -> Workspace:
 
 
 def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
-    """A place is told with its line, and with `nth` where its name alone would not do."""
+    """A place is listed with its line, and with `nth` if its name is ambiguous."""
     found = [(one.line, {k: v for k, v in one.at.items() if k not in ("file", "function")}) for one in listed]
     assert found[:3] == [
         (1, {"constant": "LIMIT"}),
@@ -93,7 +93,7 @@ def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
 
 
 def test_each_is_found_again(listed: list[ListedPlace]) -> None:
-    """Every listed anchor can be written in a spec, leads to its own line, and is listed once."""
+    """Every listed anchor is valid in a spec, leads to its own line, and is listed once."""
     source = Source(path=Path("spec.yaml"), data={}, lines={})
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))
@@ -126,7 +126,7 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
 
 
 def test_one_function(shipped: Workspace) -> None:
-    """Only its places are listed; one that the file does not have is refused with those that it has."""
+    """Only the function's places are listed; an unknown function is refused with the existing ones."""
     file = parse_file("m.py", SOURCE, Path("x"))
     found = places_of(file, shipped.fault_models(), "other")
     assert {one.location.function for one in found} == {"other"}
@@ -135,7 +135,7 @@ def test_one_function(shipped: Workspace) -> None:
 
 
 def test_a_statement_that_yields_is_not_repeated(shipped: Workspace) -> None:
-    """What a generator gives and gets has its place in a sequence: models that repeat it are not listed."""
+    """Models that repeat a statement are not listed for one that yields, because its order matters."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
     places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
     models = {one.line: one.models for one in places}

@@ -1,4 +1,4 @@
-"""Sources with the same normalized source compile together."""
+"""Sources with the same normalized source either all compile or all fail."""
 
 import pytest
 from hypothesis import example, given, settings
@@ -30,7 +30,7 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
     ],
 )
 def test_what_counts_as_a_number(text: str, kept: str) -> None:
-    """Whole decimal literals of a usual length become a zero of their kind; nothing else changes."""
+    """Decimal integer literals of a usual length become a zero of their kind; nothing else changes."""
     assert normalized(text, ()) == kept
 
 
@@ -43,7 +43,7 @@ def test_ids_stay_apart() -> None:
 
 
 def test_where_the_value_matters() -> None:
-    """Where the compiler cares which id or number it is, the normalized source does not compile."""
+    """If the compiler depends on the id or number, the normalized source does not compile."""
     assert compiles(b"x = 12345678")
     assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
     assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
@@ -68,7 +68,7 @@ def test_numbers(around: str, number: str) -> None:
 @example("x = {}", "abcdefab")
 @example("x = 1{}", "00000000")
 def test_ids(around: str, name: str) -> None:
-    """The same for ids: this one in a place, or any other."""
+    """If the normalized source compiles, so does the source with any id in its place."""
     text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, [name]).encode()):
         compile(text, "x", "exec")

@@ -68,12 +68,12 @@ def test_hunks_are_joined_when_close() -> None:
 
 
 def test_names_with_spaces() -> None:
-    """A file name with a space ends in a tab, as patch wants it."""
+    """A file name with a space ends in a tab, as patch requires."""
     assert "+++ b/a file.py\t\n" in patches.new_file("a file.py", "x = 1\n")
 
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_a_new_file(end: str, told: str) -> None:
-    """Every line is an added one, an empty one too; a missing line end is told."""
+    """Every line is an added one, even an empty one; a missing line end is marked."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
     assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

@@ -1,4 +1,4 @@
-"""Places: LibCST and `ast` tell the same ones, and a statement of which they do not is no anchor."""
+"""LibCST and `ast` agree on places; a statement on which they disagree is no anchor."""
 
 import ast
 from pathlib import Path
@@ -30,7 +30,7 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 
 def test_both_parsers_tell_the_same_places() -> None:
-    """Statements of every kind and functions have one place, whatever is before them on their lines."""
+    """Statements of every kind and functions have one place, whatever precedes them on their lines."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -45,7 +45,7 @@ def test_both_parsers_tell_the_same_places() -> None:
 
 @pytest.mark.parametrize("kind", [AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_RETURN, AnchorKind.ENTRY])
 def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where `ast` sees the anchored statement a line further down, it is refused with its line."""
+    """If `ast` sees the anchored statement a line further down, it is refused with its line."""
     later = places_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.places_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
@@ -57,7 +57,7 @@ def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.Mon
 
 
 def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Were the file's bytes not compared, the statement would still be refused."""
+    """Even without comparing the file's bytes, the statement is refused."""
 
     def unchecked(data: bytes, where: Path) -> object:
         module = cst.parse_module(data)
@@ -82,7 +82,9 @@ def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_where_a_line_of_statements_ends(line: str, after: int) -> None:
-    """Lines that backslashes add after the last statement belong to it; one in a comment adds none."""
+    """Lines that backslashes add after the last statement belong to it; a backslash in a comment
+    adds none.
+    """
     module = cst.parse_module(line + "\n")
     positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     first = module.body[0]

@@ -33,7 +33,7 @@ def probe(
 
 
 def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
-    """Observe one step a character, the lead slower than the host where it is `x`; what was active."""
+    """Observe one step per character, the lead slower than the host at an `x`; return what was active."""
     seen = ""
     for i, mark in enumerate(lead_speeds):
         fi.observe(t=start + i * 0.1, d_rel=40.0, v_ego=20.0, v_lead=15.0 if mark == "x" else 20.0)
@@ -53,13 +53,15 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
     ],
 )
 def test_hold_and_arming(clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str) -> None:
-    """A fault is active while, for a time after, or ever since its condition held, once armed."""
+    """Once armed, a fault is active while its condition holds, for a time after it, or for ever."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 
 
 def test_report(clone: Workspace) -> None:
-    """The report tells the trigger's activity and each injection's executions, those that never ran too."""
+    """The report has the trigger's activity and each injection's executions, including injections that never
+    ran.
+    """
     fi = probe(clone)
     drive(fi, "..xx.x")
     assert fi.report() == {
@@ -73,14 +75,14 @@ def test_report(clone: Workspace) -> None:
 
 
 def test_nothing_before_the_first_observation(clone: Workspace) -> None:
-    """Injected statements that run before ground truth is known stay inactive."""
+    """Injected statements that run before any ground truth stay inactive."""
     fi = probe(clone, condition="True")
     assert not fi.active("a")
     assert fi.report()["triggered"] is None
 
 
 def test_a_new_run_starts_afresh(clone: Workspace) -> None:
-    """When time starts again where the run before began, or earlier, nothing is left of that run."""
+    """When time restarts at or before the previous run's start, the probe forgets that run."""
     fi = probe(clone, hold="to_end")
     assert drive(fi, ".x.", start=0.9) == ".xx"
     assert drive(fi, "..x", start=0.9) == "..x"
@@ -100,8 +102,10 @@ def test_a_new_run_starts_afresh(clone: Workspace) -> None:
     ],
 )
 def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...], said: str) -> None:
-    """An observation at the time of the one before, or between those of a run, is an error. The probe tells
-    of it again when it is to report, lest a target that caught it passes for one that ran well."""
+    """An observation at the same time as the one before, or between those of a run, is an error.
+
+    The probe repeats it in its report, in case the target caught it.
+    """
     fi = probe(clone)
     *before, last = times
     for t in before:
@@ -113,7 +117,7 @@ def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...]
 
 
 def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
-    """Ground truth that is no number is an error of the probe, also when it reports."""
+    """Ground truth that is not a number is a probe error, also in the report."""
     fi = probe(clone)
     with pytest.raises(TypeError, match="NoneType"):
         fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
@@ -122,7 +126,7 @@ def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
 
 
 def test_step_limit(clone: Workspace) -> None:
-    """A run is stopped in the step after its limit; a new run has the whole limit again."""
+    """A run stops in the step after its limit; a new run has the whole limit again."""
     fi = probe(clone)
     fi.limit(3)
     drive(fi, "...")
@@ -132,7 +136,7 @@ def test_step_limit(clone: Workspace) -> None:
 
 
 def test_values_have_any_name(clone: Workspace) -> None:
-    """What the probe calls its own variables is no matter to what is observed."""
+    """Observed values may have the names of the probe's own variables."""
     names = ("run", "values", "error", "active", "float", "map")
     read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
     observed = replace(clone.manifest("openpilot").observation, values=read, derived=())
@@ -151,7 +155,7 @@ def test_derived_variables(clone: Workspace) -> None:
 
 
 def test_probe_and_planner_agree(clone: Workspace) -> None:
-    """The probe decides as `trigger.evaluate` does, on observations with all kinds of corners."""
+    """The probe decides like `trigger.evaluate`, on observations with edge cases of every kind."""
     stream = random.Random(1)
     conditions = ["hwt <= 2 and rs > 0", "d_rel / rs < 3 or not t > 1", "1 <= v_ego / v_lead < abs(rs) * 2"]
     for condition in conditions:
@@ -177,7 +181,7 @@ def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
 
 
 def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> None:
-    """What is remembered, and the time, start anew when the fault becomes active again."""
+    """Remembered values and the time restart when the fault becomes active again."""
     fi = probe(clone)
     seen = []
     for i, mark in enumerate(".xxx.xx"):
@@ -188,7 +192,7 @@ def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> N
 
 
 def test_delay(clone: Workspace) -> None:
-    """The first value is held until a value is old enough; from then on the delay is kept."""
+    """The first value is held until a value is old enough; then the delay stays constant."""
     fi = probe(clone, condition="t >= 0.2")
     seen = []
     for i in range(8):
@@ -199,7 +203,7 @@ def test_delay(clone: Workspace) -> None:
 
 
 def test_kept_for_a_whole_run(clone: Workspace) -> None:
-    """What an injection keeps outlives its stretches of activity, is its own, and ends with the run."""
+    """An injection's stored values outlive its stretches of activity, are separate, and end with the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -212,7 +216,7 @@ def test_kept_for_a_whole_run(clone: Workspace) -> None:
 
 
 def test_noise_repeats_with_every_run(clone: Workspace) -> None:
-    """Noise depends on its seed alone, differs between seeds, and leaves the shared generator alone."""
+    """Noise depends only on its seed, differs between seeds, and leaves the shared generator unchanged."""
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
@@ -254,8 +258,9 @@ FLIPS = [
 
 @pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
 def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
-    """Flipping a bit changes a number, or each of an array, as its representation says, keeps its type, and
-    leaves the one that there was alone; flipping it again restores it."""
+    """Flipping a bit changes a number, or each of an array, in its representation; it keeps the type and the
+    original value, and a second flip restores it.
+    """
     fi, before = probe(clone), copy.deepcopy(value)
     flipped = fi.flip_bit(value, bit)
     assert np.array_equal(flipped, result)
@@ -277,7 +282,7 @@ def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
     ],
 )
 def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None:
-    """A bit beyond those of a type is an error that names the type, as is any of what is no such number."""
+    """A bit outside the type is an error that names the type, as is a bit of a value without such a type."""
     with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
         probe(clone).flip_bit(value, bit)
 
@@ -302,7 +307,9 @@ def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None
     ],
 )
 def test_a_number_like_the_value(clone: Workspace, value: Any, number: float, kind: type) -> None:
-    """A whole number is an integer beside an integer, also of numpy, or an array of them; nothing else is."""
+    """A whole number becomes an integer next to an integer, of numpy, too, or next to an array of them;
+    otherwise not.
+    """
     found = probe(clone).like(value, number)
     assert type(found) is kind
     assert found == number or math.isnan(number)

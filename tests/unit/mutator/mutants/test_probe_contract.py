@@ -1,4 +1,4 @@
-"""The probe's contract: what it writes it finds again, and it reads what a probe reports."""
+"""The probe's contract: it recognizes what it writes, and reads a probe's report."""
 
 import json
 import math
@@ -22,7 +22,7 @@ MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 
 def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
-    """The text of a probe that is rendered as a mutant's is."""
+    """The text of a probe, rendered like a mutant's."""
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     values = contract.template_values(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
     return render(models.probe, values, models.folder / "_fi.py.j2")
@@ -36,13 +36,13 @@ def module(clone: Workspace) -> Any:
 
 
 def see(fi: Any, *, near: bool) -> None:
-    """Observe a step, and ask whether the first injection is active."""
+    """Observe a step and return whether the first injection is active."""
     fi.observe(t=1.0 if near else 0.5, d_rel=20.0 if near else 200.0, v_ego=20.0, v_lead=15.0)
     assert fi.active(IDS[0]) is near
 
 
 def test_the_decision_is_the_probes(clone: Workspace) -> None:
-    """Asked directly, a probe is first active when `observe` says so."""
+    """A probe asked directly is first active when `observe` says so."""
     code = compile(source(clone), "_fi", "exec")
     armed_t, holds = contract.decision(code)
     module: dict[str, Any] = {}
@@ -56,7 +56,7 @@ def test_the_decision_is_the_probes(clone: Workspace) -> None:
 
 
 def test_settings_are_all_that_differs(clone: Workspace) -> None:
-    """Probes of two triggers are equal but for their settings, and these are found by their names."""
+    """Probes of two triggers differ only in their settings, which are found by name."""
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):
@@ -78,14 +78,14 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
 
 
 def test_a_hold_time_is_needed(clone: Workspace) -> None:
-    """A trigger that holds for a time must say how long."""
+    """A trigger that holds for a time needs that time."""
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="holds for a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
 
 
 def test_a_condition_asks_for_what_the_target_observes(clone: Workspace) -> None:
-    """Any other name is refused, and those that are known are listed."""
+    """Any other name is refused with the known ones."""
     observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
     with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
         contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
@@ -99,7 +99,7 @@ RAN = {"first": 0.5, "last": 2.0, "count": 3}
     "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
 )
 def test_no_activation(report: dict[str, Any]) -> None:
-    """Reports without an executed injection have no activation."""
+    """A report without an executed injection has no activation."""
     assert contract.activation_of(report) is None
 
 
@@ -124,7 +124,7 @@ SOUND = {
 
 
 def test_sound_reports(clone: Workspace) -> None:
-    """Nothing is wrong with what a probe reports, be it of a fault that was active or of one that was not."""
+    """Valid reports of active and inactive faults have no findings."""
     assert contract.report_problem(SOUND, "m", ("a", "b")) == ""
     fi = module(clone)
     for near in (False, True):
@@ -162,6 +162,6 @@ def test_sound_reports(clone: Workspace) -> None:
     ],
 )
 def test_damaged_reports(change: Any, said: str) -> None:
-    """Whatever is not as a probe reports it is told: keys, types, numbers, what contradicts itself."""
+    """Wrong keys, types, numbers and contradictions in a report are found."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))

@@ -1,4 +1,4 @@
-"""Rendering: values become literals, names are checked, templates cannot reach out."""
+"""Rendering: values become literals, names are checked, and templates cannot reach outside."""
 
 import copy
 import math
@@ -59,8 +59,9 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
     ],
 )
 def test_values_are_literals(value: float, plain: str, added: str) -> None:
-    """Numbers are written exactly, non-finite ones so that Python understands them; terms that are whole
-    numbers have no point, lest they make a float of an integer."""
+    """Numbers are written exactly, non-finite ones so that Python understands them; whole-number terms have
+    no point, so that an integer stays one.
+    """
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -69,14 +70,14 @@ def test_values_are_literals(value: float, plain: str, added: str) -> None:
     "name", ["x y", "x;y", "import", "x.class", "1x", "", "_fi.active", "x\ny", 3.0, None]
 )
 def test_names_are_checked(name: Value) -> None:
-    """Only chains of identifiers get in where a variable is meant."""
+    """A variable's place accepts only chains of identifiers."""
     with pytest.raises(MutatorError):
         rendered("{{ target }} = 1\n", target=name)
 
 
 @pytest.mark.parametrize("name", ["os;x", "a.b c", "a..b", ".a", "a.import", 1, None])
 def test_imported_names_are_checked(name: Value) -> None:
-    """What is to be imported is a chain of identifiers too."""
+    """An imported name must be a chain of identifiers, too."""
     imports = ParamSchema(name="what", type="import", about="")
     made = replace(model("from {{ what }} import x\n"), params=(imports,))
     assert snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
@@ -85,7 +86,7 @@ def test_imported_names_are_checked(name: Value) -> None:
 
 
 def test_text_is_no_number() -> None:
-    """A number's place takes no text, not even a harmless name."""
+    """A number's place accepts no text, not even a harmless name."""
     with pytest.raises(MutatorError, match="'os' for 'by'; expected a number"):
         rendered("{{ target }} = {{ by }}\n", by="os")
 
@@ -120,7 +121,7 @@ def test_text_is_no_number() -> None:
     ],
 )
 def test_a_template_that_fails(template: str, pieces: list[str]) -> None:
-    """The error names the template, its line where there is one, and the reason."""
+    """The error names the template, its line if there is one, and the reason."""
     with pytest.raises(MutatorError) as caught:
         rendered(template)
     for piece in pieces:
@@ -128,7 +129,7 @@ def test_a_template_that_fails(template: str, pieces: list[str]) -> None:
 
 
 def test_a_guard_opens_a_block() -> None:
-    """The last line of a guard must be ready to take a statement beneath it."""
+    """The last line of a guard must open a block for the statement."""
     assert rendered("if not {{ target }}:\n", SnippetKind.GUARD) == ("if not x:",)
     with pytest.raises(MutatorError, match="a guard's last line must open a block"):
         rendered("x = 1\n", SnippetKind.GUARD)
@@ -146,14 +147,16 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_a_value_holds_together(template: str, text: str) -> None:
-    """Beside the `if` that asks the probe, the expression of a template is one: in brackets if it must be."""
+    """A template's expression holds together next to the `if` that asks the probe, with brackets if
+    needed.
+    """
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
 
 @pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
 def test_a_value_is_an_expression(template: str) -> None:
-    """On one line, and nothing else: a comment would end the line before its time."""
+    """A value is an expression on one line without a comment, which would end the line early."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     with pytest.raises(MutatorError, match="expected one expression on one line"):
         changed_value(made, {"by": 1.0}, "ab12", "y")
@@ -161,7 +164,7 @@ def test_a_value_is_an_expression(template: str) -> None:
 
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
 def test_a_target_is_a_name_and_nothing_else(target: Value) -> None:
-    """With a comment in it, an assignment would be none, and the fault would do nothing."""
+    """A target is a plain name: a comment in it would disable the assignment."""
     made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):
@@ -183,7 +186,7 @@ CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
     ],
 )
 def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
-    """A constant is what `repr` writes, on one line; None is not the same as none at all."""
+    """A constant is written by `repr` on one line; None differs from a missing constant."""
     template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
     assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
 
@@ -257,8 +260,7 @@ def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
 def test_values_keep_their_kind(
     clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
 ) -> None:
-    """What a fault makes of a variable is of the variable's kind: an integer stays one where the parameters
-    are whole numbers."""
+    """A fault keeps a variable's type: an integer stays one if the parameters are whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}

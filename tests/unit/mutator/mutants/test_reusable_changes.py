@@ -50,7 +50,7 @@ def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange
 @pytest.mark.parametrize("guard", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
-    """The reusable change of one mutant, filled with the lines of another of its kind, equals the other's."""
+    """The reusable change of one mutant, filled with another's lines of the same kind, equals the other's."""
     code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
     reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
@@ -61,7 +61,7 @@ def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
-    """So too where a value changes in the line that lines are inserted after, the last one included."""
+    """The same holds if a value changes in the line before inserted lines, including the last line."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
     def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
@@ -84,12 +84,12 @@ def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
 
 
 def test_a_change_that_compiles_only_with_some_values() -> None:
-    """A change that compiles with these values, but not with all, is not said to compile always."""
+    """A change that compiles with some values only is not marked as always compiling."""
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
 
 
 def fault(value: Value, **location: object) -> Fault:
-    """`gap = value` in the toy's sensor, or somewhere."""
+    """`gap = value` in the toy's sensor, or at another place."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     place = FaultLocation(**{"path": SENSOR, "function": "Sensor.measure", "anchor": anchor, **location})
     injection = Injection(location=place, model="stuck", params=(("target", "gap"), ("value", value)))
@@ -106,7 +106,7 @@ def fault(value: Value, **location: object) -> Fault:
 
 
 def test_a_change_is_spliced_once(toy: Workspace) -> None:
-    """Another number reuses the change; a sign, another type or a value that is not finite does not."""
+    """Another number reuses the change; a sign, another type or a non-finite value does not."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
     known = known_changes(manifest.tree, SENSOR)
     counts = []
@@ -119,7 +119,7 @@ def test_a_change_is_spliced_once(toy: Workspace) -> None:
 
 
 def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
-    """A mutant that cannot be built gets the same error, even if one of its kind was built before."""
+    """A mutant that cannot be built gets the same error, even after one of its kind was built."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
         "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"

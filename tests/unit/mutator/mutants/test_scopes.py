@@ -1,4 +1,4 @@
-"""Scopes: which names a function knows, and which ones inserted lines turn into others."""
+"""Scopes: the names that a function knows, and those that inserted lines would change."""
 
 import pytest
 
@@ -18,7 +18,9 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 
 
 def test_names_of_functions() -> None:
-    """A function knows its variables and what it uses from outside; not what only inner ones use."""
+    """A function knows its variables and the outer names it uses, but not those that only inner functions
+    use.
+    """
     names = function_names(SOURCE.encode())
     go = names[4, "go"]
     assert {"self", "x", "__own", "limit", "inner", "max"} <= go
@@ -71,8 +73,9 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
     ],
 )  # fmt: skip
 def test_names_that_move(source: str, inserted: str, moved: tuple[str, str, str, str] | None) -> None:
-    """Whatever binds a name makes it local to its function, and takes it from inner ones; unless it was
-    local, or declared. A name of an attribute, an argument or a comprehension is another one."""
+    """Any binding makes a name local to its function and hides it from inner ones, unless it was local or
+    declared. Names of attributes, arguments and comprehensions are separate.
+    """
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

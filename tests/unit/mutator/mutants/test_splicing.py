@@ -1,4 +1,4 @@
-"""The splicer on the shapes of source that real trees have."""
+"""The splicer on the source shapes of real trees."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def edit(
 
 
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
-    """The mutated bytes; they must compile and un-splicing."""
+    """The mutated bytes; they must compile and un-splice."""
     file = parsed(text)
     result = splicing.joined(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
@@ -78,7 +78,7 @@ def test_after_and_before() -> None:
     ],
 )
 def test_shapes_of_source(text: str | bytes) -> None:
-    """After the assignment the new lines stand, nothing else changed, and it un-splices."""
+    """The new lines follow the assignment, nothing else changes, and it un-splices."""
     result = spliced(text, AnchorKind.AFTER_ASSIGN)
     data = text if isinstance(text, bytes) else text.encode()
     added = [line for line in result.splitlines() if b"fi:ab12" in line]
@@ -99,7 +99,7 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
 
 
 def test_a_guard_leaves_strings_alone() -> None:
-    """Where a string spans lines only the first line moves, or the string would change."""
+    """If a string spans lines, only the first line moves; otherwise the string would change."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -119,7 +119,7 @@ def test_a_guard_leaves_strings_alone() -> None:
     ],
 )
 def test_guards_in_all_shapes(text: str) -> None:
-    """Tabs, mixed indentation, CRLF and missing newlines come back exactly."""
+    """Tabs, mixed indentation, CRLF and missing newlines are restored exactly."""
     assert b"guard:" in spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True)
 
 
@@ -133,14 +133,16 @@ def test_guards_in_all_shapes(text: str) -> None:
     ],
 )
 def test_a_guard_needs_its_statement_alone(text: str, kind: AnchorKind) -> None:
-    """A statement that shares its line, or is no statement, cannot be wrapped."""
+    """A statement that shares its line, or anything that is no statement, cannot be wrapped."""
     file = parsed(text)
     with pytest.raises(MutatorError, match="a guard needs a statement to wrap"):
         edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
 
 
 def test_edits_at_one_boundary() -> None:
-    """What follows a statement comes before what precedes the next; a guard stays at its statement."""
+    """Lines after a statement come before lines that precede the next one; a guard stays with its
+    statement.
+    """
     file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
     edits = [
         edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),
@@ -165,7 +167,7 @@ def test_two_guards_around_one_statement() -> None:
 
 
 def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
-    """The last line of the result has no newline either, whichever edit it comes from."""
+    """The result has no final newline either, whichever edit its last line comes from."""
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
     result = splicing.joined(splicing.apply_edits(file, edits))
@@ -174,7 +176,7 @@ def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
 
 
 def test_names_that_the_encoding_lacks() -> None:
-    """A snippet that cannot be written in the file's encoding is refused."""
+    """A snippet that the file's encoding cannot represent is refused."""
     file = parsed("# coding: ascii\ndef f(x):\n    x = 1\n")
     site = file.resolve(
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
@@ -193,7 +195,7 @@ def test_the_probe_is_imported() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """Nothing goes before the mark: below a docstring the import is fine, otherwise it is refused."""
+    """Nothing goes before the mark: an import below a docstring is fine, otherwise it is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")

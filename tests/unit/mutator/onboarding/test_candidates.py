@@ -1,4 +1,4 @@
-"""Which functions of a tree are guessed to be the step of a loop, and which values to be worth a fault."""
+"""Guesses of which functions of a tree are the step of a loop, and which values are worth a fault."""
 
 import ast
 
@@ -55,28 +55,29 @@ def run(controller, world):
 
 
 def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
-    """What is guessed of these modules, by name."""
+    """The guesses for these modules, by name."""
     modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
     return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
 
 
 def test_the_controllers_step_comes_first() -> None:
-    """A step-like method of a class with state, called in a loop, is likelier than the world or a helper."""
+    """A step-like method of a class with state, called in a loop, ranks before the world or a helper."""
     first, *others = candidates(car=CAR)
     assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
     assert {one.name for one in others} == {"World.advance", "clip", "run"}
 
 
 def test_what_it_needs() -> None:
-    """Arguments without a default are needed, keyword ones too: those of the step, and of the constructor."""
+    """Arguments without a default are needed, including keyword ones, of the step and of the constructor."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")
 
 
 def test_values_are_numbers_that_have_a_name() -> None:
-    """Texts, items and unpacked tuples are no values; arithmetic on a name given once comes
-    first, and one given several times is told apart."""
+    """Texts, items and unpacked tuples are no values; arithmetic on a name assigned once comes first, and one
+    assigned several times is distinguished.
+    """
     first, *_ = candidates(car=CAR)
     assert [(value.name, value.line, value.nth) for value in first.values] == [
         ("error", 16, None),
@@ -88,7 +89,7 @@ def test_values_are_numbers_that_have_a_name() -> None:
 
 
 def test_values_of_inner_functions_are_not_the_steps() -> None:
-    """What a function inside assigns is no variable of the step, and loops and branches are."""
+    """Variables of inner functions are not the step's; those in loops and branches are."""
     (step,) = candidates(
         a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
         "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"
@@ -97,7 +98,7 @@ def test_values_of_inner_functions_are_not_the_steps() -> None:
 
 
 def test_a_file_named_for_a_controller_counts() -> None:
-    """Of two equal functions, the one in a file named for a controller comes first."""
+    """Of two equal functions, the one in a file named after a controller comes first."""
     source = "def step(x):\n    y = x + 1\n    return y\n"
     assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
 
@@ -113,6 +114,7 @@ def test_a_file_named_for_a_controller_counts() -> None:
     ],
 )
 def test_nothing_to_step(source: str) -> None:
-    """Modules without functions that do something have no candidate; a coroutine is none, as calling it
-    drives nothing."""
+    """Modules without active functions have no candidate; a coroutine is none, since calling it
+    runs nothing.
+    """
     assert candidates(a=source) == ()

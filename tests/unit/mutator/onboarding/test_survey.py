@@ -1,4 +1,4 @@
-"""What a look at a source tree finds, which is read and never imported."""
+"""What a survey of a source tree finds; it reads the tree and never imports it."""
 
 import os
 import sys
@@ -15,7 +15,7 @@ Tree = Callable[..., Path]
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Tree:
-    """Writes files, path to text, below a folder."""
+    """Write files, path to text, below a folder."""
 
     def write(**files: str) -> Path:
         for name, text in files.items():
@@ -29,7 +29,9 @@ def tree(tmp_path: Path) -> Tree:
 
 
 def test_packages_and_flat_modules(tree: Tree) -> None:
-    """Packages and flat modules are told apart; tests, setup scripts and folders without Python are none."""
+    """Packages and flat modules are distinguished; tests, setup scripts and folders without Python are
+    neither.
+    """
     folder = tree(
         pkg__a_py="",
         loose_py="",
@@ -46,7 +48,7 @@ def test_packages_and_flat_modules(tree: Tree) -> None:
 
 
 def test_a_package_itself(tree: Tree) -> None:
-    """The folder of a package means the package, in the folder above it."""
+    """The folder of a package means the package, with the folder above it as root."""
     folder = tree(pkg__a_py="x = 1\n")
     (folder / "pkg" / "__init__.py").touch()
     found = look_at(str(folder / "pkg"))
@@ -55,19 +57,19 @@ def test_a_package_itself(tree: Tree) -> None:
 
 
 def test_a_src_layout(tree: Tree) -> None:
-    """A project that keeps its package in src/ has its root there."""
+    """A project with its package in src/ has its root there."""
     folder = tree(src__pkg__a_py="", setup_py="")
     found = look_at(str(folder))
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
 
 
 def test_an_empty_folder(tree: Tree) -> None:
-    """Where there is nothing, nothing is found."""
+    """An empty folder has no modules."""
     assert look_at(str(tree())).packages == ()
 
 
 def test_what_cannot_be_read_is_told(tree: Tree) -> None:
-    """A file with a syntax error, or that is no text, is left out, with place and reason."""
+    """A file with a syntax error, or without text, is left out, with place and reason."""
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = look_at(str(folder))
@@ -77,14 +79,14 @@ def test_what_cannot_be_read_is_told(tree: Tree) -> None:
 
 
 def test_nothing_is_imported(tree: Tree) -> None:
-    """A tree that does harm when it is imported does none."""
+    """A tree with harmful imports does no harm."""
     tree(harm_py="raise SystemExit('imported')\n")
     assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules
 
 
 def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
-    """Files whose names are no names of modules, pipes and dangling links are left out."""
+    """Files with names that are no module names, pipes and dangling links are left out."""
     folder = tree(pkg__a_py="")
     for name in ("b-c.py", "class.py"):
         (folder / "pkg" / name).touch()
@@ -96,13 +98,13 @@ def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
 
 
 def test_its_warnings_are_its_own(tree: Tree, recwarn: pytest.WarningsRecorder) -> None:
-    """Python's remarks on the controller's style are not told."""
+    """Python's warnings about the controller's style are not shown."""
     look_at(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
     assert not recwarn.list
 
 
 def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
-    """A virtual environment below a package, under whatever name, and hidden folders are left out."""
+    """Virtual environments of any name below a package, and hidden folders, are left out."""
     folder = tree(pkg__a_py="", pkg__own__lib_py="")
     (folder / "pkg" / "own" / "pyvenv.cfg").touch()
     (folder / "pkg" / ".hidden").mkdir()
@@ -111,7 +113,7 @@ def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
 
 
 def test_an_installed_package() -> None:
-    """`installed:NAME` is found without an import, with the requirement that it fulfils."""
+    """`installed:NAME` is found without an import, with its requirement."""
     found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
@@ -128,7 +130,7 @@ def test_an_installed_package() -> None:
     ],
 )
 def test_what_is_not_there_is_told(target: str, words: str) -> None:
-    """A missing folder or package, or one without Python source, is the user's mistake, with a remedy."""
+    """A missing folder or package, or one without Python source, is a user's error with a remedy."""
     with pytest.raises(MutatorError, match=words) as told:
         look_at(target)
     assert told.value.remedy

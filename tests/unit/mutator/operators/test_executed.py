@@ -1,4 +1,4 @@
-"""Executed lines: what a golden run tells, and that it is golden all the same."""
+"""Executed lines: what a golden run reports, while it stays golden."""
 
 from pathlib import Path
 
@@ -21,8 +21,9 @@ def _number(path: Path, text: str) -> int:
 
 
 def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
-    """Lines of each step are noted, those of constructors and of what never happens are not; and the run is
-    the golden run, to the byte."""
+    """Lines of each step are recorded, but not those of constructors or unexecuted ones; the run equals the
+    golden run byte for byte.
+    """
     manifest = toycar.manifest("toycar")
     base = prepare_base(manifest, tmp_path / "base")
     engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)
@@ -43,8 +44,9 @@ def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_pa
 
 
 def test_lines_are_measured_once(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A second time the lines come from the cache; a damaged entry is measured again, and a run that fails is
-    an error."""
+    """The second time, the lines come from the cache; a damaged entry is measured again, and a failed run is
+    an error.
+    """
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
     drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)

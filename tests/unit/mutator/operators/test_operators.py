@@ -1,4 +1,4 @@
-"""Mutation operators: what each makes of small sources, what is left out, and what is drawn."""
+"""Mutation operators: their mutations of small sources, the exclusions, and the sample."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -68,7 +68,7 @@ CHANGES = {
         "a(b)": ["a(b) -> left out"],
         "c = b": [],  # its first value: without it the name would not exist
         "if a: b = c": [],
-        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # a name of its own
+        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # its own name
     },
     "return": {
         "return a": ["a -> None", "a -> 0", "a -> -a"],
@@ -92,8 +92,9 @@ CHANGES = {
 
 @pytest.fixture
 def make(tmp_path: Path, clone: Workspace) -> Make:
-    """The mutations that all operators, or these, make of a function `f` with this source as its body, those
-    with equal code among them dropped."""
+    """The mutations by all operators, or by these, of a function `f` with this source as its body, without
+    duplicates of equal code.
+    """
     models = clone.fault_models()
 
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
@@ -107,19 +108,18 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
 
 @pytest.mark.parametrize("operator", CHANGES)
 def test_changes_of_operator(operator: str, make: Make) -> None:
-    """Each operator makes its documented set of changes, and no other."""
+    """Each operator makes exactly its documented set of changes."""
     for body, expected in CHANGES[operator].items():
         assert [one.text for one in make(body, operator)] == expected, body
 
 
 def test_yield_is_not_calculated_again(make: Make) -> None:
-    """An expression with a `yield` keeps its value: a second one would suspend the function twice."""
+    """An expression with a `yield` keeps its value, since a second one would suspend the function twice."""
     assert not make("return (yield a) + b", "arithmetic", "return")
 
 
 def test_equal_code_is_dropped(make: Make) -> None:
-    """A mutant that compiles to the same code as the original is dropped, and so is one that compiles to the
-    same code as an earlier mutant."""
+    """A mutant that compiles to the code of the original, or of an earlier mutant, is dropped."""
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
     assert [(one.operator.value, one.now) for one in denied] == [
@@ -129,7 +129,7 @@ def test_equal_code_is_dropped(make: Make) -> None:
 
 
 def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
-    """A property and its setter share a name: the first value of a local name is left out in neither."""
+    """A property and its setter share a name: the first value of a local name is kept in both."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
         f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",
@@ -149,13 +149,13 @@ def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
 
 
 def test_long_change_shows_what_differs(make: Make) -> None:
-    """The text of a change in a long expression has what differs, and is short."""
+    """The text of a change in a long expression is short and shows the difference."""
     [long] = make(f"{'a' * 80}(b, limit=a)", "argument")
     assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 
 
 def test_places_and_executed_lines(toycar: Workspace) -> None:
-    """Places name files and functions, by globs or not; lines that are not executed are left out, counted."""
+    """Places name files and functions, optionally with globs; unexecuted lines are left out and counted."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
@@ -179,8 +179,9 @@ def test_places_and_executed_lines(toycar: Workspace) -> None:
 
 
 def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
-    """A sample takes of each operator in each function its share, give or take one, and a seed gives the same
-    faults each time."""
+    """A sample has each operator's share in each function, give or take one, and a seed always gives the same
+    faults.
+    """
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
@@ -192,7 +193,7 @@ def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
 
 
 def test_mutants_of_operators_build(toycar: Workspace) -> None:
-    """Every mutant of the toy builds, with the bytes that building it directly gives; ids are different."""
+    """Every mutant of the toy builds, with the same bytes as a direct build; ids are different."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]

@@ -1,4 +1,4 @@
-"""What the fault-free runs of a run folder do by themselves."""
+"""What the fault-free runs of a run folder do on their own."""
 
 import json
 from pathlib import Path
@@ -43,7 +43,7 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
 
 
 def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
-    """First times of what counts, and how far a channel goes; what was not recorded is left out."""
+    """First times of counted events, and the range of a channel; unrecorded values are left out."""
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
     runs = fault_free_runs(
         folder(
@@ -61,7 +61,7 @@ def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
 
 
 def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
-    """Whatever was changed in a scenario; nothing is said of runs without alerts."""
+    """The sentence names each alert and scenario once, whatever the changes; without alerts it is empty."""
     fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
     late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
     runs = fault_free_runs(
@@ -72,7 +72,7 @@ def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
 
 
 def test_a_golden_run_that_is_gone_is_an_error(tmp_path: Path) -> None:
-    """With its place."""
+    """A missing golden run is an error with its path."""
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
     (made.golden("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):

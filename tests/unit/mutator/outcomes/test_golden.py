@@ -1,4 +1,4 @@
-"""Comparison with golden, and reading what a target wrote."""
+"""Comparison with golden, and reading a target's output."""
 
 import errno
 import json
@@ -51,7 +51,7 @@ def test_equal_traces_do_not_differ() -> None:
 
 
 def test_differences_up_to_the_end_of_the_drive() -> None:
-    """What comes after the end is in the largest difference of the run, and not in that of the drive."""
+    """Steps after the end count in the run's largest difference, and not in the drive's."""
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
     found = compare(golden, faulty, [GAS], "t", t_end=0.2)
     assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
@@ -59,7 +59,7 @@ def test_differences_up_to_the_end_of_the_drive() -> None:
 
 
 def test_steps_at_other_times_alone_are_no_difference() -> None:
-    """A channel that keeps its own times is compared on these; a run that ends earlier still differs."""
+    """A channel with its own times is compared on these; a run that ends earlier still differs."""
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
@@ -71,7 +71,7 @@ def test_steps_at_other_times_alone_are_no_difference() -> None:
 
 @pytest.mark.parametrize("times", [T, T + 0.01, T[:3]], ids=["equal", "others", "shorter"])
 def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
-    """A comparison finds the same whether or not the times that are equal are the same array."""
+    """A comparison is the same whether or not equal times are the same array."""
     golden = trace(gas=[1, 2, 3, 4, 5])
     faulty = {"t": times.copy(), "gas": np.array([1, 2, 3.5, 4, np.nan])[: len(times)]}
     shared = sharing_times(golden, faulty, "t")
@@ -80,7 +80,9 @@ def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
 
 
 def test_first_and_largest_difference() -> None:
-    """The time of the first difference in any channel, the largest difference of each."""
+    """The comparison has the time of the first difference in any channel, and the largest
+    difference of each.
+    """
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
     difference = compare(golden, faulty, [GAS, BRAKE], "t")
@@ -96,7 +98,7 @@ def test_exact_by_default(step: float, first: float) -> None:
 
 
 def test_tolerance() -> None:
-    """A difference within the channel's tolerance is none, but its size is kept."""
+    """A difference within the channel's tolerance does not count, but its size is kept."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -105,7 +107,7 @@ def test_tolerance() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_no_number_against_a_number_is_infinitely_different(value: float) -> None:
-    """NaN or infinity where golden has a number differs without bound, whatever the tolerance."""
+    """NaN or infinity against golden's number is an infinite difference, whatever the tolerance."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
@@ -114,13 +116,13 @@ def test_no_number_against_a_number_is_infinitely_different(value: float) -> Non
 
 @pytest.mark.parametrize(("golden", "faulty"), [(3, 5), (5, 3)])
 def test_other_length_differs_where_one_ends(golden: int, faulty: int) -> None:
-    """A run that ends early, or late, differs from the first step that only one of them has."""
+    """A run with another length differs from the first step that only one of them has."""
     difference = compare(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
     assert difference.t_first == T[3]
 
 
 def test_flags_and_integers_compare_too() -> None:
-    """Channels of whole numbers or flags are compared as numbers."""
+    """Channels of integers or flags are compared as numbers."""
     golden = {"t": T[:2], "gas": np.array([True, False])}
     faulty = {"t": T[:2], "gas": np.array([True, True])}
     assert compare(golden, faulty, [GAS], "t").t_first == T[1]
@@ -133,7 +135,7 @@ def test_key_of_a_golden_run() -> None:
 
 
 def test_trace_is_read(tmp_path: Path) -> None:
-    """The asked channels and time come back as written."""
+    """The requested channels and time are read back as written."""
     np.savez(tmp_path / "trace.npz", t=T, gas=T * 2, other=T)
     found = load_trace(MANIFEST, tmp_path, [GAS])
     assert set(found) == {"t", "gas"}
@@ -163,7 +165,7 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
 
 
 def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
-    """An array alone, a member whose head is no Python, and a pipe are BadOutput."""
+    """An array alone, a member with an invalid header, and a pipe are BadOutput."""
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)
@@ -182,7 +184,7 @@ def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
 
 
 def test_record_is_read(tmp_path: Path) -> None:
-    """What a target says of itself is read; every raise of an alert that counts is found in it."""
+    """A target's record is read with every raise of a counted alert."""
     said = {
         "hazards": {"H1": None, "H2": 3.5},
         "alerts": [{"name": "fcw", "t": 1.0}],
@@ -206,14 +208,14 @@ def test_record_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
-    """A record that does not say when which hazards and alerts came is BadOutput."""
+    """A record without the times of hazards and alerts is BadOutput."""
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)
 
 
 def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trace that cannot be opened for want of open files says nothing of the run that wrote it."""
+    """A trace that cannot be opened for lack of file handles is not blamed on its run."""
 
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
@@ -224,7 +226,7 @@ def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_trace_that_is_a_pipe(tmp_path: Path) -> None:
-    """A run that leaves a pipe in the place of its outputs left none; nobody waits for what it may say."""
+    """A pipe in place of an output counts as missing, without waiting."""
     for name in (MANIFEST.trace_file, MANIFEST.record_file):
         os.mkfifo(tmp_path / name)
     for read in (load_trace, load_record, trace_digest):

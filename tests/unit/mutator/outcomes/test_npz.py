@@ -1,4 +1,4 @@
-"""Arrays of stored .npz files: those that numpy reads, or none."""
+"""Arrays of stored .npz files: as numpy reads them, or none."""
 
 import io
 import zipfile
@@ -24,7 +24,7 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
 
 
 def test_the_arrays_are_those_that_numpy_reads() -> None:
-    """Names, order, types, shapes and values are numpy's."""
+    """Names, order, types, shapes and values equal numpy's."""
     found = npz.members(written(**ARRAYS))
     assert found is not None
     assert list(found) == list(ARRAYS)
@@ -45,12 +45,12 @@ def test_the_arrays_are_those_that_numpy_reads() -> None:
     ],
 )
 def test_what_is_not_as_usual_is_left_to_numpy(data: bytes) -> None:
-    """Compressed members, other orders and types, and what is no such file have no arrays here."""
+    """For compressed members, other orders and types, and other files, the fast reader returns nothing."""
     assert npz.members(data) is None
 
 
 def headed(header: bytes) -> bytes:
-    """A file of one array with these words in place of those about its three numbers."""
+    """A file of one array with this text in its header."""
     data = written(t=np.arange(3.0))
     there = data[data.index(b"{'descr'") : data.index(b"\n", data.index(b"{'descr'"))]
     with zipfile.ZipFile(io.BytesIO(data)) as file:
@@ -65,8 +65,7 @@ def headed(header: bytes) -> bytes:
     "shape", ["(3,)", "(-1,)", "(3, -1)", "(2,)", "(4,)", "(0,)", "(True,)", "(3,", "(%s,)" % ("9" * 30)]
 )
 def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
-    """A file whose check sums are right may have been written by a mutant: where there are arrays, numpy
-    reads the same ones."""
+    """A mutant may write a file with valid checksums: if there are arrays, numpy reads the same ones."""
     data = headed(b"{'descr': '<f8', 'fortran_order': False, 'shape': " + shape.encode() + b"}")
     found = npz.members(data)
     if shape == "(3,)":
@@ -76,7 +75,7 @@ def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
 
 
 def test_a_damaged_file_has_no_arrays() -> None:
-    """Whatever bit of a file is changed, the arrays are the ones that were written, or there are none."""
+    """After any bit flip, the arrays are the original ones, or there are none."""
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
         found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])

@@ -1,4 +1,4 @@
-"""Paths of faults, worked out by hand: a structure of two controllers, and chains without one."""
+"""Hand-computed paths of faults: a structure of two controllers, and chains without one."""
 
 from pathlib import Path as Folder
 from typing import Any
@@ -124,7 +124,7 @@ def passages(found: Path) -> dict[str, Passage]:
 
 
 def test_a_fault_that_an_estimator_held() -> None:
-    """It was injected where nothing is recorded; neither the estimator nor what follows it changed."""
+    """The fault was injected where nothing is recorded; neither the estimator nor its followers changed."""
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", State.INJECTED),
@@ -143,7 +143,7 @@ def test_a_fault_that_an_estimator_held() -> None:
 
 
 def test_a_fault_that_a_controller_held() -> None:
-    """It reached the estimator and no further: the controller after it is what stopped it."""
+    """The fault reached the estimator and no further: the controller after it stopped it."""
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
     assert passages(found)["picture"] is Passage.THROUGH
@@ -164,14 +164,15 @@ def test_a_fault_that_reached_the_car() -> None:
 
 
 def test_feedback_is_no_path() -> None:
-    """What is off the path does not appear on it, whenever it left golden: a car that moves otherwise is seen
-    otherwise."""
+    """A component off the path is not on it, whenever it left golden: a car that moves differently is
+    observed differently.
+    """
     found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
     assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
 
 
 def test_links_that_are_not_studied_are_no_path() -> None:
-    """A fault of the speed control does not come to the wheel control by a link that nobody looks at."""
+    """A fault of the speed control does not reach the wheel control by a link that the study ignores."""
     ends = {"from": "speed", "to": "wheel", "label": ""}
     links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
     for studied, names in ((True, {"wheel", "rack"}), (False, set())):
@@ -181,8 +182,9 @@ def test_links_that_are_not_studied_are_no_path() -> None:
 
 
 def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
-    """The speed control left golden after the car had, and something off the path leads to it: so it and what
-    it alone leads to have only been fed back to, while a branch that came first was reached."""
+    """The speed control left golden after the car, and something off the path leads to it: so it and what it
+    alone feeds only received feedback, while an earlier branch was reached.
+    """
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
@@ -197,8 +199,9 @@ def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
 
 
 def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
-    """The rack left golden before the car, so the fault came through the wheel control, although nothing that
-    is recorded of that changed, or only later."""
+    """The rack left golden before the car, so the fault came through the wheel control, even if nothing
+    recorded there changed, or only later.
+    """
     found = path("gauge", torque=1.0, place=1.1)
     assert states(found)["wheel"] is State.PASSED
     assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
@@ -206,8 +209,9 @@ def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
 
 
 def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
-    """The pedals get nothing but what the speed control sends: it had changed by the time they did, whenever
-    its channel shows it. What has other ways to come says nothing of its feeders."""
+    """The speed control alone feeds the pedals, so it had changed by the time they did, whenever its channel
+    shows it. A component with other inputs proves nothing about its feeders.
+    """
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
     assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
     assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
@@ -218,29 +222,31 @@ def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
 @pytest.mark.parametrize(
     ("left", "state"),
     [
-        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet seen that the car moved otherwise
+        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet seen the car's different motion
         ({"pace": 1.5}, State.FEEDBACK),
         ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault was there before
         ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
     ],
 )
 def test_what_came_first_decides_between_fault_and_feedback(left: dict[str, float], state: State) -> None:
-    """The car has moved already when the speed control leaves golden: what leads to it along the path changed
-    it, or what does so from off it, whichever left golden first."""
+    """If the car has moved before the speed control leaves golden, the input that left golden first decides:
+    one on the path means the fault, one off it means feedback.
+    """
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
     found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
 def test_a_late_departure_that_the_path_alone_explains() -> None:
-    """Nothing but the speed control leads to the pedals: they are reached, though the car moved before."""
+    """Only the speed control leads to the pedals: they are reached, though the car moved before."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
 
 def test_what_is_not_recorded_is_passed_through() -> None:
-    """A component without channels is unseen; whether the fault came to it is not known, and what follows it
-    tells whether it got further."""
+    """A component without channels is unseen; it is unknown whether the fault reached it, and its followers
+    show whether it got further.
+    """
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
@@ -258,18 +264,19 @@ def test_a_fault_before_a_fork_may_be_held_twice() -> None:
 
 @pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
 def test_no_path_without_an_active_fault_and_an_outcome(outcome: Outcome | None) -> None:
-    """There is none of what was never active, or broke down."""
+    """A fault that was never active, or a run that broke down, has no path."""
     assert WAYS.path(experiment("eyes"), record(outcome)) is None
 
 
 def test_no_path_from_nowhere() -> None:
-    """A fault in a file that no component names has no path: nobody knows where it starts."""
+    """A fault in a file that no component names has no path, because its start is unknown."""
     assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 
 def test_a_chain_without_a_structure() -> None:
-    """The components of a manifest follow each other by role and then by their order; the first that stayed
-    equal after those that were reached is where a fault was stopped."""
+    """The components of a manifest follow each other by role, then by order; the first that stayed equal
+    after the reached ones stopped the fault.
+    """
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
@@ -279,7 +286,7 @@ def test_a_chain_without_a_structure() -> None:
 
 
 def test_a_chain_knows_feedback_too() -> None:
-    """What the car interface reads changes after the car: the command was injected behind it."""
+    """The car interface reads values that change after the car: the command was injected behind it."""
     ways = Ways(
         [
             ["seen", "", "internal", "interface", ""],
@@ -311,7 +318,7 @@ def replace_links(links: dict[str, Any]) -> StructureModel:
 
 
 def test_ways_from_run_json() -> None:
-    """A head gives the ways that it was written with; none without components, as in old runs."""
+    """The head's ways are read as written; without components, as in old runs, there are none."""
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
     head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
     found = ways_of(head)

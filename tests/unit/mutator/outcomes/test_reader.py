@@ -29,13 +29,13 @@ from mutator.workspace import Workspace
 
 SOURCES = Path(mutator.__file__).parent
 WriteRun = Callable[..., Path]
-# What the toy car's words become in a target that has no gas, no brake and no H1.
+# The toy car's terms in a target without gas, brake or H1.
 OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r"\bbrake\b": "clamp"}
 
 
 @pytest.fixture
 def crane(toycar: Workspace) -> Workspace:
-    """The toy with other names for its hazards and channels, in its library and its tree."""
+    """The toy with other names of hazards and channels, in its library and its tree."""
     for path in toycar.library.parent.rglob("*"):
         if path.suffix in (".py", ".yaml") and "templates" not in path.parts:
             text = path.read_text()
@@ -46,7 +46,7 @@ def crane(toycar: Workspace) -> Workspace:
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Faults of the lane are hazardous, silence crashes the controller, the rest is masked."""
+    """Lane faults are hazardous, silence crashes the controller, the rest is masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None, "max_dev": ()}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("DROPPED", 4.0), ("CRUSHED", 4.5))}
@@ -71,8 +71,9 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 
 
 def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
-    """A thread of pyarrow that gives bytes back to Python while that ends kills the process after its work:
-    whatever reads tables starts none. Those of its allocator and of BLAS know nothing of Python."""
+    """A pyarrow thread that returns bytes to Python during its shutdown kills the process: no reader of
+    tables starts one. Threads of its allocator and of BLAS do not use Python.
+    """
     results.build(run)
     words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
     ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
@@ -80,7 +81,7 @@ def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
 
 
 def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> None:
-    """CSV, Parquet and frames have the target's hazards and channels, where the shipped ones have theirs."""
+    """CSV, Parquet and frames have the target's hazards and channels in the positions of the shipped ones."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")
@@ -104,7 +105,7 @@ def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> Non
 def test_numbers_have_the_units_of_their_metric_or_channel(
     crane: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """A metric's unit is the manifest's; a difference, up to the drive's end too, has that of its channel."""
+    """A metric's unit is the manifest's; a difference, also up to the drive's end, has its channel's unit."""
     path = crane.library / "targets" / "toycar.yaml"
     hazards = "hazards: {DROPPED: {when: speed > 90, terminal: true, unit: m/s}, "
     hazards += "CRUSHED: {when: speed > 91}, TOO_FAST: {when: speed > 92}}\n"
@@ -117,7 +118,7 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 
 
 def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
-    """Whichever way the results are read, the same experiments had the same hazards at the same times."""
+    """However the results are read, the same experiments have the same hazards at the same times."""
     table = Results.up_to_date(run)
     rows = table.rows()
     frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
@@ -132,14 +133,14 @@ def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
 
 
 def test_of_a_crash_it_is_not_known_whether_a_hazard_would_have_come(run: Path) -> None:
-    """`hazard` is unknown exactly where the run did not end well."""
+    """`hazard` is unknown exactly if the run did not end well."""
     frame = Results.up_to_date(run).frame()
     assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
     assert frame["hazard"].isna().any()
 
 
 def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None]) -> None:
-    """No hazard came where none was looked for, and its time is a number that is not there."""
+    """A target without hazard checks has no hazards, and their time is NaN."""
     head = run / "run.json"
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
@@ -154,7 +155,7 @@ def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None
 
 
 def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> None:
-    """The tables that other tools get, and the report, name the target's hazards."""
+    """Exports and the report name the target's hazards."""
     table = Results.up_to_date(run)
     assert export(run, Format.CSV).read_bytes() == table.csv()
     assert export(run, Format.PARQUET).read_bytes() == table.parquet()
@@ -169,7 +170,7 @@ def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> No
 def test_a_run_fills_the_columns_that_its_manifest_promises(
     crane: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """A row of an experiment that was really driven has a cell for each column and no other."""
+    """A row of an experiment that really ran has exactly one cell for each column."""
     only = 'fault_type == "lane" and method == "random"'
     folder = write_run(crane, tmp_path / "one", lambda e: None, campaign="small", only=only, limit=1)
     [experiment] = plan_file.read_all(folder)
@@ -184,7 +185,7 @@ def test_a_run_fills_the_columns_that_its_manifest_promises(
 
 
 def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    """A missing table is a user's error that names the folder, however it is asked for."""
+    """A missing table is a user's error that names the folder, through any reader."""
     table = Results.of_run(tmp_path)
     for read in (table.rows, table.texts, table.csv, table.frame):
         with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
@@ -202,7 +203,7 @@ def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
-    """A table with a status that there is not, or a line cut short, is no results table."""
+    """A table with an unknown status, or a line cut short, is no results table."""
     table = Results.up_to_date(run)
     whole = table.csv()
     for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
@@ -212,7 +213,7 @@ def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
 
 
 def test_nothing_else_opens_the_tables() -> None:
-    """Verification of what is read can stand in one place: no other module parses or opens the tables."""
+    """No other module parses or opens the tables, so verification stays in one place."""
     allowed = {"outcomes/reader.py", "outcomes/trace_files.py"}
     opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
     named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")

@@ -33,7 +33,7 @@ MakeRecord = Callable[..., Record]
 
 
 def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """A run that ended in a hazard: flags, times of simulation, alerts in their order, reaction time."""
+    """A run with a hazard has flags, simulation times, alerts in order, and reaction time."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -105,7 +105,9 @@ def test_severity_and_times_to_the_hazard(
     tolerant: float | None,
     after_manifest: float | None,
 ) -> None:
-    """A contact after the activation has a class; times count to the first hazard, of activation at 2 s."""
+    """A contact after the activation has a class; times to the first hazard count from the
+    activation at 2 s.
+    """
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
     cells = result_rows.row(experiment(), kept, HAZARDS, scale=SCALE)
@@ -115,7 +117,7 @@ def test_severity_and_times_to_the_hazard(
 
 
 def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has the columns that its head asks for: all, the times alone, or none in an older run."""
+    """A run has the columns that its head requests: all, only the times, or none in an older run."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [
@@ -146,7 +148,7 @@ def test_rows_of_what_did_not_end_well(
     activation: bool,
     activated: int | None,
 ) -> None:
-    """What is not known of a run that did not end well is empty, never 0."""
+    """Unknown values of a run that did not end well are empty, never 0."""
     given = {} if activation else {"activation": None}
     cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
@@ -157,7 +159,7 @@ def test_rows_of_what_did_not_end_well(
 
 
 def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """A run that ended well without activation says 0, not nothing."""
+    """A run that ended well without activation has 0, not an empty cell."""
     cells = result_rows.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
     assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
     assert cells["t_activation"] is None
@@ -165,7 +167,7 @@ def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: 
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
-    """A run with records of all its experiments but two, in two files."""
+    """A run with records of all its experiments except two, in two files."""
     plan = make_plan(toycar, "toy")
     folder = freeze(plan, tmp_path / "run", toycar)
     for i in (0, 1):
@@ -184,8 +186,9 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
-    """One row per experiment that has a record, sorted by id, in CSV and Parquet alike; the target's own
-    hazards and channels are the only ones."""
+    """There is one row for each experiment with a record, sorted by id, in CSV and Parquet; only the target's
+    own hazards and channels appear.
+    """
     rows = list(csv.DictReader(results.build(folder.path).open()))
     assert (len(rows), folder.planned) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
@@ -211,7 +214,7 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
 
 
 def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
-    """Made again, or from records in other files, the tables have the same bytes."""
+    """Rebuilt, or built from records in other files, the tables have the same bytes."""
     tables = results.build(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())
@@ -224,7 +227,7 @@ def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable
 
 
 def made_at_once(folder: RunFolder) -> dict[str, bytes]:
-    """The tables as they were made when all rows were in memory, up to version 0.2."""
+    """The tables as version 0.2 and earlier built them, with all rows in memory."""
     records = folder.records()
     planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
@@ -263,8 +266,9 @@ def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]
 def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
-    """However many experiments are read at a time, by one process or two, the files are those of the version
-    that had all rows in memory; those of a run without a record, too."""
+    """For any batch size and one or two processes, the files equal those built with all rows in memory, even
+    for a run without records.
+    """
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
@@ -284,7 +288,7 @@ def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
 
 
 def test_a_long_table_has_several_row_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A Parquet file has row groups of one size but for the last, whatever the batches; no empty one."""
+    """All row groups of a Parquet file have one size except the last, for any batches; none is empty."""
     monkeypatch.setattr(table_files, "_ROWS", 4)
     columns = (Column("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
@@ -308,7 +312,7 @@ def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
 def test_tables_stay_while_they_follow_from_what_is_there(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Times of files say nothing: as long as input and tables have their digests, nothing is built."""
+    """File times do not matter: while input and tables have their digests, nothing is built."""
     results.build(folder.path)
     os.utime(folder.path / "records" / "0001-gw0.jsonl")
     os.utime(folder.path / "results.csv", (1, 1))
@@ -323,7 +327,7 @@ def test_tables_stay_while_they_follow_from_what_is_there(
 def test_tables_are_built_when_anything_of_them_changed(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    """Other records or timings, and a table or stamp that is edited or deleted, make them be built."""
+    """Other records or timings, and an edited or deleted table or stamp, cause a rebuild."""
     results.build(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -340,7 +344,7 @@ def test_tables_are_built_when_anything_of_them_changed(
 
 @pytest.mark.parametrize("stamp", [True, False])
 def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -> None:
-    """Who edited a table learns in one line that it is not what was found, also if its stamp is gone."""
+    """One line says that an edited table was replaced, even if its stamp is gone."""
     table = results.build(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
@@ -354,8 +358,9 @@ def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -
 def test_a_table_that_a_kill_left_is_no_edited_one(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    """Killed before any of its tables was written, a build leaves what the next one builds without a word,
-    also after more records came."""
+    """If a build was killed before it wrote any table, the next one builds silently, also after more records
+    arrived.
+    """
     results.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):

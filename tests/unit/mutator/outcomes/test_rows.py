@@ -1,4 +1,4 @@
-"""Counting the results table."""
+"""Counts over the results table."""
 
 import csv
 from pathlib import Path
@@ -37,7 +37,7 @@ def write_table(path: Path, *lines: dict[str, str]) -> Path:
 
 
 def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
-    """Each experiment adds to exactly the numbers that its row supports."""
+    """Each experiment enters exactly the counts that its row supports."""
     hazard = SEEN | {"outcome": "hazard", "h1": "1", "t_h1": "18.3", "alerts": ""}
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
@@ -68,7 +68,7 @@ def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Pa
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
-    """A crashed or hanging controller stays among the injected and has a column of its own."""
+    """A crashed or hanging controller counts as injected and has its own column."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -80,14 +80,14 @@ def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
 
 
 def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
-    """A clean campaign's table has no columns of zeros for crashes, timeouts, unusable runs."""
+    """Without crashes, timeouts or unusable runs, a campaign's table has no columns for them."""
     rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
 def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
-    """A hazard that was looked for is named though it never came; one that nobody looked for is not."""
+    """A checked hazard is listed even if it never occurred; an unchecked one is not."""
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
     assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 

@@ -1,4 +1,4 @@
-"""Margins and metrics of the shipped target, against drives worked out by hand."""
+"""Margins and metrics of the shipped target, compared with hand-computed drives."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def manifest() -> TargetManifest:
 
 
 def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> Judged:
-    """A drive at 10 m/s behind a vehicle at 8 m/s, a second between two steps."""
+    """A drive at 10 m/s behind a vehicle at 8 m/s, with steps of one second."""
     trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.judged}
     trace |= {"t": np.arange(len(gaps), dtype=float), "d_rel": np.array(gaps), "hwt": np.array(gaps) / 10}
     trace |= {"v_ego": np.full(len(gaps), 10.0), "v_lead": np.full(len(gaps), 8.0)}
@@ -31,7 +31,7 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
 @pytest.mark.parametrize(
     ("gaps", "offsets", "values"),
     [
-        # it leaves its lane behind the other one, goes by and comes back in front of the next one
+        # it leaves its lane behind the other one, passes it, and returns in front of the next one
         ([10, 6, 2, -3, -40, 30], [0, 2.75, BESIDE, 3, -BESIDE, -2.75], [6, 6, 0.6, 3, 4 / 12, None]),
         ([10, 4, -1, -3], [0, 1, 2, 2], [-1, -1, -0.1, 2, 4 / 8, 2]),  # contact at 2 s, through it at 3 s
         ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # never behind it
@@ -40,14 +40,16 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
 def test_a_gap_counts_while_the_cars_overlap(
     manifest: TargetManifest, gaps: list[float], offsets: list[float], values: list[float | None]
 ) -> None:
-    """A vehicle that the car goes past is near, and no danger: it is in no margin of H1 and in no metric."""
+    """A vehicle that the car passes beside is near but harmless: it enters neither H1's margin nor
+    a metric.
+    """
     found = dict(driven(manifest, gaps, offsets).metrics)
     expected = {name: value for name, value in zip(OF_THE_GAP, values, strict=True) if value is not None}
     assert {name: found[name] for name in OF_THE_GAP if name in found} == pytest.approx(expected)
 
 
 def test_the_margin_of_a_contact_is_negative_where_it_came(manifest: TargetManifest) -> None:
-    """H1 came: its margin is 0 or less; it did not come: the margin is above 0."""
+    """The margin of H1 is at most 0 if it occurred, and above 0 if it did not."""
     for offset in (0.0, 2.75, BESIDE, -9.0):
         judged = driven(manifest, [5, 0, -1], [offset] * 3)
         margin = dict(judged.metrics).get("margin_h1", np.inf)

@@ -1,4 +1,4 @@
-"""What an unsafe control action looks like in two traces."""
+"""Unsafe control actions, as two traces show them."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -33,7 +33,7 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
 @pytest.mark.parametrize(
     ("end", "shown"),
     [
-        (2.0, None),  # no braking worth the name after the activation
+        (2.0, None),  # no significant braking after the activation
         (3.0, (3.0, 5.9)),  # 1 s of 4 s
         (4.5, None),  # 2.5 s of 4 s
         (6.0, None),  # as long as it should be
@@ -42,13 +42,13 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
 def test_braking_is_too_short_when_it_lasts_half_as_long_at_most(
     end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Braking time counts from the activation on; what came before is not the fault's."""
+    """Braking time counts from the activation on; earlier braking is not due to the fault."""
     given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
     assert stretch(brake_too_short, given) == shown
 
 
 def test_braking_that_nobody_needs_is_not_too_short() -> None:
-    """Where the fault-free run does not brake either, nothing is too short."""
+    """If the fault-free run does not brake either, nothing is too short."""
     assert brake_too_short(pair({}, {})) is None
 
 
@@ -65,7 +65,7 @@ def test_braking_that_nobody_needs_is_not_too_short() -> None:
 def test_gas_is_at_a_wrong_time_where_golden_gives_none(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Between activation and hazard, and for half a second at least."""
+    """Wrong gas lies between activation and hazard and lasts at least half a second."""
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
     assert stretch(at_a_wrong_time("gas"), given) == shown
     assert at_a_wrong_time("brake")(given) is None
@@ -79,20 +79,20 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
     [
         (BOTH, 4.5, (4.5, 9.9)),
         (BOTH, 5.5, None),  # more than 1 s after the alert
-        ({"brake": during(1, 6)}, 4.5, None),  # golden has no use for gas
+        ({"brake": during(1, 6)}, 4.5, None),  # golden needs no gas
     ],
 )
 def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
     golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
 ) -> None:
-    """From the last gas or brake to the end of the run."""
+    """The actuators are unavailable from the last gas or brake to the end of the run."""
     given = pair(golden, {"brake": during(1, last)})
     assert stretch(both_unavailable, given) == shown
     assert both_unavailable(replace(given, alert=None)) is None
 
 
 def test_a_pair_is_cut_to_the_steps_both_runs_have(record: Callable[..., Record]) -> None:
-    """The shorter run bounds it; hazard, activation and first alert are those of the record."""
+    """The shorter run bounds the pair; hazard, activation and first alert are the record's."""
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):

@@ -23,7 +23,7 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 FILE = REFERENCES / observations.FILE
 HOLDS, FAILS, UNDECIDED = Verdict
 ACTIVATED = {"t_activation": 1.0}
-EVENTS = {  # by count of a tally: what happened in such a run
+EVENTS = {  # by a tally's count: what happened in such a run
     "manifested": {"t_manifest": 2.0},
     "alerts": {"alerts": "steer_saturated", "t_alert": 3.0},
     "hazards": {"h3": 1, "t_h3": 9.0},
@@ -31,7 +31,7 @@ EVENTS = {  # by count of a tally: what happened in such a run
 
 
 def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
-    """As many runs as a tally has, each with what was counted of it."""
+    """As many runs as a tally counts, each with its counted events."""
     warned = tally.hazards - (tally.hazards_no_alerts or 0)
     kinds = [
         (warned, ("manifested", "alerts", "hazards")),
@@ -47,7 +47,7 @@ def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
 
 
 def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """One frame of them, each run with an id, a partner of the other method, one of 40 faults, and an end."""
+    """One frame of them; each run has an id, a partner of the other method, one of 40 faults, and an end."""
     frame = pd.concat(parts, ignore_index=True)
     number = frame.groupby("method").cumcount()
     ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}
@@ -55,13 +55,13 @@ def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def of_rows(*rows: dict[str, Any]) -> pd.DataFrame:
-    """A frame of guided chaff runs in S1 that say what is unlike one that was not activated."""
+    """A frame of guided chaff runs in S1, given by their differences from one that was not activated."""
     return frame_of([results(*rows)])
 
 
 @pytest.fixture(scope="module")
 def table_2() -> dict[str, JudgedClaim]:
-    """The claims, put to runs as the paper's table II counts them."""
+    """The claims, evaluated on runs with the counts of the paper's table II."""
     counts = load_paper(REFERENCES).summary
     frame = frame_of(runs_of(t, method=method, scenario=s) for (method, s), t in counts.items())
     return {one.number: one for each in judge(FILE, frame, []) for one in each.claims}
@@ -69,7 +69,7 @@ def table_2() -> dict[str, JudgedClaim]:
 
 @pytest.fixture(scope="module")
 def table_3() -> dict[str, JudgedClaim]:
-    """The claims, put to runs as the paper's table III counts them."""
+    """The claims, evaluated on runs with the counts of the paper's table III."""
     parts = []
     for (method, kind), tally in load_paper(REFERENCES).coverage.items():
         module, _, fault_type = kind.partition("/")
@@ -80,7 +80,7 @@ def table_3() -> dict[str, JudgedClaim]:
 
 @pytest.mark.parametrize("number", ["1.1", "1.2", "2.4", "3.4", "4.1", "4.2", "4.3"])
 def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, JudgedClaim], number: str) -> None:
-    """On runs as the paper counts them a claim's query gives the paper's number, and the same verdict."""
+    """On runs with the paper's counts, a claim's query gives the paper's number and verdict."""
     one = table_2[number]
     [answer] = one.answers
     published = one.claim.published()
@@ -91,7 +91,7 @@ def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged
 
 @pytest.mark.parametrize("number", ["2.1", "2.2", "2.7", "4.1"])
 def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, JudgedClaim], number: str) -> None:
-    """The same of claims about fault types."""
+    """The same holds for claims about fault types."""
     one = table_3[number]
     published = one.claim.published()
     assert published is not None
@@ -99,8 +99,9 @@ def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged
 
 
 def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, JudgedClaim]) -> None:
-    """Its guided advantage holds of activated faults and reverses of injected ones, resampled by fault and
-    in the same fault type; and each image effect is told apart."""
+    """The guided advantage holds for activated faults and reverses for injected ones, resampled by fault and
+    within fault type; each image effect is separate.
+    """
     assert table_3["4.4"].verdict is HOLDS
     assert table_3["4.5"].verdict is FAILS
     assert table_3["4.5"].paper is FAILS
@@ -110,7 +111,7 @@ def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, Judg
 
 
 def test_the_cited_time_is_the_drivers() -> None:
-    """The claims about a driver's time ask for the reaction time that is cited beside them."""
+    """The claims about a driver's time use the reaction time cited next to them."""
     driver_s = load_paper(REFERENCES).driver_reaction_s
     claims = [claim for one in judge(FILE, of_rows({}), []) for claim in one.claims]
     asked = [one.claim for one in claims if one.claim.measure in ("mean_time", "median_time")]
@@ -140,7 +141,7 @@ def test_the_cited_time_is_the_drivers() -> None:
     ],
 )
 def test_each_rule_reaches_each_verdict(rule: Rule, found: Estimate, verdict: Verdict) -> None:
-    """The interval decides, or a single run where one is enough; few data leave it open."""
+    """The interval decides, or a single run if one is enough; few data leave it open."""
     assert rule.verdict(found) is verdict
 
 
@@ -163,7 +164,7 @@ def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, Judged
 
 
 def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
-    """FCW in one of the three scenarios is not FCW in all three."""
+    """FCW in one of the three scenarios does not count for all three."""
     frame = of_rows(ACTIVATED | {"scenario": "S2", "alerts": "fcw", "t_alert": 2.0})
     fcw = judge(FILE, frame, [])[0].claims[4]
     assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNDECIDED, UNDECIDED]
@@ -171,9 +172,9 @@ def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
 
 
 def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
-    """The censored median is beyond every run where most alerts are followed by no hazard; where the curve
-    falls past a half in one step it is that step, unless it is one of few; without an end of runs there is
-    none."""
+    """The censored median exceeds every run if most alerts precede no hazard; if the curve falls past a half
+    in one step it is that step, unless few runs remain; without run ends there is none.
+    """
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf
@@ -185,7 +186,7 @@ def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
 
 
 def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
-    """A column that results do not have is an error of the file, at the claim."""
+    """A column that results lack is an error of the file, at the claim."""
     file = tmp_path / "o.yaml"
     text = FILE.read_text()
     file.write_text(text.replace("part: not is_alert", "part: not is_allert", 1))
@@ -200,7 +201,7 @@ def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
     [("measure: share", "measure: chare"), ("holds: {above: 0.5}", "holds: {above: 0.5, below: 0.6}")],
 )
 def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str) -> None:
-    """No unknown measure, and exactly one rule."""
+    """A claim needs a known measure and exactly one rule."""
     file = tmp_path / "o.yaml"
     file.write_text(FILE.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -209,7 +210,7 @@ def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str)
 
 
 def test_what_is_shown_is_what_was_evaluated() -> None:
-    """The lines of the report, run as Python, give the numbers beside them."""
+    """The report's query lines, run as Python, give the numbers next to them."""
     frame = of_rows(*[ACTIVATED] * 3, ACTIVATED | {"alerts": "fcw", "t_alert": 2.0, "t_h1": 9.0})
     told: tuple[JudgedObservation, ...] = judge(FILE, frame, [])
     names: dict[str, object] = {"runs": frame}

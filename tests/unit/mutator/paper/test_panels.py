@@ -1,4 +1,4 @@
-"""The published observations in a run's report: which of them its experiments can decide."""
+"""The published observations in a run's report: those that its experiments can decide."""
 
 import shutil
 from pathlib import Path
@@ -23,7 +23,7 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 
 @pytest.mark.parametrize("shard", [None, "1/2"])
 def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, shard: str | None) -> None:
-    """Claims of all faults wait for the last experiment of the plan, of which a shard is but a part."""
+    """Claims about all faults wait for the last experiment of the whole plan; a shard is only a part."""
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
@@ -57,7 +57,7 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
 
 
 def test_results_that_decide_nothing_say_nothing_of_the_study(toycar: Workspace, tmp_path: Path) -> None:
-    """Faults of the paper that never became active: no part of a report, and no file."""
+    """If no fault of the paper was activated, the report has no such part, and there is no file."""
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")

@@ -1,4 +1,4 @@
-"""The paper's campaigns: as many experiments of each kind as the paper's table III, the same everywhere."""
+"""The paper's campaigns have the counts of the paper's table III for each kind, on every machine."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[4]
-INJECTED = {  # table III, the column "injected": of the guided campaign, and again of the random one
+INJECTED = {  # table III, column "injected": for the guided campaign, and again for the random one
     ("radar", "chaff"): 480,
     ("radar", "invisible_vehicle"): 120,
     ("radar", "ghost_vehicle"): 620,
@@ -38,7 +38,7 @@ SCENARIOS = {"S1", "S2", "S3", "S4", "S5"}
 
 @pytest.fixture(scope="module")
 def library() -> Workspace:
-    """The library that ships."""
+    """The shipped library."""
     return Workspace.find(root=ROOT)
 
 
@@ -68,7 +68,7 @@ def of_method(plan: Plan, method: Method, key: Callable[[Experiment], object]) -
 
 
 def test_paper_is_table_three(paper: Plan) -> None:
-    """Both campaigns are 5640 experiments each, of every fault type as many as were injected in the paper."""
+    """Both campaigns have 5640 experiments each, with the paper's number for every fault type."""
     for method in Method:
         counts = kinds(paper, method)
         assert counts == INJECTED
@@ -77,7 +77,9 @@ def test_paper_is_table_three(paper: Plan) -> None:
 
 
 def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
-    """The 282 values stand in five scenarios and four contexts each, and every random one has its partner."""
+    """The 282 values appear in five scenarios and four contexts each, and every random one has its
+    partner.
+    """
     guided = of_method(paper, Method.GUIDED, pair)
     assert guided == of_method(paper, Method.RANDOM, pair)
     faults = {e.fault.id for e in paper.experiments}
@@ -88,7 +90,7 @@ def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
 
 @pytest.mark.parametrize("method", Method)
 def test_one_method_alone_is_its_half(library: Workspace, paper: Plan, method: Method) -> None:
-    """`paper_guided` and `paper_random` are the very experiments of `paper`, seen through pictures."""
+    """`paper_guided` and `paper_random` are the experiments of `paper`, with frames."""
     half = make_plan(library, f"paper_{method.value}")
     assert [e.id for e in half.experiments] == [e.id for e in paper.experiments if e.method is method]
     assert {e.setting for e in half.experiments} == {("pictures", "paper_detector")}
@@ -103,7 +105,7 @@ def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
 
 
 def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
-    """A tenth in matched pairs: each fault type, scenario and method is there, as its number asks."""
+    """The tenth has matched pairs of each fault type, scenario and method, in proportion."""
     assert len(sample.experiments) == 1128
     assert {e.id for e in sample.experiments} <= {e.id for e in paper.experiments}
     assert of_method(sample, Method.GUIDED, pair) == of_method(sample, Method.RANDOM, pair)
@@ -114,7 +116,7 @@ def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
 
 
 def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) -> None:
-    """A hundredth has each variant in both methods, and every scenario."""
+    """The hundredth has each variant in both methods, and every scenario."""
     smoke = make_plan(library, "paper_smoke").experiments
     assert len(smoke) == 113
     assert {e.id for e in smoke} <= {e.id for e in paper.experiments}
@@ -123,7 +125,9 @@ def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) ->
 
 
 def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> None:
-    """On the reference plant, seen as coded: every value of every fault type, guided and at random times."""
+    """The campaign has every value of every fault type, guided and at random times, on the reference plant,
+    as coded.
+    """
     plan = make_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
     setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")
@@ -132,7 +136,7 @@ def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> Non
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
-    """Another interpreter with another hash seed and locale makes the plan of the same digest."""
+    """Another interpreter with another hash seed and locale gives the plan the same digest."""
     code = (
         "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
         "from mutator.workspace import Workspace;"

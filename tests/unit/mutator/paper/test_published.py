@@ -1,4 +1,4 @@
-"""The paper's counts, as cited, and tables that show them beside ours."""
+"""The paper's counts, as cited, and tables that compare them with ours."""
 
 import csv
 import io
@@ -30,7 +30,7 @@ def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
 
 
 def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
-    """Scenarios add up to the totals of the text, and fault types add up to the same totals."""
+    """Scenarios and fault types both add up to the totals of the text."""
     assert of(paper.summary, "guided") == Tally(
         injected=5640,
         activated=3678,
@@ -48,7 +48,9 @@ def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> No
 
 
 def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
-    """35.8 against 29.0 % of the activated faults, but 23.3 against 29.0 % of the injected ones."""
+    """Guided faults lead with 35.8 against 29.0 % of the activated faults, and trail with 23.3 against 29.0 %
+    of the injected ones.
+    """
     guided, random = of(paper.summary, "guided"), of(paper.summary, "random")
     rates = [
         round(100 * share(one.hazards, whole).rate, 1)
@@ -63,7 +65,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
 
 
 def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
-    """Ours is counted by scenario and beneath the paper's; what the paper does not have is left empty."""
+    """Our counts are listed by scenario below the paper's; cells that the paper lacks are empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
     lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
@@ -79,7 +81,7 @@ def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
 
 
 def test_coverage_has_both_denominators(paper: Paper) -> None:
-    """Hazards are divided by the activated and by the injected faults; types follow the paper's order."""
+    """Hazards are divided by the activated and by the injected faults; types are in the paper's order."""
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
     sheet = coverage_sheet("guided", by_kind(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
@@ -89,7 +91,7 @@ def test_coverage_has_both_denominators(paper: Paper) -> None:
 
 
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
-    """Count, whole, rate and interval can be computed with; a cell that is not known is empty."""
+    """Count, whole, rate and interval are numeric; an unknown cell is empty."""
     sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
     lines = list(csv.DictReader(io.StringIO(sheet.csv())))
     assert lines[0]["hazards/activated: count"] == "154"
@@ -99,7 +101,7 @@ def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
 
 
 def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Path) -> None:
-    """More hazards than activated faults in the cited file: file and line."""
+    """More hazards than activated faults in the cited file is reported with file and line."""
     for file in REFERENCES.glob("paper_*.yaml"):
         (tmp_path / file.name).write_text(
             file.read_text().replace("guided_hazards: 154", "guided_hazards: 433")
@@ -109,7 +111,7 @@ def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Pa
 
 
 def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
-    """Held constant over fault types, guided faults are the more hazardous ones per activated fault only."""
+    """Held constant over fault types, guided faults are more hazardous only per activated fault."""
     activated, injected = (
         contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )
@@ -120,7 +122,7 @@ def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
 
 
 def test_the_sheets_tell_both_wholes_for_paper_and_here(paper: Paper) -> None:
-    """Per activated and per injected fault, the paper's counts are put to the same tests as ours."""
+    """Per activated and per injected fault, the paper's counts go through the same tests as ours."""
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
     assert [line[:2] for line in overall.lines] == [

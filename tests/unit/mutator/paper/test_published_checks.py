@@ -1,4 +1,4 @@
-"""Published numbers that cannot be, or that do not fit the library, are told with file and line."""
+"""Impossible published numbers, or ones that do not fit the library, are reported with file and line."""
 
 import re
 import shutil
@@ -16,7 +16,7 @@ CLONE = Path(__file__).parents[4]
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
-    """The library that ships, with a copy of its references that a test may break."""
+    """The shipped library, with a copy of its references that a test may break."""
     library = tmp_path / "fault_library"
     library.mkdir()
     for folder in (CLONE / "fault_library").iterdir():
@@ -28,12 +28,12 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
-    """Nothing is wrong with them."""
+    """The shipped cited numbers pass the check."""
     assert list(check_paper(workspace)) == []
 
 
 def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None:
-    """Its campaigns ask for numbers that are not there: the folder, the files and a remedy are named."""
+    """If a campaign needs missing numbers, the error names the folder, the files and a remedy."""
     references = workspace.library / "references"
     shutil.rmtree(references)
     [problem] = check_paper(workspace)
@@ -76,7 +76,9 @@ def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None
 def test_what_is_wrong_is_told_where_it_stands(
     workspace: Workspace, file: str, old: str, new: str, told: str
 ) -> None:
-    """An unknown key, name or method, a row that stands twice, parts and sums that do not fit."""
+    """An unknown key, name or method, a duplicate row, and inconsistent parts and sums are reported with
+    their line.
+    """
     path = workspace.library / "references" / f"paper_{file}.yaml"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
@@ -85,7 +87,9 @@ def test_what_is_wrong_is_told_where_it_stands(
 
 
 def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar: Workspace) -> None:
-    """One that cites a part of the published numbers is told which file is missing, if a campaign asks."""
+    """A library with part of the published numbers is told which file is missing, if a campaign requests the
+    study.
+    """
     references = toycar.library / "references"
     references.mkdir()
     shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
@@ -100,7 +104,7 @@ def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar:
 
 
 def test_a_library_without_any_is_told_only_if_a_campaign_asks(toycar: Workspace) -> None:
-    """No published number is needed where no campaign asks for the study."""
+    """Without a campaign for the study, no published number is needed."""
     told = [str(problem) for problem in check_library(toycar, "toycar")]
     assert not any("references" in problem for problem in told)
     campaign = toycar.library / "campaigns" / "small.yaml"

@@ -1,4 +1,4 @@
-"""The study in the report of a campaign that asks for it."""
+"""The study in the report of a campaign that requests it."""
 
 import csv
 from pathlib import Path
@@ -15,7 +15,7 @@ HERE = Workspace.find(Path(__file__).parents[4])
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A made-up run whose campaign asks for the study; one hazard speaks against the second observation."""
+    """A made-up run of a campaign that requests the study; one hazard contradicts the second observation."""
     made = make_run(tmp_path, study="driving_agent_resilience", experiments=4)
     with (made / "results.csv").open("a", newline="") as file:
         kind = {"module": "vision_output", "fault_type": "relative_distance"}
@@ -31,7 +31,7 @@ def study_forms(run: Path) -> tuple[str, str]:
 
 
 def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
-    """They are in the study's Markdown and page, not in the report's, and in files of their own."""
+    """They are in the study's Markdown and page, not in the report's, and in separate files."""
     forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
@@ -41,7 +41,7 @@ def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path)
 
 
 def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
-    """A claim's query stands in the file and in the page; the table has a line for each query."""
+    """A claim's query is in the file and in the page; the table has a line for each query."""
     text, page = study_forms(run)
     file, table = run / "report/observations.md", run / "report/tables/observations.csv"
     query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
@@ -53,14 +53,16 @@ def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Pat
 
 
 def test_without_a_library_there_are_no_observations(run: Path) -> None:
-    """A report can be written anywhere; what was published is then not in it."""
+    """Without a library the report is written without the published observations."""
     written = building.write(run, None)
     assert "observation" not in written.markdown.read_text() + written.page.read_text()
     assert not (run / "report" / "observations.md").exists()
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """Both forms do while there is such a page; it goes once the results say nothing of the study."""
+    """Both forms link to the page while it exists; it is deleted once the results do not concern
+    the study.
+    """
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
@@ -74,7 +76,9 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
 
 
 def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
-    """A hazard whose experiment is in no plan has no trace: both forms say so, none shows a picture."""
+    """A hazard of an experiment outside the plan has no trace: both forms say so, and neither shows
+    a figure.
+    """
     forms = study_forms(run)
     for text in forms:
         assert "No figure: its traces are not available" in text
@@ -84,7 +88,7 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
 
 
 def test_a_library_without_the_papers_numbers_is_said_in_the_origin(run: Path, toycar: Workspace) -> None:
-    """Both forms name the study and say that its data are not there; the library that ships has them."""
+    """Both forms name the study and say that its data are missing; the shipped library has them."""
     said = "the published numbers are not in this library"
     for workspace, expected in ((toycar, True), (HERE, False)):
         written = building.write(run, workspace)

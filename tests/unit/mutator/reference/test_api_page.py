@@ -1,4 +1,4 @@
-"""The page of the Python API says something of every public name."""
+"""The page of the Python API documents every public name."""
 
 import re
 import sys
@@ -20,14 +20,14 @@ def test_every_public_name_is_documented() -> None:
 
 
 def test_the_page_describes_every_public_name() -> None:
-    """Each name of `__all__` has a heading, and so has nothing else; only the version is no object."""
+    """Exactly the names of `__all__` have a heading, except the version, which is no object."""
     page = python_api(Workspace.find(CLONE))
     headings = re.findall(r"^### (?:mutator\.)?(\w+)$", page, re.MULTILINE)
     assert sorted(headings) == sorted(set(mutator.__all__) - {"__version__"})
 
 
 def test_a_missing_docstring_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A function, class, method, property or attribute that says nothing is listed by name."""
+    """An undocumented function, class, method, property or attribute is listed by name."""
     (tmp_path / "silent.py").write_text(
         "class Silent:\n"
         "    said: int = 0  #: said\n"

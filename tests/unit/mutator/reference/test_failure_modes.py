@@ -1,4 +1,4 @@
-"""The page that says what the fault models stand for."""
+"""The page that maps fault models to failure modes."""
 
 import re
 from pathlib import Path
@@ -11,15 +11,16 @@ _MODEL = re.compile(r"\[(\w+)\]\(\.\./reference/fault-models\.md#(\w+)\)")
 
 
 def rows(heading: str) -> list[list[str]]:
-    """The cells of the table under a heading, without those of its head."""
+    """The cells of the table under a heading, without the head's."""
     section = PAGE.read_text().partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
 def test_each_model_has_its_row(clone: Workspace) -> None:
-    """Every template is in one row, linked to its section, and every row is about templates that there are;
-    none leaves open what its models stand for."""
+    """Every template is in one row, linked to its section, and every row refers to existing templates and
+    states their failure mode.
+    """
     found = [name for first, *_ in rows("The models") for name in _MODEL.findall(first)]
     assert all(name == section for name, section in found)
     assert sorted(name for name, _ in found) == sorted(clone.fault_models().models)
@@ -27,7 +28,7 @@ def test_each_model_has_its_row(clone: Workspace) -> None:
 
 
 def test_what_cannot_be_expressed_has_its_reason(clone: Workspace) -> None:
-    """Each failure mode that is out of reach has a reason, and the models named there exist."""
+    """Each unreachable failure mode has a reason, and the models named there exist."""
     missing = rows("What cannot be expressed, and why")
     assert len(missing) > 5 and all(len(row) == 2 and all(row) for row in missing)
     named = {name for row in missing for cell in row for name in re.findall(r"`([a-z_]+)`", cell)}
@@ -35,7 +36,7 @@ def test_what_cannot_be_expressed_has_its_reason(clone: Workspace) -> None:
 
 
 def test_sources_are_named_in_the_text() -> None:
-    """Each source of the list is cited, by its first author or number, and each one cited is in the list."""
+    """Each listed source is cited by its first author or number, and each cited one is listed."""
     text, _, sources = PAGE.read_text().partition("\n## Sources\n")
     listed = [line[2:].partition(",")[0] for line in sources.splitlines() if line.startswith("* ")]
     assert listed == sorted(listed) and len(listed) > 10

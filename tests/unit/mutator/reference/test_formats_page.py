@@ -1,4 +1,4 @@
-"""docs/reference/formats.md owns every format: it and the code name the same ones."""
+"""docs/reference/formats.md and the code name the same formats."""
 
 import importlib.util
 import re
@@ -14,31 +14,31 @@ IN_PAGE = re.compile(rf"`{SCHEMA.pattern}`")
 
 
 def in_code() -> set[str]:
-    """Every `name/number` that is a text of its own in the harness or the shipped target."""
+    """Every `name/number` string literal in the harness or the shipped target."""
     files = [*(CLONE / "mutator").rglob("*.py"), *(CLONE / "target").rglob("*.py")]
     assert len(files) > 250
     return {name for file in files for name in IN_CODE.findall(file.read_text(encoding="utf-8"))}
 
 
 def test_every_schema_of_the_code_is_in_the_page() -> None:
-    """A format that is stored or sent has a line that says who writes and reads it."""
+    """Every stored or transmitted format has a line with its writers and readers."""
     assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(PAGE))
 
 
 def test_every_schema_in_the_page_is_in_the_code() -> None:
-    """The page names no format that is gone."""
+    """The page names no removed format."""
     assert set(IN_PAGE.findall(PAGE)) - in_code() == set()
 
 
 def test_every_module_in_the_page_exists() -> None:
-    """Writers and readers are named by modules that are there."""
+    """Writers and readers are existing modules."""
     modules = set(re.findall(r"`((?:mutator|selfdrive)\.[\w.]+)`", PAGE))
     assert len(modules) > 40
     assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []
 
 
 def test_every_cache_has_a_line() -> None:
-    """The table names the folders that `mutator cache` lists, and no others."""
+    """The table lists exactly the folders of `mutator cache`."""
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
     kept = {caches.CHECKS, caches.GOLDENS, caches.LINES, caches.PICTURES, caches.RUNS, caches.TARGETS}
@@ -46,7 +46,7 @@ def test_every_cache_has_a_line() -> None:
 
 
 def test_every_file_of_a_library_has_a_line() -> None:
-    """Each YAML file that ships has a schema that the page knows."""
+    """Each shipped YAML file has a schema that the page lists."""
     files = [*(CLONE / "fault_library").rglob("*.yaml"), *(CLONE / "templates").glob("*.yaml")]
     heads = {re.search(rf"^schema: {SCHEMA.pattern}$", file.read_text(), re.MULTILINE) for file in files}
     assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(PAGE))

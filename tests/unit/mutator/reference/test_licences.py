@@ -1,4 +1,4 @@
-"""The page of licences has every dependency, with the licence that the package states."""
+"""The page of licences has every dependency, with its package's stated licence."""
 
 import sys
 from email.message import Message
@@ -14,14 +14,14 @@ TABLE = table_of((CLONE / PAGE).read_text(encoding="utf-8"))
 
 
 def test_every_constrained_package_has_a_licence() -> None:
-    """The table and constraints.txt name the same packages, in the same order."""
+    """The table and constraints.txt name the same packages in the same order."""
     assert tuple(TABLE) == constrained(CLONE)
     assert all(licence.strip() for licence in TABLE.values())
 
 
 @pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="the page has the versions for Python 3.11")
 def test_the_licences_are_those_that_the_packages_state() -> None:
-    """No licence on the page differs from that of the package installed here."""
+    """Every licence on the page equals that of the installed package."""
     stated = {name: stated_licence(name) for name in TABLE}
     installed = {name: licence for name, licence in stated.items() if licence is not None}
     assert "numpy" in installed
@@ -29,7 +29,7 @@ def test_the_licences_are_those_that_the_packages_state() -> None:
 
 
 def test_a_licence_given_whole_is_told_by_its_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Some packages put their licence's whole text into the field that should name it."""
+    """Some packages put the whole text of their licence into the name field."""
     stated = Message()
     stated["License"] = "BSD 3-Clause License\n \n Redistribution and use ..."
     monkeypatch.setattr("mutator.reference.licences.metadata.metadata", lambda name: stated)
@@ -46,7 +46,9 @@ def clone(folder: Path, *packages: str) -> Path:
 
 
 def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> None:
-    """Its line is kept; a package that is gone loses its own; a new one that nobody can ask is an error."""
+    """The line of a package that is not installed is kept; a removed package loses its line; a new one that
+    is not installed is an error.
+    """
     page = clone(tmp_path, "pytest", "no_such") / PAGE
     page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
     write_licences(tmp_path)

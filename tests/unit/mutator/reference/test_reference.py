@@ -1,4 +1,4 @@
-"""The generated reference: pages and JSON Schemas say what the program says."""
+"""The generated reference: pages and JSON Schemas match the program."""
 
 import json
 import math
@@ -36,7 +36,7 @@ def described(kind: Format) -> dict[str, dict[str, Any]]:
     "path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS)]
 )
 def test_what_is_generated_is_up_to_date(path: Path) -> None:
-    """A committed page or schema is what its source would give now."""
+    """Every committed page and schema equals what its source generates."""
     generated = _generated()[path]
     assert (CLONE / path).read_text(encoding="utf-8") == generated, "run: python -m mutator.reference"
 
@@ -51,7 +51,7 @@ def _generated() -> dict[Path, str]:
 
 
 def test_nothing_else_says_that_it_is_generated() -> None:
-    """A page or schema whose source is gone is gone, too. (Scenarios are the target's: it has its own.)"""
+    """A page or schema without its source must not exist. (The target generates its own scenarios page.)"""
     pages = [
         path
         for path in (CLONE / "docs").rglob("*.md")
@@ -63,7 +63,7 @@ def test_nothing_else_says_that_it_is_generated() -> None:
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_every_model_and_key_is_described(kind: Format) -> None:
-    """Each model of a file format has a title, and each of its keys is described in a sentence."""
+    """Each model of a file format has a title, and each of its keys a sentence."""
     parts = described(kind)
     assert parts
     for name, part in parts.items():
@@ -73,20 +73,20 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
 
 
 def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
-    """The file's own model first, then those of its keys, each where it is first needed."""
+    """The file's own model comes first, then those of its keys, each where it is first needed."""
     names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
 def test_every_verb_is_in_a_group() -> None:
-    """Help and page list verbs by groups, so one without a group would be hidden."""
+    """Help and page list verbs by groups, so every verb needs one."""
     command: Any = get_command(app)
     assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_library_files_follow_their_schema(kind: Format) -> None:
-    """What the program accepts is accepted by the schema that editors get, for each file of the library."""
+    """For each file of the library, the editors' schema accepts what the program accepts."""
     files = sorted(CLONE.glob(kind.files))
     assert files
     check = validator(kind.name)
@@ -110,7 +110,7 @@ def test_library_files_follow_their_schema(kind: Format) -> None:
     ],
 )
 def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...], value: Any) -> None:
-    """A misspelt key or parameter, a wrong word, a number out of range: the editor marks it."""
+    """The editor marks a misspelt key or parameter, a wrong word, or a number out of range."""
     data = yaml_files.load(CHAFF).data
     check = validator("fault_spec")
     assert check.is_valid(data)
@@ -122,7 +122,7 @@ def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...]
 
 
 def test_a_schema_takes_a_model_of_ones_own() -> None:
-    """A model that is not among the templates is no mistake to an editor: it may be the user's own."""
+    """A schema accepts an unknown fault model, since it may be the user's own."""
     data = yaml_files.load(CHAFF).data
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
@@ -130,7 +130,7 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
 
 
 def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the library is the one that came with a wheel, there is no clone to write pages into."""
+    """With a library from a wheel there is no clone to write pages into."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"

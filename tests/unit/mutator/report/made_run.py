@@ -68,7 +68,7 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """A run folder of before there were digests, with a hazard, a crash and a harness error.
+    """A run folder from before digests, with a hazard, a crash and a harness error.
 
     The hazard has its patch and a still. `head` is added to its run.json.
     """

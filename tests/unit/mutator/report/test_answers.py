@@ -1,4 +1,4 @@
-"""What a report answers first, counted by hand."""
+"""A report's first answers, compared with hand counts."""
 
 import csv
 import json
@@ -77,7 +77,7 @@ def said(run: ReportedRun) -> dict[str, Answer]:
 
 
 def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    """Harder contact first, then the smaller margin; a row opens its experiment in the list of hazards."""
+    """Harder contacts come first, then smaller margins; a row opens its experiment in the list of hazards."""
     answer = said["dangerous"]
     assert (
         answer.says
@@ -102,7 +102,7 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
 
 
 def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
-    """Three of four hazards had no alert before: two none at all, one an alert too late."""
+    """Three of four hazards had no alert before: two none, one an alert too late."""
     answer = said["unwarned"]
     assert answer.says == (
         "3 of 4 hazards (75 %) were silent (no alert came before): 2 with no alert at all, 1 with an "
@@ -118,7 +118,9 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
 
 
 def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str, Answer]) -> None:
-    """Silent hazards count, then the shortest time to one; a link opens the fastest among the silent ones."""
+    """The number of silent hazards decides, then the shortest time to one; a link opens the fastest silent
+    one.
+    """
     answer = said["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
@@ -148,7 +150,9 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 
 
 def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() -> None:
-    """One of class S3 goes before many of S1; with as many of each class the faster one goes first."""
+    """One of class S3 ranks before many of S1; with equal numbers in each class, the faster one
+    ranks first.
+    """
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
     answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
@@ -163,14 +167,15 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
 
 
 def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
-    """One that came to its first actuator by a component, or was stopped."""
+    """An experiment with a fault that reached its first actuator through a component, or was stopped."""
     entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
     return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    """The link by which a fault came to the first actuator decides, that of most of them; stops of the type
-    are counted, and faults without a path are in neither number."""
+    """The link through which most faults reached the first actuator decides; the type's stops are counted,
+    and faults without a path are in neither number.
+    """
     courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
@@ -187,7 +192,7 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 
 
 def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
-    """Six contacts and four others where both are many; each list opens its own kind of hazards."""
+    """With many of each, six contacts and four others are listed; each list opens its own kind of hazards."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)
@@ -198,8 +203,9 @@ def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
 
 
 def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
-    """A fault that never became active was not survived; the weakest fault type is first, and those that
-    never led to a hazard are named."""
+    """A fault that never became active was not survived; the weakest fault type is first, and those without a
+    hazard are named.
+    """
     answer = said["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
@@ -211,7 +217,7 @@ def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answ
 
 
 def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) -> None:
-    """The costliest fault type is first; an experiment that was not driven costs nothing."""
+    """The most expensive fault type is first; an experiment that did not run takes no time."""
     answer = said["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 "
@@ -223,7 +229,7 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
 
 
 def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
-    """The same run with these experiments alone."""
+    """The same run with only these experiments."""
     return replace(
         run,
         texts=run.texts[run.texts["experiment_id"].isin(names)].reset_index(drop=True),
@@ -237,7 +243,7 @@ def names_of(run: ReportedRun, empty: str) -> set[str]:
 
 
 def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
-    """No empty table, and no share of nothing."""
+    """A run without hazards shows neither an empty table nor a share of zero."""
     panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
     assert "## What came without a warning\n\nNo hazard came." in panel.markdown
@@ -246,7 +252,9 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
 
 
 def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
-    """Nothing was dangerous, and nothing survived; no link leads to an empty list."""
+    """If no fault was activated, nothing is reported as dangerous or survived; no link leads to an empty
+    list.
+    """
     idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
@@ -257,7 +265,7 @@ def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None
 
 
 def test_a_crash_is_not_survived(run: ReportedRun) -> None:
-    """It is no hazard either: it is counted apart."""
+    """A crash is no hazard either, and is counted separately."""
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
     found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
     assert found["survived"].says == (
@@ -267,7 +275,7 @@ def test_a_crash_is_not_survived(run: ReportedRun) -> None:
 
 
 def test_one_is_singular(run: ReportedRun) -> None:
-    """One hazard was silent, one experiment was driven."""
+    """A count of one hazard or one experiment uses the singular."""
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
@@ -275,7 +283,7 @@ def test_one_is_singular(run: ReportedRun) -> None:
 
 
 def test_a_link_names_facets_as_the_page_reads_them() -> None:
-    """Values are escaped, the order stands last."""
+    """Values are escaped, and the order comes last."""
     assert (
         to_list({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end") == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
     )

@@ -1,4 +1,4 @@
-"""What the page carries of experiments: columns, details, pictures."""
+"""The page's data on experiments: columns, details, images."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -62,13 +62,14 @@ def row(name: str) -> Row:
     ],
 )
 def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str], made: object) -> None:
-    """Ids stay texts, empty cells stay empty, and what is no finite number is told by its name; names have a
-    dictionary, which filters need, also where no two are equal, and are no numbers."""
+    """Ids stay texts, empty cells stay empty, and non-finite numbers are written by name; name columns have a
+    dictionary for the filters, even without equal names, and are no numbers.
+    """
     assert column(name, values) == made
 
 
 def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
-    """The page of a target without alerts carries no column that is always empty."""
+    """The page of a target without alerts has no empty alert column."""
     line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
@@ -78,7 +79,7 @@ def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
 
 
 def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:
-    """The members of a shape come in the order of the rows; a row without a patch or plan has none."""
+    """The members of a shape are in row order; a row without a patch or plan has none."""
     one, two = experiment(3.0), experiment(4.0)
     rows = [row(two.id), row("none"), row(one.id)]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
@@ -96,7 +97,7 @@ def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., 
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    """The first ones, by time, are in the page; films and exact plots are always links."""
+    """The first images by time are in the page; films and exact plots are always links."""
     write_json(tmp_path / "run.json", {"schema": "run/1"})
     plots = tmp_path / "plots"
     plots.mkdir()
@@ -113,6 +114,8 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 
 def test_rows_are_read_in_one_order() -> None:
-    """By fault, scenario, method, trigger, then id: the page is the same whatever order results come in."""
+    """Rows are sorted by fault, scenario, method, trigger, then id, so the page does not depend on the order
+    of results.
+    """
     rows = [row("b"), row("a")]
     assert sorted(rows, key=browse.reading_order) == [rows[1], rows[0]]

@@ -26,12 +26,12 @@ HERE = Workspace.find(Path(__file__).parents[4])
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A made-up run whose campaign asks for no study."""
+    """A made-up run of a campaign without a study."""
     return make_run(tmp_path)
 
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
-    """It is listed first among the runs that ended badly, and is in no count of faults."""
+    """A harness error is listed first among the runs that ended badly, and enters no count of faults."""
     text = building.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not finish normally")[1]
@@ -51,13 +51,13 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
 
 
 def carried(page: Path, name: str) -> Any:
-    """What a page carries in the script element `name`."""
+    """The page's data in the script element `name`."""
     [text] = re.findall(rf'id="{name}">([^<]*)</script>', page.read_text())
     return json.loads(gzip.decompress(base64.b64decode(text)))
 
 
 def test_the_page_needs_no_other_file(run: Path) -> None:
-    """Whatever it shows is in it: its links lead into itself, and nothing comes from elsewhere."""
+    """The page's links lead into itself, and it loads nothing from elsewhere."""
     written = building.write(run, None)
     page = Page(written.page.read_text())
     assert page.links
@@ -66,7 +66,7 @@ def test_the_page_needs_no_other_file(run: Path) -> None:
 
 
 def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
-    """All columns of the results, the diff without the probe, and the picture itself."""
+    """The page has all columns of the results, the diff without the probe, and the image itself."""
     page = building.write(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
@@ -84,7 +84,7 @@ def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> 
 
 
 def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A page of 100,000 crashes does not list each; the rest is one filter away."""
+    """A page of 100,000 crashes lists a few; a filter shows the rest."""
     monkeypatch.setattr(failed, "PAGE_LISTED", 1)
     text = building.write(run, None).page.read_text()
     assert "1 more: " in text
@@ -92,7 +92,7 @@ def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.Monke
 
 
 def test_the_report_says_what_it_comes_from(run: Path) -> None:
-    """Plan, seed, reading, choices, sources and versions are in both forms."""
+    """Both forms have plan, seed, reading, choices, sources and versions."""
     written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
@@ -100,7 +100,7 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 
 
 def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
-    """Approvals that a run kept are told in both forms, and one that has none says nothing of them."""
+    """Both forms show the approvals that a run stored; without any, they say nothing."""
     assert "reviewed" not in building.write(run, None).markdown.read_text()
     approvals = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
     write_json(run / gate.FILE, approvals)
@@ -110,7 +110,7 @@ def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
 
 
 def test_the_report_is_the_same_each_time(run: Path) -> None:
-    """Written again from the same results, it is the same file."""
+    """A report written again from the same results is the same file."""
     written = building.write(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
     again = building.write(run, None)
@@ -118,13 +118,13 @@ def test_the_report_is_the_same_each_time(run: Path) -> None:
 
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
-    """A folder that is no run folder is the user's error."""
+    """A folder that is no run folder is a user's error."""
     with pytest.raises(MutatorError, match="not a run folder"):
         building.write(tmp_path, None)
 
 
 def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
-    """Two fault types and two scenarios: three figures, in the Markdown and the page, all of them there."""
+    """Two fault types and two scenarios give three existing figures, in the Markdown and in the page."""
     with (run / "results.csv").open("a", newline="") as file:
         other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, COLUMNS, restval="").writerow(other)
@@ -138,15 +138,18 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
 
 
 def test_experiments_and_runs_are_told_apart(run: Path) -> None:
-    """Both numbers are there, and why they differ; a plan of before runs were shared has none of runs."""
+    """Both numbers are shown with the reason for the difference; a plan from before shared runs has none of
+    runs.
+    """
     assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 
 
 def test_what_runs_that_stop_have_not_seen_is_told(run: Path) -> None:
-    """A hazard that no alert followed may be one whose run ended before: the summary, the answer on
-    warnings and the heads of the tables say so, and say nothing of it where runs go on."""
+    """The alert for a hazard may have come after the run's end: the summary, the answer on warnings and the
+    table heads say so, and only if runs stop.
+    """
     assert STOP_NOTE not in building.write(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))
@@ -157,7 +160,7 @@ def test_what_runs_that_stop_have_not_seen_is_told(run: Path) -> None:
 
 
 def drawn_again(run: Path, workspace: Workspace | None) -> bool:
-    """Whether `ensure` writes the report instead of leaving it."""
+    """Whether `ensure` writes the report again."""
     page = run / "report" / "index.html"
     before = page.stat().st_mtime_ns if page.exists() else None
     building.ensure(run, workspace)
@@ -165,7 +168,7 @@ def drawn_again(run: Path, workspace: Workspace | None) -> bool:
 
 
 def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
-    """It is written once; again when results, a plot, a series, or the library beside it have changed."""
+    """It is written once, and again when results, a plot, a series, or the library have changed."""
     assert drawn_again(run, None)
     assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
@@ -181,7 +184,7 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
-    """Each file of it is compared with what was written; a comparison beside it is none of its files."""
+    """Each file is compared with what was written; a comparison next to it is none of its files."""
     out = run / "report"
     for folder in ("figures", "tables", "compare-other"):
         (out / folder).mkdir(parents=True)
@@ -196,7 +199,7 @@ def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', '{"schema": "report/1", "files": 1}'])
 def test_a_damaged_note_of_what_a_report_was_made_from_is_none(run: Path, text: str) -> None:
-    """Whatever is left of it, the report is written again."""
+    """Any damage to the note causes a rewrite."""
     building.write(run, None)
     (run / "report" / "made_from.json").write_text(text)
     assert drawn_again(run, None)
@@ -204,7 +207,7 @@ def test_a_damaged_note_of_what_a_report_was_made_from_is_none(run: Path, text: 
 
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
 def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
-    """A page or the note of what it was made from may be missing."""
+    """A missing page, or a missing note of the inputs, causes a rewrite."""
     building.write(run, None)
     (run / "report" / damage).unlink()
     assert drawn_again(run, None)
@@ -214,7 +217,7 @@ def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) 
 def test_a_campaign_without_a_study_is_reported_without_its_words(
     run: Path, workspace: Workspace | None
 ) -> None:
-    """Published fault types alone bring no published numbers into a report, whatever the library cites."""
+    """Published fault types alone add no published numbers to a report, whatever the library cites."""
     written = building.write(run, workspace)
     page = re.sub(r"(?s)<(style|script).*?</\1>", "", written.page.read_text())
     shown = written.markdown.read_text() + page
@@ -228,15 +231,14 @@ def test_a_campaign_without_a_study_is_reported_without_its_words(
 def test_a_study_that_cannot_be_asked_is_said_and_left_out(
     tmp_path: Path, workspace: Workspace | None
 ) -> None:
-    """The package may be missing here, or the library: the report is written, and its origin says why."""
+    """If the package or the library is missing, the report is written, and its origin says why."""
     text = building.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
     assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)
 
 
 def test_several_seeds_have_a_part_of_the_report(run: Path) -> None:
-    """Their spread is in both forms, in files, and in a table that the command line prints; one seed has none
-    of it."""
+    """Both forms, files, and a table on the command line show their spread; a single seed has none of it."""
     assert building.write(run, None).summaries == ()
     path = run / "results.csv"
     lines = list(csv.DictReader(path.read_text().splitlines()))

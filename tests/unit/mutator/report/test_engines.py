@@ -1,4 +1,4 @@
-"""What a report says of how experiments were run, and of their proof."""
+"""What a report says about how experiments ran, and about their proof."""
 
 import json
 from collections.abc import Callable
@@ -42,8 +42,9 @@ Finish = Callable[..., Path]
 
 @pytest.fixture
 def finish(toycar: Workspace, tmp_path: Path) -> Finish:
-    """Makes a finished run of four experiments; `proven` of their records are in its proof, too, after
-    `change` (None: it has no proof)."""
+    """Create a finished run of four experiments; `proven` of their records are in its proof, too, after
+    `change` (None: it has no proof).
+    """
 
     def made(
         proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
@@ -87,7 +88,7 @@ def summary(run: Path) -> engines.EngineSummary | None:
 
 
 def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
-    """There is a line for each way, and one for each reason why an experiment was not forked."""
+    """There is a line for each way, and one for each reason against forking."""
     told = summary(finish(4))
     assert told is not None
     ways = dict(told.table.rows)
@@ -97,7 +98,7 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
 
 
 def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
-    """A report stays short however many reasons there are, and counts every experiment."""
+    """Rare reasons share one line, and every experiment is counted."""
     run = finish(None)
     more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
@@ -108,7 +109,7 @@ def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
 
 
 def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
-    """The newest of several timings is what the report tells."""
+    """The report uses the newest of several timings."""
     run = finish(4)
     again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
@@ -135,7 +136,7 @@ def record_ids(run: Path) -> list[str]:
     ],
 )
 def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
-    """A whole proof, one with something left, and none."""
+    """The report distinguishes a complete proof, a partial one, and none."""
     told = summary(finish(proven))
     assert told is not None
     assert said in told.proof
@@ -147,7 +148,7 @@ def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: 
 def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever had many experiments run on the reference engine wanted so."""
+    """If many experiments ran on the reference engine by choice, forking is not reported as useless."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
@@ -155,8 +156,9 @@ def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
 
 
 def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
-    """Whoever reads the report of a run with a wrong record learns it first, in both forms, and again among
-    the facts; how experiments were run is told further down, escaped."""
+    """Both forms report a wrong record first, and again among the facts; how experiments ran comes later,
+    escaped.
+    """
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
     written = building.write(run, None)
@@ -168,7 +170,7 @@ def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
 
 
 def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
-    """Results that have not changed are not all: more of its proof makes the report out of date."""
+    """More of its proof makes the report out of date, even with unchanged results."""
     run = finish(3)
     build(run)
     before = stamp.made_from(RunFolder.open(run), None)
@@ -178,7 +180,9 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
 
 
 def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Path], None]) -> None:
-    """A trace digest, which the proof compares, is in no result; another one makes the report out of date."""
+    """A trace digest, which the proof compares, is in no result; a changed one makes the report out
+    of date.
+    """
     run = finish(4)
     build(run)
     results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
@@ -191,12 +195,12 @@ def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Pat
 
 
 def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
-    """A failed proof is no secret of a run whose timings say nothing of engines."""
+    """A failed proof is reported even if the run's timings name no engine."""
     told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
     assert told.failed
 
 
 def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
-    """Their timings do not say what ran an experiment, and neither does the report."""
+    """If timings do not name an engine, neither does the report."""
     assert summary(finish(None, ways=())) is None

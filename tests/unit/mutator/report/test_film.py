@@ -1,4 +1,4 @@
-"""What a film says of hazards."""
+"""What a film says about hazards."""
 
 from pathlib import Path
 
@@ -7,7 +7,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_film_says_of_a_hazard_what_the_page_says() -> None:
-    """Hazards have the manifest's words, which the report has, too, not those of the hazard analysis."""
+    """Hazards have the manifest's descriptions, as in the report, not those of the hazard analysis."""
     workspace = Workspace.find(root=Path(__file__).parents[4])
     manifest = workspace.manifest("openpilot")
     assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.rules}

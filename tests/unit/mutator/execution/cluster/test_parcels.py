@@ -1,4 +1,4 @@
-"""What travels between command and workers arrives as it was sent, or is refused."""
+"""What travels between command and workers arrives unchanged or is refused."""
 
 import random
 
@@ -10,14 +10,14 @@ from mutator.execution.cluster.pieces import Ending, Result
 
 
 def test_parts_come_back() -> None:
-    """Names and bytes, empty ones and binary ones, in their order."""
+    """Names and bytes come back in order, including empty and binary ones."""
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
     assert unpack(pack(parts)) == parts
     assert list(unpack(pack(parts))) == list(parts)
 
 
 def test_damage_is_found() -> None:
-    """Any changed, missing or additional byte is told."""
+    """Any changed, missing or additional byte is reported."""
     data, draw = pack({"a": b"some bytes", "b": b"more"}), random.Random(1)
     for _ in range(100):
         at = draw.randrange(len(data))
@@ -28,7 +28,7 @@ def test_damage_is_found() -> None:
 
 
 def test_a_result_comes_back() -> None:
-    """Lines, blocks and how it ended."""
+    """A result's lines, blocks and ending come back."""
     result = Result(
         number=7,
         ending=Ending.DONE,

@@ -1,4 +1,4 @@
-"""What `WHERE` may be, what is refused before anything is started, and what is opened and closed again."""
+"""Valid values of `WHERE`, the refusals before anything starts, and what is opened and closed again."""
 
 import json
 import os
@@ -32,7 +32,7 @@ def test_an_address_is_a_scheduler(address: str) -> None:
 
 
 def test_local_names_how_many_workers() -> None:
-    """`local:4` are four worker processes."""
+    """`local:4` means four worker processes."""
     assert parse("local:4") == Local(workers=4)
 
 
@@ -44,7 +44,7 @@ def test_local_names_how_many_workers() -> None:
     ],
 )
 def test_what_means_no_cluster_is_refused(text: str) -> None:
-    """The error names the argument, what was written, and what may be."""
+    """The error names the argument, the value found, and the valid ones."""
     with pytest.raises(MutatorError) as caught:
         parse(text)
     assert caught.value.argument == "cluster"
@@ -53,7 +53,7 @@ def test_what_means_no_cluster_is_refused(text: str) -> None:
 
 
 def test_parsing_needs_no_dask() -> None:
-    """`parse` costs no more than a look at the text, and works where the extra is not installed."""
+    """`parse` only checks the text, and works without the extra."""
     code = (
         "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
     )
@@ -62,7 +62,7 @@ def test_parsing_needs_no_dask() -> None:
 
 
 def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
-    """As `dask scheduler --scheduler-file` writes it; an error about it names the file."""
+    """The address is read as `dask scheduler --scheduler-file` writes it; an error names the file."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
     found = parse(str(file))
@@ -75,7 +75,7 @@ def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
     "text", ["", "[]", "{}", '{"address": 7}', '{"address": "http://x:1"}', "\xff", "[" * 9999]
 )
 def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None:
-    """The error names the file, also when it is not there."""
+    """The error names the file, even a missing one."""
     file = tmp_path / "scheduler.json"
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
         parse(str(file))
@@ -100,7 +100,7 @@ def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None
     ],
 )
 def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> None:
-    """Anywhere else, others can reach the scheduler."""
+    """Any other network can be reached by others."""
     assert connecting.is_closed(address) is closed
 
 
@@ -116,7 +116,7 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
 def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """`dask scheduler` listens on all networks: reached over the loopback, it is as open as it was."""
+    """`dask scheduler` listens on all networks, so it is refused even if reached over the loopback."""
 
     @asynccontextmanager
     async def found(*given: Any, **more: Any) -> AsyncIterator[Any]:
@@ -129,7 +129,7 @@ def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
 
 
 def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever has not installed Dask is told how."""
+    """Without Dask, the error says how to install it."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
         with pytest.raises(MutatorError, match=r"no package distributed; pip install '.\[cluster\]'"):
@@ -137,7 +137,7 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a limited time, with an error that says why."""
+    """The attempt ends after a limited time, with the reason."""
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # nobody else listens there
@@ -147,7 +147,7 @@ def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.Monkey
 
 
 def test_tls_needs_certificates() -> None:
-    """Without them, or with files that are not there, the error says how to name them."""
+    """Without certificate files, the error says how to name them."""
     import dask
 
     with pytest.raises(
@@ -163,7 +163,9 @@ def test_tls_needs_certificates() -> None:
 
 
 def test_local_workers_work_and_end() -> None:
-    """A worker process of one thread, on the loopback, in a folder of its own; all is gone afterwards."""
+    """A single-threaded worker process on the loopback, in a separate folder; afterwards all of it
+    is gone.
+    """
 
     async def used() -> tuple[str, dict[str, int], int, str]:
         async with parse("local:1").open(insecure=False) as client:

@@ -38,7 +38,7 @@ def names(run: RunFolder, suffix: str) -> set[str]:
 
 
 def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
-    """CSV for computing, Markdown for reading, each with the title that the report has."""
+    """Each table is a file in CSV and in Markdown, with the report's title."""
     markdown = tables_panel(ReportedRun.open(run, HERE)).markdown
     assert "alert_to_hazard" in names(run, "md") == names(run, "csv")
     for file in (run.path / "report" / "tables").glob("*.md"):
@@ -46,14 +46,14 @@ def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
 
 
 def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
-    """When a run ends stands in its golden run, which only the target's manifest can read."""
+    """Without the target's manifest, nothing can read when a run ends."""
     tables_panel(ReportedRun.open(run, None))
     assert "propagation" in names(run, "csv")
     assert "alert_to_hazard" not in names(run, "csv")
 
 
 def test_files_are_the_same_each_time(run: RunFolder) -> None:
-    """CSV and Markdown of each table, the same bytes when written again."""
+    """CSV and Markdown of each table have the same bytes when written again."""
     contents = []
     for _ in range(2):
         tables_panel(ReportedRun.open(run, HERE))
@@ -63,7 +63,7 @@ def test_files_are_the_same_each_time(run: RunFolder) -> None:
 
 
 def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
-    """One that the fault-free run raises is named wherever alerts are counted, with how it drove."""
+    """Wherever alerts are counted, those of the fault-free run are named with its conditions."""
     golden = run.path / "golden" / "S1"
     drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
@@ -80,7 +80,7 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
 def test_alerts_are_told_only_of_a_target_that_has_some(run: RunFolder, alerts: list[str]) -> None:
-    """The report of a target without alerts explains no column that it does not have."""
+    """The report of a target without alerts explains no alert columns."""
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
     markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
