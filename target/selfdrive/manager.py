@@ -8,13 +8,13 @@ from selfdrive.controls.radard import Radard
 from selfdrive.messages import CameraView, CanFrame, RadarState
 from selfdrive.visiond.visiond import Visiond
 
-# First step of the control loop: the original's process is up 0.1 s after the car. Its first cycle
-# finds no CAN frames yet.
+# First step of the control loop: the original's process starts 0.1 s after the car. Its first cycle has no
+# CAN frames.
 START_STEP = 11
 
 
 class Manager:
-    """All of the controller. One `step` for each 10 ms of the car's time."""
+    """The whole controller. One `step` per 10 ms of the car's time."""
 
     def __init__(self, car: CarInterface, radar: RadarInterface, visiond: Visiond) -> None:
         self._radar = radar

@@ -1,9 +1,9 @@
-"""What the parts of the controller tell each other.
+"""The messages between the parts of the controller.
 
 Every message is a plain slotted record in SI units and radians. Left is positive for lateral
-positions, angles and steering torque. Messages are created anew by their publisher and never
-changed by a receiver; they are not frozen only because a frozen record costs four times as much
-to create, and thousands are created in every run.
+positions, angles and steering torque. Publishers create new messages, and receivers never change them.
+They are not frozen because creating a frozen record takes four times as long, and a run creates
+thousands.
 """
 
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ class CanFrame(NamedTuple):
 
 @dataclass(slots=True)
 class ButtonEvent:
-    """A cruise button that was pressed or released: 'accel', 'decel', 'cancel' or 'setting'."""
+    """A cruise button press or release: 'accel', 'decel', 'cancel' or 'setting'."""
 
     type: str
     pressed: bool
@@ -67,7 +67,7 @@ class CarState:
 
 @dataclass(slots=True)
 class RadarPoint:
-    """One radar track as the radar interface read it."""
+    """One radar track as read by the radar interface."""
 
     track_id: int
     d_rel: float  # m, from the radar's mounting point
@@ -87,14 +87,14 @@ class RadarData:
 class CameraView(NamedTuple):
     """What the camera sees at one moment, as geometry in the car's frame (m, left positive).
 
-    `picture` is what a detector is to work on, 8 bit grey, rows x columns; None where the run has no
-    pictures. Detectors that have it use nothing else of the view.
+    `picture` is the detector's input, 8 bit grey, rows x columns; None if the run has no pictures. Detectors
+    that use it use nothing else of the view.
     """
 
     left_lane_y: float  # at the car
     right_lane_y: float  # at the car
     path_y: float  # middle of the lane, at the car
-    bend: tuple[float, ...]  # how far the lines have moved sideways at 0, 1, ... 49 m ahead
+    bend: tuple[float, ...]  # sideways shift of the lines at 0, 1, ... 49 m ahead
     lead_d_rel: float  # from the front bumper
     picture: np.ndarray | None = None
 
@@ -103,7 +103,7 @@ class CameraView(NamedTuple):
 class PathData:
     """A line ahead of the car: lateral positions (m, left positive) at 0, 1, ... 49 m.
 
-    Where it was not seen `valid` is False, `prob` 0, and the points are where it is expected.
+    If it was not seen, `valid` is False, `prob` is 0, and the points are the expected ones.
     """
 
     points: tuple[float, ...]
@@ -114,7 +114,7 @@ class PathData:
 
 @dataclass(slots=True)
 class LeadVision:
-    """The lead vehicle as the camera sees it; `d_rel` in m from the front bumper, `std` in m."""
+    """The lead vehicle seen by the camera; `d_rel` in m from the front bumper, `std` in m."""
 
     d_rel: float
     prob: float
@@ -123,7 +123,7 @@ class LeadVision:
 
 @dataclass(slots=True)
 class ModelData:
-    """What the vision model publishes at 20 Hz."""
+    """The vision model's output at 20 Hz."""
 
     t: float
     path: PathData
@@ -134,7 +134,7 @@ class ModelData:
 
 @dataclass(slots=True)
 class LeadData:
-    """A lead vehicle as radard publishes it; all zero when `status` is False."""
+    """A lead vehicle published by radard; all zero if `status` is False."""
 
     status: bool = False
     d_rel: float = 0.0  # m
@@ -146,7 +146,7 @@ class LeadData:
     v_lat: float = 0.0  # m/s
     v_lead_k: float = 0.0  # m/s, filtered
     a_lead_k: float = 0.0  # m/s^2, filtered
-    fcw: bool = False  # fused with the camera often enough to warn of it
+    fcw: bool = False  # fused with the camera often enough for a warning
 
 
 @dataclass(slots=True)
@@ -170,7 +170,7 @@ class Actuators:
 
 @dataclass(slots=True)
 class CarControl:
-    """The controller's demand, handed to the car interface every cycle."""
+    """The controller's demand, passed to the car interface every cycle."""
 
     enabled: bool = False
     actuators: Actuators = field(default_factory=Actuators)
@@ -201,7 +201,7 @@ class Plan:
 
 @dataclass(slots=True)
 class ControlsState:
-    """What controlsd tells the rest of the system and the log, every cycle."""
+    """The controller's state for other parts and the log, every cycle."""
 
     t: float = 0.0
     state: str = "disabled"  # disabled, pre_enabled, enabled, soft_disabling

@@ -15,13 +15,13 @@ def half_byte_sum(data: bytes) -> int:
 
 
 def checksum_base(address: int) -> int:
-    """What the address contributes: address, payload and checksum add up to 8 modulo 16, by half bytes."""
+    """The address's contribution: address, payload and checksum add up to 8 modulo 16, by half bytes."""
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
 def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
-    """A payload as one big-endian number, of the nearest raw values of the fields, which are held at their
-    ends; not-a-number becomes raw 0."""
+    """A payload as one big-endian number, from the nearest raw values of the fields, clipped to their range;
+    not-a-number becomes raw 0."""
     word = 0
     for (_, shift, mask, sign_bit, factor, offset), value in zip(fields, values, strict=True):
         scaled = (value - offset) / factor
@@ -49,7 +49,7 @@ class Packer:
         self._checksum_base = checksum_base(message.address)
         self._values: tuple[float, ...] | None = None
         self._word = -1
-        self._frames: dict[int, CanFrame] = {}  # of the word, by counter: values often stay
+        self._frames: dict[int, CanFrame] = {}  # by counter, of one word: values often stay
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
         """The frame for physical `values`; `counter` counts the frames sent of this message."""

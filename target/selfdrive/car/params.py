@@ -1,4 +1,4 @@
-"""What a controller has to know of the car it drives."""
+"""What a controller needs to know about its car."""
 
 from dataclasses import dataclass
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 class CarParams:
     """Physical data and tuning of one car model. Tables are (breakpoints, values).
 
-    Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the
-    lateral PI loop are per radian of steering-wheel angle, `steer_kf` also per (m/s)^2: what turns the
-    wheels straight again grows with lateral acceleration.
+    Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the lateral PI
+    loop are per radian of steering-wheel angle, `steer_kf` also per (m/s)^2, because the self-aligning torque
+    grows with lateral acceleration.
     """
 
     name: str
@@ -33,4 +33,4 @@ class CarParams:
     acceleration_per_output: float  # m/s^2 for an output of 1, divides the feedforward
     radar_offset: float  # m from the radar to the bumper reference
     steer_limit_alert: bool
-    start_acceleration: float = 0.5  # m/s^2, targeted while the brake is released to move off
+    start_acceleration: float = 0.5  # m/s^2, target while the brake is released to move off

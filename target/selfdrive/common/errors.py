@@ -1,4 +1,4 @@
-"""Errors that a user can mend."""
+"""Errors that a user can fix."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,7 +17,7 @@ class ConfigError(Exception):
 
 @contextmanager
 def writing(where: Path, *, expected: str, remedy: str) -> Iterator[None]:
-    """Makes what the file system refuses within it a ConfigError that names `where`."""
+    """Turn file system errors in its block into a ConfigError that names `where`."""
     try:
         yield
     except OSError as error:

@@ -1,13 +1,13 @@
-"""Piecewise linear tables on plain floats; an array library costs twenty times as much here."""
+"""Piecewise linear tables on plain floats; an array library is twenty times slower here."""
 
 from bisect import bisect_right
 from collections.abc import Sequence
 
 
 def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
-    """Value at `x` of the line through (xp, fp), held constant beyond its ends. `xp` ascends.
+    """Value at `x` of the line through (xp, fp), constant outside. `xp` ascends.
 
-    An `x` that is no number gives the first value; where `xp` repeats, the last of its values counts.
+    If `x` is NaN, the result is the first value; for equal `xp`, the last value counts.
     """
     if not x >= xp[0]:
         return fp[0]
@@ -19,7 +19,7 @@ def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
 
 
 def clip(x: float, lo: float, hi: float) -> float:
-    """`x` limited to lo..hi. A value that is no number becomes `hi`, as in the original."""
+    """`x` limited to lo..hi. NaN becomes `hi`, as in the original."""
     if not x < hi:
         return hi
     return x if x > lo else lo

@@ -1,11 +1,11 @@
-"""Kalman filters small enough for plain floats."""
+"""Small Kalman filters on plain floats."""
 
 
 class SteadyKalman:
-    """Two states, value and rate, of which the value is measured; fixed gains.
+    """Two states, value and rate, with measured value and fixed gains.
 
-    The innovation is taken against the last estimate, not against its prediction, as in the
-    original: x <- (A - K C) x + K z with A = [[1, dt], [0, 1]] and C = [1, 0].
+    The innovation uses the last estimate, not its prediction, as in the original: x <- (A - K C) x + K z with
+    A = [[1, dt], [0, 1]] and C = [1, 0].
     """
 
     __slots__ = ("dt", "gain_rate", "gain_value", "rate", "value")
@@ -26,7 +26,7 @@ class SteadyKalman:
 class DistanceFilter:
     """Distance and its rate from a distance measurement of known variance (covariance form).
 
-    Process noise is added at each prediction whatever the step, as in the original.
+    Each prediction adds the same process noise, whatever the step, as in the original.
     """
 
     __slots__ = ("p00", "p01", "p11", "q_distance", "q_rate", "rate", "value")
@@ -41,7 +41,7 @@ class DistanceFilter:
         self.q_rate = q_rate
 
     def restart(self, value: float, variance: float, rate_variance: float) -> None:
-        """Take `value` as it is, with no rate known."""
+        """Start from `value`, with unknown rate."""
         self.value = value
         self.rate = 0.0
         self.p00 = variance

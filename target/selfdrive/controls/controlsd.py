@@ -36,7 +36,7 @@ LEARN_EVERY, LEARN_AT = 5, 2  # cycles, angle offset learning at 20 Hz
 
 
 class Controlsd:
-    """The control loop. `state` and `plan` hold the newest ControlsState and Plan after each update."""
+    """The control loop. After each update, `state` and `plan` have the newest ControlsState and Plan."""
 
     def __init__(self, params: CarParams, car: CarInterface, fit: ModelFit) -> None:
         self._params = params
@@ -58,7 +58,7 @@ class Controlsd:
     ) -> list[CanFrame]:
         """Run one cycle at time `t` (s) and return the frames to send.
 
-        `radar_state` and `model` are the newest ones, however old; None before the first.
+        `radar_state` and `model` are the newest messages of any age; None before the first.
         """
         if self._frame == 0:
             self._alerts.add("startup", t)
@@ -84,7 +84,7 @@ class Controlsd:
 
     def _collect_events(self, car: CarState) -> tuple[Event, ...]:
         events = car.events + self.plan.events
-        # braking by foot with nothing to stop for: letting go of the pedal would start the car
+        # foot on the brake with nothing to stop for: releasing the pedal would start the car
         if car.brake_pressed and self.plan.v_target_future >= STARTING_TARGET_SPEED:
             events += (NO_TARGET,)
         return events
@@ -142,7 +142,7 @@ class Controlsd:
 
     def _publish(self, t: float, car: CarState, events: tuple[Event, ...]) -> ControlsState:
         machine, alerts = self._machine, self._alerts
-        return ControlsState(  # by position, which takes half the time
+        return ControlsState(  # positional arguments take half the time
             t,
             machine.state,
             machine.enabled,

@@ -1,4 +1,4 @@
-"""plannerd: how fast to go and where, from the leads, the set speed and the road."""
+"""plannerd: target speed and path, from the leads, the set speed and the road."""
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.conversions import KPH_TO_MS
@@ -13,15 +13,15 @@ from selfdrive.controls.lib.speed_smoother import smooth_speed
 from selfdrive.messages import CarState, ModelData, Plan, RadarState
 
 DT_PLAN = 0.2  # s, how far ahead the candidates are compared
-MAX_AGE = 0.5  # s, an older message counts as none
-AGE_ROUNDING = 1e-6  # s, keeps sums of 0.01 from deciding
+MAX_AGE = 0.5  # s, older messages are ignored
+AGE_ROUNDING = 1e-6  # s, so that sums of 0.01 do not decide
 
 MODEL_ERROR = Event("model_error", (NO_ENTRY, IMMEDIATE_DISABLE))
 RADAR_ERROR = Event("radar_error", (NO_ENTRY, IMMEDIATE_DISABLE))
 
 
 class Planner:
-    """Plans anew with each radar state (20 Hz) and interpolates in between (100 Hz)."""
+    """Replans with each radar state (20 Hz) and interpolates in between (100 Hz)."""
 
     def __init__(self, params: CarParams, fit: ModelFit) -> None:
         self._params = params
@@ -34,7 +34,7 @@ class Planner:
         self._fcw = False
         self._source = "cruise"
         self._planned_at = 0.0  # s
-        # speed and acceleration: where the plan began, where it goes in 0.2 s, where it is now
+        # speed and acceleration: at the start of the plan, 0.2 s later, and now
         self._v_start = self._a_start = 0.0
         self._v_goal = self._a_goal = 0.0
         self._v_now = self._a_now = 0.0
@@ -42,7 +42,7 @@ class Planner:
         self._v_future = 0.0
 
     def take_model(self, v_ego: float, model: ModelData | None) -> bool:
-        """Update the path if the model message is a new one; returns whether it was."""
+        """Update the path if the model message is new; returns whether it was."""
         if model is None or model is self._model:
             return False
         self._model = model
@@ -60,8 +60,8 @@ class Planner:
     ) -> Plan:
         """The plan for this cycle at time `t` (s).
 
-        `long_state` is the longitudinal control's state, `v_cruise` the set speed in km/h,
-        `slow_down` asks for a gentle deceleration as the driver is absent.
+        `long_state` is the longitudinal control's state, `v_cruise` the set speed in km/h; `slow_down`
+        requests a gentle deceleration because the driver is absent.
         """
         if radar is not None and radar is not self._radar:
             self._radar = radar
@@ -109,7 +109,7 @@ class Planner:
         self._v_cruise = max(v, 0.0)
 
     def _follow_car(self, car: CarState, long_state: str) -> None:
-        """Not in closed loop: the plan starts from where the car is."""
+        """Not in closed loop: the plan starts at the car's state."""
         if long_state == STARTING:
             v, a = MIN_CAN_SPEED, self._params.start_acceleration
         else:

@@ -1,4 +1,4 @@
-"""radard: from radar tracks and the camera's lead to the leads to follow, 20 times a second."""
+"""radard: selects the leads from radar tracks and the camera's lead, 20 times a second."""
 
 from collections import deque
 
@@ -12,12 +12,12 @@ from selfdrive.controls.lib.vehicle_model import VehicleModel
 from selfdrive.controls.lib.vision_point import VisionPoint
 from selfdrive.messages import ControlsState, LeadData, ModelData, RadarData, RadarPoint, RadarState
 
-RADAR_DELAY = 0.1  # s from measuring to reporting
+RADAR_DELAY = 0.1  # s between measurement and report
 SPEED_HISTORY = 20  # cycles
 
 
 class Radard:
-    """Turns each complete radar cycle into a RadarState. All state of the tracks lives here."""
+    """Converts each complete radar cycle to a RadarState. All track state is here."""
 
     def __init__(self, params: CarParams, fit: ModelFit) -> None:
         self._radar_offset = params.radar_offset
@@ -27,7 +27,7 @@ class Radard:
         self._tracks: dict[int, Track] = {}
         self._model: ModelData | None = None
         self._cycle = 0
-        # as in the original the history starts with zeros: the car is taken to have stood before
+        # as in the original, the history starts with zeros, as if the car had been at rest
         self._speeds: deque[float] = deque([0.0] * SPEED_HISTORY, maxlen=SPEED_HISTORY)
         self._times: deque[float] = deque([0.0] * SPEED_HISTORY, maxlen=SPEED_HISTORY)
 
@@ -54,13 +54,13 @@ class Radard:
         self._vision.update(model.lead)
 
     def _likely_path(self, controls: ControlsState) -> Curve:
-        """The path to follow while in control, else where the steering wheel points."""
+        """The path to follow while in control, else the steering wheel's."""
         if controls.active and not controls.steer_override:
             return model_curve(self._path.d_poly)
         return steering_curve(self._vehicle.curvature(controls.steering_angle, controls.v_ego))
 
     def _track(self, points: tuple[RadarPoint, ...], path: Curve, v_ego: float, driver_steers: bool) -> None:
-        """Carry tracks on, start new ones, drop those the radar no longer reports."""
+        """Continue tracks, start new ones, drop those that the radar no longer reports."""
         tracks = {}
         for point in points:
             d_rel = point.d_rel + self._radar_offset

@@ -1,4 +1,4 @@
-"""The car's actuators: what they take from the frames the controller sends."""
+"""The car's actuators: decode the controller's frames."""
 
 from collections.abc import Sequence
 
@@ -7,7 +7,7 @@ from selfdrive.can.parser import CanParser
 from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, COMMAND_MESSAGES, STEER_FULL_COUNTS
 from selfdrive.messages import Actuators, CanFrame
 
-# What the pedal interceptor makes of its counts; 256 is the gas pedal's full travel.
+# The pedal interceptor's conversion of counts; 256 is the gas pedal's full travel.
 _PEDAL_SLOPE = 0.253984064
 _PEDAL_OFFSET = -83.3
 _PEDAL_FULL = 256.0

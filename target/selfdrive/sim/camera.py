@@ -1,4 +1,4 @@
-"""The camera: where lane and lead are, seen from the car, 20 times a second."""
+"""The camera: positions of lane and lead seen from the car, 20 times a second."""
 
 from math import tan
 
@@ -13,7 +13,7 @@ _AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
 
 
 class Camera:
-    """Looks along the car: the lane moves in view as the car drifts, turns, or the road bends."""
+    """Looks along the car: the lane moves in view as the car drifts or turns, or as the road bends."""
 
     def __init__(self, road: Road) -> None:
         self._road = road

@@ -1,7 +1,7 @@
 """Compiles the slowest steps of a run's arithmetic: `python -m selfdrive.sim.compile_helpers`.
 
-Installing the harness does the same. Runs that are told of the folder give the same bytes in less time. Exit
-code 2 where there is no C compiler. It needs nothing but Python.
+Installing the harness does the same. Runs that use the folder give the same bytes in less time. Exit code 2
+without a C compiler. Needs only Python.
 """
 
 import argparse
@@ -21,8 +21,8 @@ from selfdrive.common.errors import ConfigError, writing
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = PACKAGE.with_name("compiled")
-# IEEE arithmetic as it is written: no fused multiply-add, no other order. Without symbols a library has the
-# same bytes wherever it is compiled.
+# IEEE arithmetic as written: no fused multiply-add, no reordering. Without symbols, a library has the same
+# bytes wherever it is compiled.
 OPTIONS = (
     "-O3",
     "-ffp-contract=off",
@@ -39,7 +39,7 @@ EXIT_INPUT = 2
 
 
 def compiler() -> list[str]:
-    """The C compiler and its first options: CC, else cc, else that of the package ziglang; [] without any."""
+    """The C compiler and its first options: CC, else cc, else the package ziglang's; [] if there is none."""
     if os.environ.get("CC"):
         return shlex.split(os.environ["CC"])
     if shutil.which("cc"):
@@ -50,7 +50,7 @@ def compiler() -> list[str]:
 
 
 def compile_helpers(folder: Path) -> Iterator[Path]:
-    """Compile every C file of the package into `folder`, where nothing else stays. Raises ConfigError."""
+    """Compile every C file of the package into `folder` and remove other files. Raises ConfigError."""
     with writing(folder, expected="a folder for compiled helpers", remedy="choose another --out"):
         folder.mkdir(parents=True, exist_ok=True)
         sources = {compiled.file_name(source): source for source in sorted(PACKAGE.rglob("*.c"))}

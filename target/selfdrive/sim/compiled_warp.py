@@ -1,4 +1,4 @@
-"""The warp of a region in C, where that was compiled and gives OpenCV's bits."""
+"""Warps a region in compiled C, if available and equal to OpenCV to the bit."""
 
 import ctypes
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Warp = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
 
 
 def build_warp() -> tuple[Warp, str]:
-    """What does as `warp` does, in C where it may, and which compiled code it calculates with, if any."""
+    """A function like `warp`, in C if possible, and the compiled code that it uses, if any."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library):
         return warp, ""
@@ -26,7 +26,7 @@ def build_warp() -> tuple[Warp, str]:
 
 
 class CompiledWarp:
-    """Does what `warp` does: `library` is `warp.c`, compiled."""
+    """Same as `warp`, with `library`, compiled `warp.c`."""
 
     def __init__(self, library: compiled.Library) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -37,7 +37,7 @@ class CompiledWarp:
     def __call__(self, source: np.ndarray, matrix: np.ndarray, region: Region) -> np.ndarray:
         """The region of `source`, warped by `matrix`."""
         rows, width = source.shape
-        # What is left of a row beyond whole vectors OpenCV calculates in another way.
+        # OpenCV computes the rest of a row after whole vectors differently.
         if source.dtype != np.uint8 or matrix.dtype != float or region.right > width // VECTOR * VECTOR:
             return warp(source, matrix, region)
         source, matrix = np.ascontiguousarray(source), np.ascontiguousarray(matrix)
@@ -48,9 +48,9 @@ class CompiledWarp:
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code has OpenCV's bits: an older one, or one without fused sums, calculates otherwise.
+    """Whether compiled code has OpenCV's bits: older versions, or those without fused sums, differ.
 
-    A noisy picture so large that places in it are coarse shows each other way to round.
+    A noisy picture, large enough for coarse positions, reveals any other rounding.
     """
     noise = (np.arange(48 * 8192) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 8192)
     matrix = np.array([(1.7, 31.3, 3007.3), (1.3e-3, 0.93, 0.4), (3.1e-5, 1.7e-4, 1.1)])

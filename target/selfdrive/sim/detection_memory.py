@@ -1,9 +1,9 @@
-"""What detectors saw in pictures, kept in a file that all runs share.
+"""Results of detectors by picture, in a file that all runs share.
 
-The file is a table of fixed size. An entry has the digest of all that a detection follows from, a check of
-its own, and numbers. Processes read and write it at the same time without a lock: who finds an entry damaged,
-half written or overwritten by another one does the work again, and writes what every other would write.
-Without such a file, on a full disk for instance, nothing is remembered.
+The file is a table of fixed size. An entry has the digest of all inputs of a detection, a checksum, and
+numbers. Processes read and write it concurrently without a lock: a process that finds an entry damaged,
+incomplete or overwritten repeats the work and writes the same entry. If the file cannot be created, for
+example on a full disk, nothing is remembered.
 """
 
 import os
@@ -17,8 +17,8 @@ MOST = 20  # numbers in an entry
 KEY, CHECK = 16, 8  # bytes
 _VALUE = struct.Struct(f"<q{MOST}d")
 ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
-WAYS = 8  # entries of a bucket, in any of which one may lie
-BUCKETS = 1 << 19  # 2^22 entries, those of two large campaigns: 805 MB once all of them are in use
+WAYS = 8  # entries of a bucket; a key may be in any of them
+BUCKETS = 1 << 19  # 2^22 entries, enough for two large campaigns: 805 MB when all are used
 _BUCKET = WAYS * ENTRY
 
 
@@ -29,7 +29,7 @@ class DetectionMemory:
         self._file = _opened(cache / FILE)
 
     def recall(self, key: bytes) -> tuple[float, ...] | None:
-        """The numbers kept under a key of KEY bytes; None where there are none."""
+        """The numbers stored under a key of KEY bytes; None if there are none."""
         bucket = self._bucket(key)
         at = _place(bucket, key)
         if at is None:
@@ -41,7 +41,7 @@ class DetectionMemory:
         return tuple(numbers[:count])
 
     def keep(self, key: bytes, numbers: Sequence[float]) -> None:
-        """Keep at most MOST numbers under a key; in a full bucket they take another entry's place."""
+        """Store at most MOST numbers under a key; in a full bucket they replace another entry."""
         if self._file is None:
             return
         bucket = self._bucket(key)
@@ -57,7 +57,7 @@ class DetectionMemory:
             self._file = None
 
     def _bucket(self, key: bytes) -> bytes:
-        """The bytes of the bucket that a key belongs to; empty entries where there are none."""
+        """The bytes of a key's bucket; empty entries if there are none."""
         bucket = b""
         if self._file is not None:
             try:
@@ -68,10 +68,10 @@ class DetectionMemory:
 
 
 def _opened(path: Path):
-    """The table's file, made where it is missing; None where it cannot be had.
+    """The table's file, created if missing; None if that fails.
 
-    It is read and written by position, not mapped: a disk that is full then is an error, not a signal, and
-    processes that share the open file after a fork do not move each other's place in it.
+    It is read and written by position, not mapped, so a full disk is an error, not a signal, and processes
+    that share the open file after a fork do not move each other's position.
     """
     if not hasattr(os, "pwrite"):
         return None
@@ -79,7 +79,7 @@ def _opened(path: Path):
         path.parent.mkdir(parents=True, exist_ok=True)
         file = os.fdopen(os.open(path, os.O_RDWR | os.O_CREAT, 0o644), "r+b", buffering=0)
         if os.fstat(file.fileno()).st_size < BUCKETS * _BUCKET:
-            file.truncate(BUCKETS * _BUCKET)  # nothing but a hole, until entries are written
+            file.truncate(BUCKETS * _BUCKET)  # sparse until entries are written
     except OSError:
         return None
     return file
@@ -90,7 +90,7 @@ def _start(key: bytes) -> int:
 
 
 def _place(bucket: bytes, key: bytes) -> int | None:
-    """Where in the bucket the entry with this key begins."""
+    """The position of this key's entry in the bucket."""
     for at in range(0, _BUCKET, ENTRY):
         if bucket[at : at + KEY] == key:
             return at

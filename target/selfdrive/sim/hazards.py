@@ -1,4 +1,4 @@
-"""The three hazards, checked on the ground truth of every step; each counts once."""
+"""The three hazards, checked on ground truth at every step; each is recorded once."""
 
 from selfdrive.sim.camera import LANE_WIDTH
 from selfdrive.sim.sensors import STANDSTILL_SPEED
@@ -7,7 +7,7 @@ from selfdrive.sim.truth import GroundTruth
 CAR_WIDTH = 1.8  # m
 OVERLAP_OFFSET = 0.5 * (LANE_WIDTH + CAR_WIDTH)  # m, half a lane and half a car
 FREE_DISTANCE = 100.0  # m
-LANE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m, beyond it a side of the car leaves the lane
+LANE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m, beyond this a side of the car leaves the lane
 
 
 class HazardMonitor:

@@ -1,9 +1,9 @@
-"""The pictures a run drives through: a rendered road, or a folder of a user's frames. Grey, and read-only.
+"""The frames of a run: a rendered road, or a folder of user frames. Grey and
+read-only.
 
-Pictures are made or decoded once and kept in a cache folder, in a file whose name is the digest of all they
-follow from. Processes map that file and so share its memory. A file appears there whole or not at all, and
-each frame is compared with its check when it is first looked at. Without a cache, or with one that cannot be
-written, each process makes its own.
+Frames are made or decoded once and cached in a file named by the digest of all inputs.
+Processes map that file and share its memory. Files appear atomically, and each frame
+is checked on first use. Without a writable cache, each process makes its own frames.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,9 +25,9 @@ from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.vision import Pictures
 
-FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, after which it repeats itself without a seam
-SPACING = PERIODS * DASH_PERIOD / FRAMES  # m from frame to frame: 1.342, which is 20 a second at 60 mph
-CHECK = 8  # bytes; one of each frame, then a digest of these and of the header, end the file
+FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, which repeats seamlessly
+SPACING = PERIODS * DASH_PERIOD / FRAMES  # m between frames: 1.342, which is 20 per second at 60 mph
+CHECK = 8  # bytes; the file ends with one per frame, then a digest of these and of the header
 DIGEST = sha256().digest_size
 
 Made = Iterator[np.ndarray]
@@ -35,10 +35,10 @@ Made = Iterator[np.ndarray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageLibrary:
-    """Frames in the order they were taken, by `model`, each `spacing` m or, where that is None, 1 / `fps` s
-    after the one before; the first follows the last.
+    """Frames in order, taken by `model`, each `spacing` m (or, if None, 1 / `fps` s) after the previous; the
+    first follows the last.
 
-    `digest` stands for all that the frames follow from.
+    `digest` covers all inputs of the frames.
     """
 
     name: str
@@ -58,10 +58,10 @@ class ImageLibrary:
 
 
 class Frames:
-    """Frames (rows x width, uint8) by number, read-only; those of a file are verified when first asked for.
+    """Frames (rows x width, uint8) by number, read-only; those from a file are verified on first use.
 
-    `checks` are joined, one of each frame; frames in memory have none. `mend` makes the frames anew if one is
-    not what was written.
+    `checks` are joined, one per frame; frames in memory have none. `mend` recreates all frames if one is
+    damaged.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Frames:
         return self._frames[number]
 
     def _verify(self, number: int) -> None:
-        """Compare a frame with its check; where it is another one, all frames are made anew."""
+        """Verify a frame; if it is damaged, recreate all frames."""
         expected = self._checks[number * CHECK : (number + 1) * CHECK]
         if _check(self._frames[number], self._weights) == expected:
             self._sound[number] = True
@@ -97,7 +97,7 @@ class Frames:
 
 
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
-    """The pictures a run asks for, from the cache where they are there. ConfigError for unusable frames."""
+    """The frames that a run requests, cached if possible. ConfigError for unusable frames."""
     cv2.setNumThreads(1)
     if pictures.frames is not None:
         return _own(ImageFolder(pictures.frames), pictures.cache)
@@ -134,10 +134,10 @@ def _own(folder: ImageFolder, cache: Path | None) -> ImageLibrary:
 
 
 def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Made]) -> Frames:
-    """The frames `make` gives, of this shape (number, rows, width).
+    """The frames from `make`, of this shape (number, rows, width).
 
-    They are mapped from a file of the cache that is made where it is missing or damaged, by any number of
-    processes at the same time. Without a cache that can be written the frames are made in memory.
+    They are mapped from a cache file, which is created if missing or damaged, by any number of processes at
+    once. Without a writable cache, the frames are made in memory.
     """
 
     def in_memory() -> Frames:
@@ -148,7 +148,7 @@ def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: C
         return Frames(frames)
 
     def anew() -> Frames:
-        """In a file that is written now; whoever cannot rely on that one either keeps them in memory."""
+        """In a newly written file, or in memory if that file is not reliable."""
         try:
             cache.mkdir(parents=True, exist_ok=True)
             _write(path, shape, make())
@@ -168,7 +168,7 @@ def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: C
 
 
 def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
-    """Write all frames under another name, then give the file its own."""
+    """Write all frames under a temporary name, then rename the file."""
     with NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as file:
         part = Path(file.name)
         try:
@@ -186,8 +186,8 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
 
 
 def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes] | None:
-    """The frames in that file and their checks; None where there is no such file, or not a whole one."""
-    if path.is_fifo():  # nobody waits for what a pipe may say
+    """The frames in that file and their checks; None if it is missing or incomplete."""
+    if path.is_fifo():  # do not wait for a pipe
         return None
     header = _header(shape)
     end = len(header) + _size(shape)
@@ -204,14 +204,14 @@ def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes]
 
 
 def _header(shape: tuple[int, int, int]) -> bytes:
-    """How NumPy's files of such an array begin."""
+    """The header of NumPy's files for such an array."""
     header = BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "|u1", "fortran_order": False, "shape": shape})
     return header.getvalue()
 
 
 def _seal(shape: tuple[int, int, int], checks: bytes) -> bytes:
-    """What ends a file whose frames have these checks."""
+    """The end of a file whose frames have these checks."""
     return sha256(_header(shape) + checks).digest()
 
 
@@ -222,10 +222,10 @@ def _weights(shape: tuple[int, int, int]) -> np.ndarray:
 
 
 def _check(frame: np.ndarray, weights: np.ndarray) -> bytes:
-    """Tells a frame from a damaged one: a weighted sum of its words, in a fifth of the time of SHA-256.
+    """A weighted sum of a frame's words, which detects damage in a fifth of the time of SHA-256.
 
-    One other word is always noticed; several are missed once in 2^32 times, as high halves count in low ones.
-    """
+    One changed word is always detected; several are missed once in 2^32 times, because high halves count in
+    low ones."""
     data = frame.reshape(-1)
     if data.size % CHECK:
         data = np.concatenate((data, np.zeros(-data.size % CHECK, np.uint8)))

@@ -1,14 +1,14 @@
-"""How the car moves sideways: torque turns the steering wheel, tyres turn the car.
+"""Lateral motion: torque turns the steering wheel, tyres turn the car.
 
-Steering: `J w' = T u - c w - trail * F_front / ratio`. `u` is the commanded torque (1 is all the
-EPS gives), `F_front` the lateral force of the front tyres, which pulls the wheel straight. The
-column is dominated by its damping (motor friction, gearing, the EPS' own return damping), as LKAS
-actuators are: from straight ahead full torque turns the wheel by half a radian a second, and at speed
-it holds 2.8 m/s^2 of lateral acceleration. With the controller's loop around it, the wheel answers
-a demand in about 0.1 s, the actuation delay the path planner assumes.
+Steering: `J w' = T u - c w - trail * F_front / ratio`. `u` is the commanded torque (1 is the EPS's maximum),
+`F_front` the lateral force of the front tyres, which straightens the wheel. Damping dominates the column
+(motor friction, gearing, the EPS's own return damping), as in LKAS actuators: from straight ahead full torque
+turns the wheel by half a radian per second, and at speed it holds 2.8 m/s^2 of lateral acceleration. With the
+controller's loop around it, the wheel follows a demand in about 0.1 s, the actuation delay that the path
+planner assumes.
 
-Car: linear bicycle model in lateral speed and yaw rate, advanced by implicit Euler because its
-poles run away as 1/speed; at walking pace it becomes the kinematic model.
+Car: linear bicycle model in lateral speed and yaw rate, advanced by implicit Euler because its poles diverge
+as 1/speed; at walking pace it becomes the kinematic model.
 """
 
 from math import cos, sin
@@ -23,12 +23,12 @@ COLUMN_INERTIA = 0.1  # kg m^2, wheel, column and motor
 COLUMN_DAMPING = 20.0  # N m s/rad
 TRAIL = 0.053  # m, caster and pneumatic trail
 LARGEST_ANGLE = 8.7  # rad, mechanical stop
-CREEP = 0.1  # m/s; below this the tyres take no side force
-NEAREST_TO_CENTRE = 0.1  # of a bend's radius; a car astray may reach its centre, where `along` has no meaning
+CREEP = 0.1  # m/s; tyres take no side force below this
+NEAREST_TO_CENTRE = 0.1  # of a bend's radius; a stray car may reach its centre, where `along` is undefined
 
 
 class Lateral(Protocol):
-    """Sideways motion: place in the lane (m, rad), and what the steering wheel does (rad, rad/s)."""
+    """Lateral motion: position in the lane (m, rad), and steering wheel state (rad, rad/s)."""
 
     offset: float
     heading: float
@@ -40,7 +40,7 @@ class Lateral(Protocol):
 
 
 class LateralDynamics:
-    """Steering and sideways motion; `offset` (m) and `heading` (rad) are relative to the lane's middle."""
+    """Steering and lateral motion; `offset` (m) and `heading` (rad) are relative to the lane centre."""
 
     def __init__(self, car: CarParams, offset: float = 0.0) -> None:
         self.offset = offset

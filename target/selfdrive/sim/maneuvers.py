@@ -1,7 +1,7 @@
 """Runs all maneuvers and plots them on one page: `python -m selfdrive.sim.maneuvers --out DIR [NAME...]`.
 
-Writes DIR/index.html, which needs no other file. With --references the traces of that folder lie beneath the
-runs of the same name, and the page says which are within tolerance. Exit code 2 for wrong input.
+Writes DIR/index.html, which is self-contained. With --references, traces of the same name from that folder
+are drawn below the runs, and the page lists which are within tolerance. Exit code 2 for invalid input.
 """
 
 import argparse
@@ -50,7 +50,7 @@ def _maneuver(run: runs.Run, reference: Reference | None, tolerances: Tolerances
 
 
 def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scenario]:
-    """What is to be run, by name. Of all, those whose road the plant does not know are left out."""
+    """The scenarios to run, by name. By default all whose road the plant supports."""
     names = options.names or _all_names(options.scenarios, known)
     scenarios = {}
     for name in names:

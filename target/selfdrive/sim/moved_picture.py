@@ -1,8 +1,8 @@
-"""How the camera's frame looks from elsewhere on the road.
+"""The camera's frame as seen from elsewhere on the road.
 
-A frame was taken in the lane's middle, along the road. Seen from `offset` m further left and turned by
-`heading`, the ground moves by a homography that follows from the camera's geometry: exact for all that lies
-on the road. What is above the horizon only pans. Where the frame ends, its last pixel is repeated.
+A frame was taken in the lane centre, along the road. Seen from `offset` m further left and turned by
+`heading`, the ground moves by a homography from the camera's geometry, which is exact for everything on the
+road. Parts above the horizon only pan. Outside the frame, its last pixel is repeated.
 """
 
 from math import tan
@@ -15,18 +15,18 @@ from selfdrive.sim.compiled_warp import build_warp
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan, picture_to_car
 
-# Poses are rounded to these, less than a detector can tell: equal poses give equal bytes.
+# Poses are rounded to these, below a detector's resolution: equal poses give equal bytes.
 OFFSET_STEP = 0.004  # m
 HEADING_STEP = 0.00025  # rad
-SHIFT_DISTANCE = 10.0  # m ahead where a shift of the whole frame is right
+SHIFT_DISTANCE = 10.0  # m ahead where shifting the whole frame is exact
 CODED_METRES_PER_PIXEL = 0.03895
-CODED_REACH = 1.0  # m: further the picture never moves
+CODED_REACH = 1.0  # m: the largest shift of the picture
 
 
 class GroundView:
     """Moves frames to another place on the road by the ground's homography.
 
-    `calculated_by` tells which compiled code it calculates with, if any.
+    `calculated_by` identifies the compiled code in use, if any.
     """
 
     def __init__(self, model: CameraModel) -> None:
@@ -61,7 +61,7 @@ class GroundView:
 
 
 class ShiftedView:
-    """Moves frames sideways as a whole: how the paper makes the view follow the car."""
+    """Moves whole frames sideways, as the paper does to follow the car."""
 
     calculated_by = ""  # no compiled code
 
@@ -75,13 +75,13 @@ class ShiftedView:
 
 
 class CodedView:
-    """Moves frames sideways as a whole, as the paper's authors coded it: by the metres of another row than
-    the one in which their detector reads lines, so that it sees 64 % of the way. Heading is not seen."""
+    """Moves whole frames sideways, as the paper's authors coded it: scaled at a different row than the one
+    where their detector reads lines, so it sees 64 % of the way. Heading is ignored."""
 
     calculated_by = ""
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
-        """The frame as seen `offset` m further left (m); `heading` is of no account."""
+        """The frame as seen `offset` m further left (m); `heading` is ignored."""
         return _shifted(frame, round(min(max(offset, -CODED_REACH), CODED_REACH) / CODED_METRES_PER_PIXEL))
 
 
@@ -91,14 +91,14 @@ def _shifted(frame: Picture, columns: int) -> Picture:
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Of a matrix of three rows."""
+    """The inverse of a matrix with three rows."""
     a, b, c = matrix
     columns = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     return np.array(columns).T / dot(a, columns[0])
 
 
 def moved(frame: Picture, columns: int, region: Region) -> np.ndarray:
-    """The region of `frame` moved that far to the right. Where it ends, its last column is repeated."""
+    """The region of `frame` moved that far to the right. Outside it, its last column is repeated."""
     last = frame.shape[1] - 1
     left, right = (min(max(end - columns, 0), last) for end in (region.left, region.right - 1))
     there = frame[region.top : region.bottom, left : right + 1]

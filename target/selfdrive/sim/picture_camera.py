@@ -1,4 +1,4 @@
-"""The camera of a run with pictures: the library's frame, as it would look from where the car is."""
+"""The camera of a run with pictures: the library's frame as seen from the car's position."""
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
@@ -12,8 +12,8 @@ from selfdrive.sim.vision import GROUND, SHIFT
 class PictureCamera:
     """Takes the view's geometry from `geometry` and its picture from `library`.
 
-    `calculated_by` tells which compiled code moves frames, if any. `translation` says how these follow the
-    car: "ground" by the road's homography, "shift" and "as_coded" sideways as a whole.
+    `calculated_by` identifies the compiled code that moves frames, if any. `translation` is how frames follow
+    the car: "ground" by the road's homography, "shift" and "as_coded" by shifting sideways.
     """
 
     def __init__(self, geometry: Camera, library: ImageLibrary, translation: str) -> None:

@@ -1,4 +1,4 @@
-"""The standard plant: openpilot's longitudinal PC simulation, with a car that really steers."""
+"""The standard plant: openpilot's longitudinal PC simulation, with realistic steering."""
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.interp import interp
@@ -16,7 +16,7 @@ PEAK_POWER = 100_000.0  # W
 GAS_SLOPE = 3.33  # of the pedal's full travel
 BRAKE_FORCE = 10.0 * MASS
 BRAKE_SLOPE = 0.3
-BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s, above which power limits, not force
+BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power is the limit, not force
 CREEP_BP = (0.0, 1.5)  # m/s
 CREEP_V = (1.0, 0.0)  # m/s^2 that an idling automatic gearbox gives
 
@@ -31,14 +31,14 @@ def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
 
 
 class Plant:
-    """The host car, and what its sensors are shown of it.
+    """The host car and what its sensors receive.
 
-    `speed` never falls below 0; `position` is counted along the road; `lateral` has `offset`,
-    `heading`, `steer_angle` and `steer_rate`; the gearbox reports `gearbox_scale` times the speed.
+    `speed` is at least 0; `position` is measured along the road; `lateral` has `offset`, `heading`,
+    `steer_angle` and `steer_rate`; the gearbox reports `gearbox_scale` times the speed.
     """
 
     gearbox_scale = 1.0
-    mirrors = False  # whether what is left in the camera's picture is right for who sends what it shows
+    mirrors = False  # whether left in the camera's picture is right for the plant's messages
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed
@@ -64,9 +64,9 @@ class Plant:
         return d_rel / self.speed if self.speed > 0.0 else float("inf")
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
-        """What camera and radar can see: all there is."""
+        """What camera and radar can see: everything."""
         return truth
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """What the camera's pictures are taken of: likewise."""
+        """What the camera's pictures show: everything."""
         return truth

@@ -1,4 +1,4 @@
-"""Keeps what happens in a run, one row of channels for each step, and the alerts."""
+"""Records a run: one row of channels per step, and the alerts."""
 
 from array import array
 
@@ -8,8 +8,8 @@ from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, LeadData
 from selfdrive.sim.truth import GroundTruth
 
-# Alerts that count as the driver being warned, in the order of their bits in channel `alert`.
-# The last is a refusal to engage, which the original shows and its users counted, too.
+# Alerts that count as warning the driver, in the order of their bits in channel `alert`. The last is a
+# refusal to engage, which the original shows and its users also counted.
 COUNTED_ALERTS = (
     *("steer_saturated", "fcw", "can_error", "radar_error", "model_error"),
     "model_error_no_entry",
@@ -19,7 +19,7 @@ LONG_STATES = ("off", "pid", "stopping", "starting")
 _PLAN_SOURCE = {name: float(code) for code, name in enumerate(PLAN_SOURCES)}
 _LONG_STATE = {name: float(code) for code, name in enumerate(LONG_STATES)}
 
-# Ground truth and actuators, then what the controller perceives and wants. SI units, radians.
+# Ground truth and actuators, then the controller's perception and demands. SI units, radians.
 CHANNELS = (
     *("t", "v_ego", "a_ego", "d_rel", "v_rel", "v_lead", "hwt"),
     *("gas", "brake", "steer_torque", "steer_angle", "lateral_offset", "heading"),
@@ -30,8 +30,8 @@ CHANNELS = (
 INTEGER_CHANNELS = ("lead_status", "plan_source", "long_state", "engaged", "alert")
 
 _NO_LEAD = LeadData()
-_FOLD = 64 * len(CHANNELS)  # numbers that are kept by row before they go to their channels
-_ROOM = 4096  # rows that there is room for at first
+_FOLD = 64 * len(CHANNELS)  # numbers buffered by row before they are moved to channels
+_ROOM = 4096  # initial capacity in rows
 
 
 class Recorder:
@@ -41,14 +41,14 @@ class Recorder:
         self.alerts: list[tuple[str, float]] = []  # every time one is raised
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
-        self._rows = array("d")  # the newest ones, of which there is always one
-        self._table = np.empty((len(CHANNELS), _ROOM))  # those before, by channel, as they will be written
+        self._rows = array("d")  # the newest rows, at least one
+        self._table = np.empty((len(CHANNELS), _ROOM))  # earlier rows, by channel, as written
         self._folded = 0  # rows in the table
         self._shown: tuple[str, ...] = ()
         self._alert_bits = 0
 
     def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
-        """Add one row: the world, the commands it has felt, and the controller's newest messages."""
+        """Add one row: the world, the commands that it received, and the controller's newest messages."""
         state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
         lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
@@ -78,7 +78,7 @@ class Recorder:
         return dict(zip(CHANNELS, self._rows[-len(CHANNELS) :], strict=True))
 
     def trace(self) -> dict[str, np.ndarray]:
-        """Every channel's array. Rows that are added later do not change it."""
+        """Every channel's array. Later rows do not change it."""
         count = self._folded + len(self._rows) // len(CHANNELS)
         table = self._with_newest()[:, :count]
         return {
@@ -93,7 +93,7 @@ class Recorder:
         del self._rows[:]
 
     def _with_newest(self) -> np.ndarray:
-        """The table with the newest rows in it, a larger one where they need the room."""
+        """The table with the newest rows, enlarged if necessary."""
         newest = np.array(self._rows).reshape(-1, len(CHANNELS)).T
         table, end = self._table, self._folded + newest.shape[1]
         if end > table.shape[1]:

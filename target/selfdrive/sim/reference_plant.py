@@ -1,7 +1,7 @@
-"""The reference plant: openpilot v0.4.2's own PC simulation with its errors, to compare with its recordings.
+"""The reference plant: openpilot v0.4.2's own PC simulation with its errors, for comparison with recordings.
 
-It moves along the road as the standard plant does. Sideways, and in what it tells the controller, it
-is the original's crude stand-in for a car. No result about driving should be taken from it.
+Longitudinally it moves like the standard plant. Laterally, and in its messages to the controller, it is the
+original's crude model. Do not draw conclusions about driving from it.
 """
 
 from selfdrive.car.params import CarParams
@@ -12,14 +12,14 @@ from selfdrive.sim.truth import GroundTruth
 
 FULL_TORQUE_RATE = 0.1  # deg/s of the steering wheel, for a torque of 1
 ANGLE_PER_OFFSET = 0.1067  # deg of the steering wheel for a metre to the side
-OFFSET_CYCLE = 5  # steps, of which only the first moves the car sideways
+OFFSET_CYCLE = 5  # steps; only the first moves the car sideways
 FIRST_HEADWAY = 30.0  # s
 
 
 class CrudeLateral:
-    """Torque turns the steering wheel slowly; only while it turns does the car go sideways, at any speed.
+    """Torque turns the steering wheel slowly; the car moves sideways only while it turns, at any speed.
 
-    There is no heading, no bend, and no force that turns the wheel back.
+    There is no heading, no bend, and no self-aligning force.
     """
 
     heading = 0.0  # rad
@@ -44,12 +44,12 @@ class CrudeLateral:
 
 
 class ReferencePlant(Plant):
-    """The standard plant's longitudinal motion with the original's errors around it.
+    """The standard plant's longitudinal motion with the original's errors.
 
-    The gearbox sends km/h where m/s are meant. Lanes count right positive, where the controller counts left:
-    so the left one is sent as the right one, and pictures move to the other side. Without pictures, camera
-    and radar see a car in mid-lane wherever it is.
-    A distance ends at 0; headway time starts at 30 s and stays as it was while the car stands.
+    The gearbox sends km/h instead of m/s. Lanes count right positive, where the controller counts left
+    positive: so the left lane is sent as the right one, and pictures move to the other side. Without
+    pictures, camera and radar always see a car in mid-lane.
+    A distance ends at 0; headway time starts at 30 s and keeps its value while the car stands.
     """
 
     gearbox_scale = MS_TO_KPH
@@ -61,19 +61,19 @@ class ReferencePlant(Plant):
         self._headway = FIRST_HEADWAY
 
     def distance_to(self, position: float) -> float:
-        """As the standard plant's, but 0 where that is negative."""
+        """Like the standard plant's, but at least 0."""
         return max(super().distance_to(position), 0.0)
 
     def headway(self, d_rel: float) -> float:
-        """Headway time (s); at standstill that of the last step in which the car moved."""
+        """Headway time (s); at standstill the last value in motion."""
         if self.speed > 0.0:
             self._headway = d_rel / self.speed
         return self._headway
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
-        """The car's drift is kept from camera and radar."""
+        """Camera and radar do not see the car's drift."""
         return truth._replace(lateral_offset=0.0)
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """The car is as far on the other side."""
+        """The car is as far to the other side."""
         return truth._replace(lateral_offset=-truth.lateral_offset)

@@ -1,4 +1,4 @@
-"""A lane detector that looks up what it would see before it looks."""
+"""A lane detector that looks up earlier results."""
 
 import platform
 import sys
@@ -16,8 +16,8 @@ from selfdrive.sim.detection_memory import KEY, DetectionMemory
 from selfdrive.sim.picture import Picture
 from selfdrive.visiond.detector import LaneDetector, LaneLines, RoadLine
 
-# All files that decide what is seen in a picture of some key. Not visiond.py, which uses what was seen, and
-# not picture_camera.py, which says what picture it is: what these do shows in the key, or comes after.
+# All files that determine what is seen in a picture with a given key. visiond.py only uses the result, and
+# picture_camera.py's choice of picture is in the key, so both are left out.
 SEEING = (
     "common/array_math.py",
     "common/camera_model.py",
@@ -45,16 +45,16 @@ _NUMBERS = 9  # of three lines
 
 
 class StatedDetector(LaneDetector, Protocol):
-    """A detector whose lines follow from the picture and its `state` alone: all it remembers, as numbers."""
+    """A detector whose lines depend only on the picture and its `state`: all its memory, as numbers."""
 
     state: tuple[float, ...]
 
 
 class RememberingDetector:
-    """Sees what `detector` sees, also without the pixels where `memory` has what it saw.
+    """Sees what `detector` sees, without needing pixels if `memory` has the result.
 
-    The code that sees must see the same in the same picture at any time of a run. `made_of` tells the
-    detector from others that the same files describe: its name, its camera.
+    The detector must be deterministic in picture and state. `made_of` distinguishes detectors that the same
+    files describe: its name, its camera.
     """
 
     def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
@@ -62,11 +62,11 @@ class RememberingDetector:
         self._seeing = seeing_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in the view's picture. An array, of which nobody knows what it shows, is looked at."""
+        """The lines in the view's picture. Plain arrays, which have no key, are always examined."""
         picture, detector = view.picture, self._detector
         if not isinstance(picture, Picture):
             return detector.detect(view)
-        text = repr((picture.key, detector.state)).encode()  # a float's repr tells it from all others
+        text = repr((picture.key, detector.state)).encode()  # a float's repr is unique
         key = blake2b(self._seeing + text, digest_size=KEY).digest()
         kept = self._memory.recall(key)
         if kept is not None:
@@ -78,7 +78,7 @@ class RememberingDetector:
 
 
 def seeing_digest(root: Path) -> bytes:
-    """Stands for the code that sees, as it lies in the package at `root`, and for what it calculates with."""
+    """Digest of the detection code in the package at `root`, and of what it calculates with."""
     digest = sha256()
     calculator = sys.version, platform.machine(), cv2.__version__, cv2.getCPUFeaturesLine(), np.__version__
     digest.update(repr(calculator).encode())
@@ -89,7 +89,7 @@ def seeing_digest(root: Path) -> bytes:
 
 
 def _seeing(root: Path) -> Iterator[tuple[str, bytes]]:
-    """Names below `root` and contents of the files that see, always in the same order."""
+    """Names below `root` and contents of the detection code, in a fixed order."""
     for pattern in SEEING:
         for file in sorted(root.glob(pattern)):
             yield file.relative_to(root).as_posix(), file.read_bytes()

@@ -14,7 +14,7 @@ class Road:
         self._grade, self._curvature = grade, curvature
 
     def grade(self, t: float) -> float:
-        """What the slope takes from the car's acceleration at time `t` (s)."""
+        """The slope's effect on the car's acceleration at time `t` (s)."""
         return interp(t, *self._grade) if self._grade else 0.0
 
     def curvature(self, position: float) -> float:
@@ -22,7 +22,7 @@ class Road:
         return interp(position, *self._curvature) if self._curvature else 0.0
 
     def bend(self, position: float, length: int) -> tuple[float, ...] | None:
-        """How far the road leaves its tangent at 0, 1, ... `length` - 1 m ahead; None on a straight road."""
+        """The road's distance from its tangent at 0, 1, ... `length` - 1 m ahead; None on a straight road."""
         if self._curvature is None:
             return None
         sideways, direction, points = 0.0, 0.0, []
@@ -34,6 +34,6 @@ class Road:
         return tuple(points)
 
     def sideways(self, position: float, distance: float) -> float:
-        """How far (m) the road has left its tangent `distance` m ahead, to the nearest metre."""
+        """The road's distance (m) from its tangent `distance` m ahead, to the nearest metre."""
         points = self.bend(position, max(round(distance), 0) + 1)
         return points[-1] if points else 0.0

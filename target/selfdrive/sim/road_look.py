@@ -1,7 +1,7 @@
-"""What a rendered road looks like: paint, asphalt, shadows, other cars. Plain data, no drawing.
+"""The appearance of a rendered road: paint, asphalt, shadows, other cars. Data only.
 
-Tones are grey levels (0..255) as the camera's picture shows them; lengths in m; lateral positions are from
-the middle of the ego lane, left positive.
+Tones are grey levels (0..255) as the camera sees them; lengths in m; lateral positions are relative to the
+centre of the ego lane, left positive.
 """
 
 from dataclasses import dataclass, replace
@@ -12,9 +12,9 @@ SOLID, DASHED = "solid", "dashed"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paint:
-    """One line of paint. `wear` is the share of it that has flaked off, `fade` how far it sank into the road.
+    """One line of paint. `wear` is the share that has flaked off, `fade` its loss of contrast.
 
-    A `double` line is two strips with a gap of their own width, centred where the line is.
+    A `double` line is two strips with a gap of the same width, centred on the line.
     """
 
     tone: float = 218.0
@@ -22,9 +22,9 @@ class Paint:
     dashed: bool = False
     dash: float = DASH
     period: float = DASH_PERIOD
-    phase: float = 0.0  # where along the road a dash begins
+    phase: float = 0.0  # start of a dash along the road
     double: bool = False
-    yellow: bool = False  # for the picture in colour; its `tone` is grey as any
+    yellow: bool = False  # for colour pictures; its `tone` is grey
     wear: float = 0.06
     fade: float = 0.0  # 0 fresh .. 1 invisible
 
@@ -34,7 +34,7 @@ YELLOW_PAINT = Paint(tone=182.0, yellow=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherCar:
-    """A vehicle in the picture that keeps its place before the camera: its back at `x`, its middle at `y`."""
+    """A vehicle at a fixed place before the camera: its rear at `x`, its centre at `y`."""
 
     x: float
     y: float
@@ -45,10 +45,10 @@ class OtherCar:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Look:
-    """All that may vary between two roads. The defaults are a clean highway in daylight.
+    """All variations between roads. The defaults are a clean highway in daylight.
 
-    `left` and `right` bound the ego lane, `far_left` and `far_right` the lanes beside it; None is no line.
-    The shoulder begins beyond the far lines, the verge beyond the shoulder.
+    `left` and `right` bound the ego lane, `far_left` and `far_right` the adjacent lanes; None is no line. The
+    shoulder begins outside the far lines, the verge outside the shoulder.
     """
 
     lane_width: float = 3.7
@@ -60,20 +60,20 @@ class Look:
     asphalt: float = 97.0
     grain: float = 4.0  # standard deviation of its fine texture (grey levels)
     mottle: float = 3.0  # of its slow changes, over metres
-    tracks: float = 5.0  # how much darker the wheels have made it
+    tracks: float = 5.0  # darkening in the wheel tracks
     shoulder: float = 88.0
     shoulder_width: float = 2.6
     verge: float = 78.0
     kerb: float | None = None  # tone of a kerb between shoulder and verge
-    # what lies on it, in pieces for 100 m of road
+    # flaws per 100 m of road
     patches: float = 1.0
     cracks: float = 2.0
     seams: float = 0.0  # tar seams that run along the road
     joints: float | None = None  # m between the joints across a concrete road
     joint_tone: float = -30.0  # of patches, cracks, seams and joints against the ground
     # light
-    shadows: float = 0.04  # share of the road that trees shade
-    shadow_depth: float = 0.3  # how much of the light they take
+    shadows: float = 0.04  # share of the road in tree shadows
+    shadow_depth: float = 0.3  # share of light lost in shadows
     sky: float = 222.0
     trees: float = 72.0
     exposure: float = 1.0  # factor on all tones

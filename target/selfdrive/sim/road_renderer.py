@@ -1,7 +1,7 @@
-"""Pictures of a straight road from anywhere on it: what the camera sees, and where the lines truly are.
+"""Renders a straight road from any position: the camera's picture, and the true positions of the lines.
 
 The road is painted once, from above (`road_texture`). A picture is that strip seen through the camera: each
-band of its rows takes it from a copy just coarse enough for its distance, so the far road does not flicker.
+band of rows uses a copy of suitable coarseness, so that the far road does not flicker.
 """
 
 from dataclasses import dataclass
@@ -17,10 +17,10 @@ from selfdrive.sim.lead_picture import draw_car, draw_lead, tinted
 from selfdrive.sim.road_look import Look, standard_look
 from selfdrive.sim.road_texture import Strip, paint_strip
 
-BAND_RATIO = 1.4  # how much further below the horizon a band of rows ends than it begins
-TREE_HEIGHT = 0.05  # of the focal length: how high trees rise above the horizon
+BAND_RATIO = 1.4  # ratio of a band's end to its start, below the horizon
+TREE_HEIGHT = 0.05  # of the focal length: height of trees above the horizon
 LEAST_ROWS = 3  # of a band
-MARGIN = 2  # texels around what is seen that interpolation reads
+MARGIN = 2  # extra texels that interpolation reads
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,15 +38,15 @@ class Band:
 
 
 def first_road_row(model: CameraModel) -> int:
-    """The highest row of the picture that is all road."""
+    """The highest row of the picture that shows only road."""
     return max(0, ceil(model.horizon + 0.5))
 
 
 class RoadRenderer:
-    """Draws one road, through one camera. Equal arguments give equal pictures.
+    """Draws one road with one camera. Equal arguments give equal pictures.
 
-    `look` is how the road looks, or the standard look's marks, "solid" or "dashed". The strip of road repeats
-    itself after `periods` dash periods of 12.2 m.
+    `look` is the road's appearance, or the marks of the standard look, "solid" or "dashed". The strip of road
+    repeats after `periods` dash periods of 12.2 m.
     """
 
     def __init__(self, model: CameraModel, look: Look | str, seed: int, *, periods: int = 8) -> None:
@@ -73,7 +73,7 @@ class RoadRenderer:
     def colour(
         self, position: float, offset: float = 0.0, heading: float = 0.0, lead: float | None = None
     ) -> np.ndarray:
-        """The same in colour (uint8, rows x width x BGR), to show to people; with a car `lead` m ahead."""
+        """The same in colour (uint8, rows x width x BGR), for display; with a car `lead` m ahead."""
         picture = tinted(self.grey(position, offset, heading), self.model, self.look, offset, heading)
         if lead is not None:
             draw_lead(picture, self.model, lead, offset, heading)
@@ -87,7 +87,7 @@ class RoadRenderer:
         return ((half - offset) / cos(heading), slope), ((-half - offset) / cos(heading), slope)
 
     def _draw_far(self, picture: np.ndarray, heading: float) -> None:
-        """What is above the horizon: it only pans as the car turns."""
+        """Everything above the horizon, which only pans as the car turns."""
         rows, width = len(self._far), picture.shape[1]
         spare = self._far.shape[1] - width
         first = min(max(spare // 2 - pan(self.model, heading), 0), spare)
@@ -111,7 +111,7 @@ def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
 
 
 def pan(model: CameraModel, heading: float) -> int:
-    """How many pixels what is far away moves to the right as the car turns left by `heading` (rad)."""
+    """The shift to the right, in pixels, of distant objects as the car turns left by `heading` (rad)."""
     return round(model.fx * tan(heading) / cos(model.pitch))
 
 
@@ -140,7 +140,7 @@ def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
 
 
 def _draw_band(picture: np.ndarray, band: Band, to_road: np.ndarray) -> None:
-    """Draw the band's rows, seen from where `to_road` puts the car."""
+    """Draw the band's rows from the position `to_road`."""
     rows, width = band.last - band.first, picture.shape[1]
     matrix = product(product(band.to_texels, to_road), band.to_car)
     (columns, lines, scales) = product(matrix, _corners(width, rows)).tolist()

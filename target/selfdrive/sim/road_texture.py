@@ -1,7 +1,7 @@
-"""The road from above: a strip painted once per look, and coarser copies of it for what is further away.
+"""The road from above: a strip painted once per look, and coarser copies for the distance.
 
-A strip is an array (rows along the road, columns from left to right) of grey levels. It closes on itself: its
-last row is followed by its first.
+A strip is an array (rows along the road, columns from left to right) of grey levels. It is cyclic: its last
+row is followed by its first.
 """
 
 from dataclasses import dataclass
@@ -14,14 +14,14 @@ from selfdrive.common.array_math import each
 from selfdrive.common.ordered import total
 from selfdrive.sim.road_look import DASH_PERIOD, Look, Paint
 
-HALF_WIDTH = 12.0  # m from the lane's middle to the strip's edge
+HALF_WIDTH = 12.0  # m from the lane centre to the strip's edge
 ROWS_PER_PERIOD, COLUMNS = 400, 2400
 ROW_LENGTH, COLUMN_WIDTH = DASH_PERIOD / ROWS_PER_PERIOD, 2.0 * HALF_WIDTH / COLUMNS  # m
-TILE_PERIODS = 3  # the finest texture repeats itself, which no camera can tell
-TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: where wheels roll in a lane
+TILE_PERIODS = 3  # the finest texture repeats, which cameras cannot resolve
+TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane
 KERB_WIDTH = 0.25  # m
-FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # about what flakes off together
-VERGE_GRAIN = 3.0  # how much coarser the verge looks than the road
+FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # typical size of a flake
+VERGE_GRAIN = 3.0  # coarseness of the verge relative to the road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,7 +33,7 @@ class Strip:
     column_width: float
 
     def shrunk(self, row_length: float, column_width: float) -> "Strip":
-        """A copy with texels about as large as that, each the mean of the area it covers."""
+        """A copy with texels of about this size, each the mean of its area."""
         rows, columns = self.texels.shape
         length, width = rows * self.row_length, columns * self.column_width
         fewer_rows = max(1, min(rows, round(length / row_length)))
@@ -75,12 +75,12 @@ def lines(look: Look) -> tuple[tuple[float, Paint | None], ...]:
 
 
 def _edge(look: Look) -> float:
-    """Distance (m) from the lane's middle to where the shoulder ends."""
+    """Distance (m) from the lane centre to the end of the shoulder."""
     return 1.5 * look.lane_width + look.shoulder_width
 
 
 def _lateral() -> np.ndarray:
-    """y (m) of the columns' middles."""
+    """y (m) of the column centres."""
     return HALF_WIDTH - (np.arange(COLUMNS) + 0.5) * COLUMN_WIDTH
 
 
@@ -114,7 +114,7 @@ def _ground(look: Look, periods: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _flaws(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
-    """Patches, cracks, seams and joints, where chance puts them."""
+    """Patches, cracks, seams and joints at random places."""
     rows, length = len(texels), len(texels) * ROW_LENGTH
     paved = 1.5 * look.lane_width
     for _ in range(rng.poisson(look.patches * length / 100.0)):
@@ -137,7 +137,7 @@ def _flaws(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
 def _polyline(
     texels: np.ndarray, rng: np.random.Generator, tone: float, *, length: float, heading: float
 ) -> None:
-    """A crooked dark line that begins somewhere on the road."""
+    """A crooked dark line from a random place on the road."""
     steps = max(3, int(length / 0.4))
     turns = heading + np.cumsum(rng.normal(0.0, 0.25 if length < 10.0 else 0.004, steps))
     x = rng.uniform(0.0, len(texels) * ROW_LENGTH) + np.cumsum(0.4 * each(cos, turns))
@@ -148,7 +148,7 @@ def _polyline(
 
 
 def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random.Generator) -> None:
-    """Paint a line at `y`, exact to a fraction of a texel."""
+    """Paint a line at `y` with subtexel accuracy."""
     centres = (y - paint.width, y + paint.width) if paint.double else (y,)
     first, last = _column(max(centres) + paint.width), _column(min(centres) - paint.width) + 1
     across = total(
@@ -164,7 +164,7 @@ def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random
 
 
 def _dashes(rows: int, paint: Paint) -> np.ndarray:
-    """How much of each row lies in a dash."""
+    """The share of each row that lies in a dash."""
     if not paint.dashed:
         return np.ones(rows, np.float32)
     edges = np.arange(rows + 1) * ROW_LENGTH - paint.phase
@@ -174,7 +174,7 @@ def _dashes(rows: int, paint: Paint) -> np.ndarray:
 
 
 def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> np.ndarray:
-    """1 where paint has come off, which is that share of the area, 0 elsewhere, soft between."""
+    """1 where paint has come off (this share of the area), 0 elsewhere, with soft edges."""
     rows, columns = shape
     spots = rng.standard_normal((rows // FLAKE_ROWS + 2, columns // FLAKE_COLUMNS + 2), dtype=np.float32)
     spots = cv2.resize(cv2.GaussianBlur(spots, (0, 0), 0.8), (columns, rows))
@@ -191,7 +191,7 @@ def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
     noise += 0.25 * cv2.GaussianBlur(rng.standard_normal(noise.shape, dtype=np.float32), (0, 0), 0.7)
     noise = noise[small[0] : 2 * small[0]]
     limit = np.quantile(noise, 1.0 - look.shadows)
-    # What lies beyond the strip repeats its edge: no shadow may reach that far.
+    # Beyond the strip its edge is repeated: no shadow may reach that far.
     depth = look.shadow_depth * np.clip(HALF_WIDTH - 0.5 - np.abs(_lateral()), 0.0, 1.0).astype(np.float32)
     for k in range(rows // ROWS_PER_PERIOD):
         part = texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD]
@@ -211,5 +211,5 @@ def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
 
 
 def _column(y: float) -> int:
-    """The column in which y (m) lies, within the strip."""
+    """The column that contains y (m), within the strip."""
     return min(max(int((HALF_WIDTH - y) / COLUMN_WIDTH), 0), COLUMNS - 1)

@@ -1,8 +1,8 @@
 """Runs one scenario: `python -m selfdrive.sim.run --scenario FILE --out DIR`.
 
-Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests).
-The same scenario and seed give the same bytes. Exit code 2 for wrong input. The record comes last and
-whole: where there is one, the run was finished and the trace beside it is its own.
+Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests). Equal
+scenario and seed give equal bytes. Exit code 2 for invalid input. The record is written last and atomically:
+if it exists, the run finished and the trace belongs to it.
 """
 
 import argparse
@@ -38,14 +38,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Run:
-    """A run under way. Whoever drives it step by step does what the command line does, and in its order."""
+    """A run in progress. Stepping it manually does the same as the command line, in the same order."""
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
 
     @property
     def done(self) -> bool:
-        """True once there is no step left."""
+        """Whether all steps are done."""
         return self._simulator.done
 
     def step(self) -> None:
@@ -53,18 +53,18 @@ class Run:
         self._simulator.step()
 
     def recorded(self) -> dict[str, float]:
-        """The channels as the last step has them."""
+        """The channels after the last step."""
         return self._simulator.recorder.newest()
 
     def write(self, folder: Path) -> None:
-        """Write trace and record of the steps made so far into `folder`."""
+        """Write trace and record of the steps so far into `folder`."""
         write(self._simulator.result(), folder)
 
 
 def open_run(arguments: Sequence[str]) -> Run:
-    """The run that these arguments of the command line ask for, before its first step.
+    """The run that these command line arguments describe, before its first step.
 
-    `--out` is of no account here: `write` is told where to. Raises ConfigError for wrong input.
+    `--out` is ignored: `write` takes the folder. ConfigError for invalid input.
     """
     return _open(_parse(arguments))
 
@@ -93,7 +93,7 @@ def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) ->
 
 
 def write(result: SimulationResult, folder: Path) -> None:
-    """Write trace.npz and record.json into `folder`, which is made if need be."""
+    """Write trace.npz and record.json into `folder`, which is created if needed."""
     trace, digest = pieces(result.trace), sha256()
     for piece in trace:
         digest.update(piece)

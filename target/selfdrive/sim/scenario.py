@@ -1,4 +1,4 @@
-"""Scenarios: what the host, the lead, the driver and the road do. Read from YAML, in SI units inside."""
+"""Scenarios: host, lead, driver and road. Read from YAML; SI units inside."""
 
 from dataclasses import dataclass, replace
 from hashlib import sha256
@@ -62,7 +62,7 @@ CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lead:
-    """The lead's gap (m) at the start, and its speeds (m/s) at times (s), linear in between."""
+    """The lead's gap (m) at the start, and its speeds (m/s) at times (s), interpolated linearly."""
 
     gap: float
     times: tuple[float, ...]
@@ -103,7 +103,7 @@ class Scenario:
 
 
 def load_scenario(path: Path) -> Scenario:
-    """Read a scenario file. Raises ConfigError for anything a user can mend."""
+    """Read a scenario file. ConfigError for anything a user can fix."""
     try:
         data = path.read_bytes()
         text = data.decode()
@@ -116,7 +116,7 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def parse_scenario(text: str, where: str, digest: str) -> Scenario:
-    """The scenario in `text`; `where` names its source in errors."""
+    """The scenario in `text`; `where` is its source in error messages."""
     root = read_yaml(text, where, KEYS)
     root.text("schema", (SCHEMA,))
     host = root.section("host", HOST_KEYS)
@@ -141,7 +141,7 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
 
 
 def on_plant(scenario: Scenario, plant: str) -> Scenario:
-    """The same scenario on the plant of that name. Raises ConfigError where that knows no such road."""
+    """The same scenario on the plant of that name. ConfigError if the plant does not support its road."""
     if not _possible(scenario, plant):
         expected, remedy = _ONLY_STRAIGHT
         raise ConfigError(f"{scenario.name} on the plant {plant!r}", expected=expected, remedy=remedy)

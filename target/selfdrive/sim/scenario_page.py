@@ -1,7 +1,7 @@
 """Writes the reference of scenario files: a page, and a JSON Schema for editors.
 
 `python -m selfdrive.sim.scenario_page [--out docs/reference]` writes scenario.md and schemas/scenario.json
-from the keys and bounds that the parser has.
+from the parser's keys and bounds.
 """
 
 import argparse
@@ -44,7 +44,7 @@ _SPEED = dict.fromkeys((f"speed_{unit}" for unit in s.SPEED_UNITS), _number(0.0,
 _SPEEDS = {key: {"anyOf": [speed, _numbers(0.0, s.FASTEST)]} for key, speed in _SPEED.items()}
 _TIME = _number(0.0, s.LONGEST)
 
-# Heading of each section, its keys with their meanings, the type of each, and which it cannot do without.
+# Heading of each section, its keys with meanings, their types, and the required ones.
 SECTIONS: dict[str, tuple[dict[str, str], dict[str, dict[str, Any]], tuple[str, ...]]] = {
     "scenario": (
         s.KEYS,
@@ -88,7 +88,7 @@ SECTIONS: dict[str, tuple[dict[str, str], dict[str, dict[str, Any]], tuple[str, 
         ("at_m", "per_m"),
     ),
 }
-ONE_SPEED = ("host", "lead")  # exactly one of the speed keys, in the unit one likes
+ONE_SPEED = ("host", "lead")  # exactly one of the speed keys, in any unit
 
 
 def schema() -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The car's own sensors and switches: what its control units put on the car bus."""
+"""The car's own sensors and switches, as its control units report them on the car bus."""
 
 from selfdrive.can.dbc import load
 from selfdrive.can.packer import Packer
@@ -7,9 +7,9 @@ from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
 from selfdrive.messages import CanFrame
 from selfdrive.sim.truth import GroundTruth
 
-STANDSTILL_SPEED = 0.3  # m/s; below it the speed reads 0, though the wheels are known to turn
+STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0, though the wheels turn
 
-# Signals with a constant value, by period in steps: a closed, belted car in drive, its main switch on.
+# Signals with a constant value, by period in steps: a closed, belted car in drive, main switch on.
 _CONSTANT = {
     1: {
         "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
@@ -27,11 +27,11 @@ _CONSTANT = {
         "DOORS_STATUS": {"DOOR_OPEN_FL": 0, "DOOR_OPEN_FR": 0, "DOOR_OPEN_RL": 0, "DOOR_OPEN_RR": 0},
     },
 }
-_COUNTERS = 4  # a two-bit counter makes a constant message one of four frames
+_COUNTERS = 4  # with a two-bit counter, a constant message has four frames
 
 
 class CarSensors:
-    """Makes the car's frames of each 10 ms step, with running counters.
+    """Makes the car's frames of each 10 ms step, with counters.
 
     The gearbox reports `gearbox_scale` times the speed.
     """

@@ -29,19 +29,19 @@ RECORD_SCHEMA = "sim-record/1"
 STEPS_PER_SECOND = 100
 CYCLE = 5  # steps between radar cycles, and between pictures
 PLANTS: dict[str, type[Plant]] = {STANDARD: Plant, REFERENCE: ReferencePlant}
-FREE_ROAD_DISTANCE = 200.0  # m; radar and camera see an object there that keeps its distance
+FREE_ROAD_DISTANCE = 200.0  # m; radar and camera see an object at this constant distance
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationResult:
-    """What a run leaves: `record` (plain data for record.json) and `trace` (channel to array)."""
+    """The result of a run: `record` (plain data for record.json) and `trace` (channel to array)."""
 
     record: dict
     trace: dict[str, np.ndarray]
 
 
 class Simulator:
-    """Runs one scenario at a time; `reset` starts the next one, with nothing left of the last."""
+    """Runs one scenario at a time; `reset` starts the next with a clean state."""
 
     def reset(
         self,
@@ -50,10 +50,10 @@ class Simulator:
         pictures: Pictures | None = None,
         film: Path | None = None,
     ) -> None:
-        """Build car, controller and recorder anew. `seed` is that of the pictures, if there are any.
+        """Rebuild car, controller and recorder. `seed` is that of the pictures, if any.
 
-        A folder `film` gets a film of the run. Raises ConfigError where it cannot be written, and where the
-        pictures cannot be had or do not fit the scenario's road.
+        A folder `film` receives a film of the run. ConfigError if it cannot be written, or if the pictures
+        are not available or do not fit the scenario's road.
         """
         self.frame = 0
         self._scenario, self._seed = scenario, seed
@@ -79,7 +79,7 @@ class Simulator:
 
     @property
     def done(self) -> bool:
-        """True once the scenario's duration has been simulated."""
+        """Whether the scenario's duration has been simulated."""
         return self.frame >= self._scenario.steps
 
     def step(self) -> None:
@@ -104,7 +104,7 @@ class Simulator:
         self.frame += 1
 
     def result(self) -> SimulationResult:
-        """Record and trace of the steps made so far."""
+        """Record and trace of the steps so far."""
         recorder = self.recorder
         first_alerts: dict[str, float] = {}
         for name, t in recorder.alerts:
@@ -127,7 +127,7 @@ class Simulator:
         return SimulationResult(record=record, trace=recorder.trace())
 
     def _advance(self, t: float) -> None:
-        """The world's step that begins at `t`, with the commands of the step before."""
+        """The world's step that begins at `t`, with the previous step's commands."""
         road, plant = self._road, self._plant
         plant.step(self._actuators, road.grade(t), road.curvature(plant.position))
         if self._lead:

@@ -1,4 +1,4 @@
-"""What is true in the simulated world, whatever the sensors say."""
+"""The true state of the simulated world, independent of sensors."""
 
 from typing import NamedTuple
 

@@ -1,6 +1,6 @@
-"""How the controller sees in a run: ideal geometry, or pictures and a detector that works on them.
+"""How the controller sees in a run: ideal geometry, or pictures with a detector.
 
-Libraries for pictures take long to load, so what needs them is imported only in runs with pictures.
+Picture libraries load slowly, so they are imported only in runs with pictures.
 """
 
 from dataclasses import dataclass
@@ -23,15 +23,15 @@ TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pictures:
-    """The pictures of a run and who looks at them.
+    """The pictures of a run, and their detector.
 
-    `frames` is a folder of a user's own frames; None: a rendered road with these `marks` (left and right
-    both solid, or the right one dashed). `translation` is how a frame is moved to the car's offset and
-    heading: by the ground's homography, or shifted as a whole, as in the paper's text or as in its authors'
-    code. Frames, and what was seen in pictures, are kept in the folder `cache`; None: nothing is kept. With
-    `forget` every picture is looked at, also where `cache` tells what was seen in it. What is seen is the
-    same, unless the code that sees acts differently at different times: such code must run with `forget` or
-    without a cache.
+    `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid,
+    or the right one dashed). `translation` is how a frame is moved to the car's offset and
+    heading: by the ground's homography, or by shifting it, as in the paper's text or in its
+    authors' code. The folder `cache` keeps frames and detections; None: nothing is kept. With
+    `forget`, every picture is examined even if `cache` has its result. Results are the same
+    unless the detection code depends on time: such code must run with `forget` or without a
+    cache.
     """
 
     detector: str = PAPER
@@ -54,7 +54,7 @@ class RoadCamera(Protocol):
 class Vision:
     """Camera and detector of one run; `description` goes into its record.
 
-    `model` is the camera's geometry: to draw what is seen, where nothing takes pictures.
+    `model` is the camera's geometry, for drawing the view if there are no pictures.
     """
 
     camera: RoadCamera
@@ -66,7 +66,7 @@ class Vision:
 def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
     """Camera and detector for a run on `road`.
 
-    Raises ConfigError for frames that cannot be used, and for pictures of a road that is not straight.
+    ConfigError for unusable frames, and for pictures of a road that is not straight.
     """
     if pictures is None:
         return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
@@ -98,7 +98,7 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 
 
 def build_detector(name: str, model: CameraModel):
-    """The detector of DETECTORS that is called so, for one run's pictures."""
+    """The detector of this name in DETECTORS, for one run's pictures."""
     if name == PAPER:
         from selfdrive.visiond.compiled_paper import build_paper_detector
 

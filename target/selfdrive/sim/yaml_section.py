@@ -1,4 +1,4 @@
-"""Strict reading of YAML: every key known and given once, every number in range, errors with their line."""
+"""Strict reading of YAML: known keys, no duplicates, numbers in range, errors with line numbers."""
 
 import re
 from difflib import get_close_matches
@@ -8,12 +8,12 @@ import yaml
 
 from selfdrive.common.errors import ConfigError
 
-# YAML 1.1 takes 060 for 48 and 1:30 for 90; here a number is what it looks like, or no number.
+# YAML 1.1 reads 060 as 48 and 1:30 as 90; here numbers must look like what they are.
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
 def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
-    """The mapping a document consists of. Raises ConfigError if it is not YAML, or not one mapping."""
+    """The mapping that a document consists of. ConfigError if it is not YAML, or not one mapping."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except (yaml.YAMLError, RecursionError) as error:
@@ -33,7 +33,7 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
 
 
 class Section:
-    """One mapping of the document. `keys` names what may stand in it, each with what it means."""
+    """One mapping of the document. `keys` has the allowed keys with their meanings."""
 
     def __init__(self, node: yaml.Node, where: str, keys: dict[str, str]) -> None:
         self._where = where
@@ -75,7 +75,7 @@ class Section:
         return tuple(self._number(item, key, low, high) for item in self._items(key))
 
     def ascending(self, key: str, low: float, high: float) -> tuple[float, ...]:
-        """As `numbers`, each greater than the one before."""
+        """As `numbers`, in strictly ascending order."""
         values = self.numbers(key, low, high)
         for item, before, value in zip(self._items(key)[1:], values, values[1:], strict=False):
             if value <= before:
@@ -85,7 +85,7 @@ class Section:
         return values
 
     def quantity(self, name: str, units: tuple[str, ...]) -> str:
-        """The key that gives `name` in one of `units`; exactly one of them must be there."""
+        """The key that gives `name` in one of `units`; exactly one must be present."""
         found = [key for unit in units if (key := f"{name}_{unit}") in self]
         if len(found) != 1:
             names = [f"{name}_{unit}" for unit in units]
@@ -106,7 +106,7 @@ class Section:
         return [Section(item, self._where, keys) for item in self._items(key)]
 
     def check(self, key: str, good: bool, expected: str, remedy: str) -> None:
-        """Refuse the value of `key` unless it is `good`."""
+        """Reject the value of `key` unless it is `good`."""
         if not good:
             node = self._node(key)
             self._fail(node, f"{key}: {_shown(node)}", expected, remedy)

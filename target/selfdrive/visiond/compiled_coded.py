@@ -1,4 +1,4 @@
-"""The detector as coded with its arithmetic in C, where this was compiled: the same lines to the bit."""
+"""The detector as coded, with compiled C arithmetic if available: the same lines to the bit."""
 
 import ctypes
 from pathlib import Path
@@ -15,7 +15,7 @@ from selfdrive.visiond.compiled_windows import MarkWindows
 from selfdrive.visiond.detector import LaneLines
 
 C_SOURCE = Path(__file__).with_name("coded_lines.c")
-_ROOMS = {  # shape and type of what C writes to, in its order
+_ROOMS = {  # shape and type of C's outputs, in order
     "power": (SIZE, np.int32),
     "crest": (SIZE, np.int32),
     "limits": (WINDOWS, np.int32),
@@ -37,7 +37,7 @@ class _Coded(ctypes.Structure):
 
 
 def build_coded_detector(model: CameraModel) -> CodedDetector:
-    """The detector, compiled where it is to be used and has been."""
+    """The detector, compiled if available and enabled."""
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
     if None in libraries or not adds_up_alike(libraries[0]):
         return CodedDetector(model)
@@ -45,7 +45,7 @@ def build_coded_detector(model: CameraModel) -> CodedDetector:
 
 
 class CompiledCodedDetector(CodedDetector):
-    """Does what CodedDetector does: `lines` is `coded_lines.c`, `windows` is `mark_windows.c`, compiled."""
+    """Same as CodedDetector: `lines` is compiled `coded_lines.c`, `windows` compiled `mark_windows.c`."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
@@ -61,7 +61,7 @@ class CompiledCodedDetector(CodedDetector):
     def detect(self, view: CameraView) -> LaneLines:
         """The lines in `view.picture`, as CodedDetector sees them."""
         part = np.ascontiguousarray(view.picture[PART])
-        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault may do that to a picture
+        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault may change a picture this way
             return super().detect(view)
         address = part.ctypes.data
         self._take_edges(self._at, address)

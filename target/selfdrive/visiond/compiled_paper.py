@@ -1,4 +1,4 @@
-"""The paper's lane detector with its arithmetic in C, where this was compiled: the same lines to the bit."""
+"""The paper's lane detector, with compiled C arithmetic if available: the same lines to the bit."""
 
 import ctypes
 from math import cos, tan
@@ -19,7 +19,7 @@ from selfdrive.visiond.paper_detector import EPS, THRESHOLD, PaperDetector, lane
 from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
-EXACT = 2**24  # whole numbers below this are the same in single precision, whatever the order of a sum
+EXACT = 2**24  # smaller integers are exact in single precision, whatever the order of a sum
 NONE = 2**31 - 1
 
 
@@ -50,7 +50,7 @@ class _Paper(ctypes.Structure):
 
 
 def build_paper_detector(model: CameraModel) -> PaperDetector:
-    """The detector, compiled where it is to be used and has been."""
+    """The detector, compiled if available and enabled."""
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
     if None in libraries or not adds_up_alike(libraries[0]):
         return PaperDetector(model)
@@ -58,7 +58,7 @@ def build_paper_detector(model: CameraModel) -> PaperDetector:
 
 
 class CompiledPaperDetector(PaperDetector):
-    """Does what PaperDetector does: `lines` is `mark_lines.c`, `windows` is `mark_windows.c`, compiled."""
+    """Same as PaperDetector: `lines` is compiled `mark_lines.c`, `windows` compiled `mark_windows.c`."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
@@ -112,7 +112,7 @@ class CompiledPaperDetector(PaperDetector):
 
 
 def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
-    """What C calculates with, and where it writes to, for pictures of that part of the road."""
+    """C's inputs and outputs for pictures of that part of the road."""
     rows, width = region.shape
     tiles, size = (rows // STRIDE, width // STRIDE), rows * width
     return {
@@ -135,6 +135,6 @@ def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _points(region: RoadRegion) -> list[np.ndarray]:
-    """Room for all pixels of that part as points."""
+    """Space for all pixels of that part as points."""
     size = region.shape[0] * region.shape[1] + 1
     return [np.zeros(size) for _ in range(3)] + [np.zeros(size, np.uint8)]

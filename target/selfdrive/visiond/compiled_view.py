@@ -1,4 +1,4 @@
-"""The map of the road in C, where that was compiled: the same map to the bit."""
+"""The map of the road in compiled C, if available: the same map to the bit."""
 
 import ctypes
 from pathlib import Path
@@ -10,7 +10,7 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.road_view import LEVELS, RoadView
 
 C_SOURCE = Path(__file__).with_name("road_view.c")
-MORE = 4  # pixels at the end of a picture that C may read
+MORE = 4  # pixels past the end of a picture that C may read
 
 
 class _Level(ctypes.Structure):
@@ -31,7 +31,7 @@ class _View(ctypes.Structure):
 
 
 class CompiledRoadView(RoadView):
-    """Does what RoadView does: `library` is `road_view.c`, compiled."""
+    """Same as RoadView, with `library`, compiled `road_view.c`."""
 
     def __init__(self, model: CameraModel, library: compiled.Library) -> None:
         super().__init__(model)
@@ -54,7 +54,7 @@ class CompiledRoadView(RoadView):
         self._view = _View(rows, width, len(self.y), tuple(levels), tuple(smaller), self._road.ctypes.data)
 
     def map(self, picture: np.ndarray) -> np.ndarray:
-        """The map of a grey picture, which the next one overwrites."""
+        """The map of a grey picture, overwritten by the next call."""
         part = np.ascontiguousarray(picture[self._first :, :])
         if not self._even or part.dtype != np.uint8 or part.shape != self._shape:
             return super().map(picture)
@@ -63,7 +63,7 @@ class CompiledRoadView(RoadView):
 
 
 def _places(columns: np.ndarray, parts: np.ndarray, width: int) -> np.ndarray:
-    """Where each point of the map lies in its row, as the C file has it; beyond the ends at these."""
+    """The position of each map point in its row, as in the C file; points outside are at the ends."""
     place = (columns[:, :, 0].astype(np.int32) << 5) + parts
     place = np.clip(place, 0, (width - 1) << 5)
     column = np.minimum(place >> 5, width - 2)

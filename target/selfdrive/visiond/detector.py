@@ -1,4 +1,4 @@
-"""What a lane detector is, and the ideal one."""
+"""The interface of lane detectors, and the ideal one."""
 
 from typing import NamedTuple, Protocol
 
@@ -10,7 +10,7 @@ LANE_WIDTH = 3.7  # m
 class RoadLine(NamedTuple):
     """A line ahead of the car: `y` (m, left positive) at the car, then y + slope * x + bend[x].
 
-    `prob` is 0 where the line was not seen; `y` and `slope` are then where it is expected.
+    `prob` is 0 if the line was not seen; `y` and `slope` are then the expected ones.
     """
 
     y: float
@@ -20,7 +20,7 @@ class RoadLine(NamedTuple):
 
 
 class LaneLines(NamedTuple):
-    """What a detector makes of one picture: the ego lane's two lines and the path between them."""
+    """A detector's result for one picture: the ego lane's two lines and the path between them."""
 
     left: RoadLine
     right: RoadLine
@@ -31,15 +31,15 @@ class LaneDetector(Protocol):
     """Finds the lane's lines in the camera's view, 20 times a second."""
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in this view. A detector may remember earlier views of the same run, nothing else."""
+        """The lines in this view. A detector may remember only earlier views of the same run."""
         ...
 
 
 class IdealDetector:
-    """Knows the view's geometry, and is sure of it: for runs without pictures."""
+    """Knows the view's geometry with certainty: for runs without pictures."""
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines where they are."""
+        """The true lines."""
         return LaneLines(
             left=RoadLine(y=view.left_lane_y, bend=view.bend),
             right=RoadLine(y=view.right_lane_y, bend=view.bend),
@@ -48,7 +48,7 @@ class IdealDetector:
 
 
 class MirroredDetector:
-    """Sees what another detector sees, and takes left for right."""
+    """Swaps left and right of another detector's result."""
 
     def __init__(self, detector: LaneDetector) -> None:
         self._detector = detector
@@ -64,9 +64,9 @@ def _mirrored(line: RoadLine) -> RoadLine:
 
 
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
-    """The lane's middle: between two lines, or half a `width` (m) beside the one that is seen.
+    """The lane centre: between two lines, or half a `width` (m) from the one that is seen.
 
-    Where none is seen the path goes straight on along the car.
+    If none is seen, the path goes straight ahead.
     """
     seen = [line for line in (left, right) if line.prob > 0.0]
     if len(seen) == 2:

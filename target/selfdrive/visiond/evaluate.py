@@ -1,10 +1,10 @@
-"""How well a detector finds real lanes: `python -m selfdrive.visiond.evaluate FRAMES TRUTH`.
+"""Measures how well a detector finds real lanes: `python -m selfdrive.visiond.evaluate FRAMES TRUTH`.
 
-TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, where only
-the lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. All of it is in the canonical frame:
-640 x 480, the frame made 640 wide and moved up or down until its vanishing row is 200. The first word of a
-key (`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml as for runs. Every frame
-is looked at by a new detector, which thus has no history.
+TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the
+lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x
+480, the frame scaled to 640 and moved vertically until its vanishing row is 200. The first word of a key
+(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml as for runs. A new detector
+examines every frame, without history.
 """
 
 import argparse
@@ -37,7 +37,7 @@ GREEN, RED = (0, 255, 0), (0, 0, 255)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Source:
-    """A camera that took frames: the row of `rows` where straight roads vanish, and its canonical model."""
+    """A camera: the row of `rows` where straight roads vanish, and its canonical model."""
 
     vanishing_row: float
     rows: int
@@ -48,7 +48,7 @@ def _canonical_model(focal: float, height: float) -> CameraModel:
     return CameraModel.from_view(width=WIDTH, rows=ROWS, horizon=HORIZON, focal=focal, height=height)
 
 
-UDACITY = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart part by 3.05 px a row
+UDACITY = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart diverge by 3.05 px per row
 TUSIMPLE = _canonical_model(focal=500.0, height=1.68)  # 2.2 px a row
 SOURCES = {
     "p1": Source(vanishing_row=318, rows=540, model=UDACITY),
@@ -61,7 +61,7 @@ SOURCES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """A frame to look at: colour and grey in the canonical frame, and its lines' true columns in row 278."""
+    """A frame to examine: colour and grey in the canonical frame, and its lines' true columns in row 278."""
 
     key: str
     colour: np.ndarray
@@ -71,13 +71,13 @@ class Frame:
 
     @property
     def grey(self) -> np.ndarray:
-        """What a detector sees (rows x columns, uint8)."""
+        """The detector's input (rows x columns, uint8)."""
         return cv2.cvtColor(self.colour, cv2.COLOR_BGR2GRAY)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """What a detector made of a frame: errors (px, right positive) in row 278, None for a line not found."""
+    """A detector's result for a frame: errors (px, right positive) in row 278, None for a line not found."""
 
     frame: Frame
     lines: LaneLines
@@ -86,13 +86,13 @@ class Finding:
 
     @property
     def good(self) -> bool:
-        """Both lines were found, and close enough."""
+        """Whether both lines were found, close enough."""
         limit = TOLERANCE * (self.frame.right - self.frame.left)
         return all(error is not None and abs(error) <= limit for error in (self.left, self.right))
 
 
 def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
-    """The frame 640 wide, moved so that its vanishing row is 200, filled up with black to 640 x 480."""
+    """The frame scaled to 640 and moved so that its vanishing row is 200, padded with black to 640 x 480."""
     rows, width = colour.shape[:2]
     scale = WIDTH / width
     small = cv2.resize(colour, (WIDTH, round(rows * scale)), interpolation=cv2.INTER_AREA)
@@ -101,7 +101,7 @@ def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
 
 
 def read_frames(folder: Path, truth: Path) -> list[Frame]:
-    """The frames that the truth file names. Raises ConfigError for what is missing or cannot be read."""
+    """The frames that the truth file names. ConfigError if one is missing or unreadable."""
     images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGES]
     own = _source_of(camera_of(folder)) if (folder / CALIBRATION).exists() else None
     frames = []
@@ -128,12 +128,12 @@ def read_frames(folder: Path, truth: Path) -> list[Frame]:
 
 
 def evaluate(detector: str, frames: list[Frame]) -> list[Finding]:
-    """What `detector` makes of each frame, seen for the first time."""
+    """The result of `detector` for each frame, without history."""
     return [look(build(detector, frame.model), frame, frame.grey) for frame in frames]
 
 
 def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
-    """What the detector makes of a picture (rows x columns, uint8) of what the frame shows."""
+    """The detector's result for a picture (rows x columns, uint8) of the frame's scene."""
     view = CameraView(left_lane_y=0.0, right_lane_y=0.0, path_y=0.0, bend=(), lead_d_rel=0.0, picture=picture)
     lines = detector.detect(view)
     errors = []
@@ -149,7 +149,7 @@ def build(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
 
 
 def report(detector: str, findings: list[Finding]) -> str:
-    """The table of errors, and the share of frames in which both lines were found well enough."""
+    """The table of errors, and the share of frames in which both lines were found closely enough."""
     rows = [f"{detector}: errors in row {ROW} (px), limit {TOLERANCE:.4f} of the spacing"]
     for finding in findings:
         frame = finding.frame
@@ -195,7 +195,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _source_of(model: CameraModel) -> Source:
-    """The source of frames that a camera of this model took."""
+    """The source for frames from a camera of this model."""
     scale = WIDTH / model.width
     fy = model.fy * scale
     seen = CameraModel(
@@ -228,7 +228,7 @@ def _read_truth(path: Path) -> dict:
 
 
 def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
-    """Columns of both lines in row 278: from the lines where there are any, else from their centres."""
+    """Columns of both lines in row 278: from the lines if there are any, else from their centres."""
     try:
         if entry.get("L") and entry.get("R"):
             left, right = (entry[side][0] * ROW + entry[side][1] for side in "LR")
@@ -249,9 +249,9 @@ def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
 
 
 def _image(key: str, images: list[Path], folder: Path) -> Path:
-    """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError when it is missing.
+    """The key's file: `KEY.jpg`, or without the key's first word. ConfigError if it is missing.
 
-    Of files of one name it is the one in a folder called as the key's first word.
+    Among files of equal name, the one in a folder named by the key's first word is used.
     """
     camera, _, name = key.partition("_")
     named = [path for path in images if path.stem == key] or [path for path in images if path.stem == name]

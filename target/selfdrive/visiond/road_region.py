@@ -1,7 +1,7 @@
-"""The part of the picture in which the paper's detector looks for lane marks, and its detection windows.
+"""The part of the picture in which the paper's detector searches for lane marks, and its windows.
 
 It is the road around the car, from `NEAR` to `FAR` metres ahead and `SIDE` metres to the left and right (more
-further ahead, as the car may point a little off the road), so it follows from the camera's calibration.
+further ahead, because the car may point off the road), so it follows from the camera's calibration.
 """
 
 from math import ceil, floor
@@ -12,15 +12,15 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.common.errors import ConfigError
 from selfdrive.visiond.hog import STRIDE, WINDOW
 
-NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always looked at, the furthest may be left out
-SIDE = 3.8  # m: a lane's line when the car is all but in the next lane
-TURN = 0.08  # m further out for each metre ahead
+NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always examined, the furthest may be left out
+SIDE = 3.8  # m: a lane's line when the car is almost in the next lane
+TURN = 0.08  # m further out per metre ahead
 
 
 class RoadRegion:
-    """Rows and columns of the picture (`part`), and which windows of it see enough of the road.
+    """Rows and columns of the picture (`part`), and which of its windows see enough of the road.
 
-    Raises ConfigError if the camera sees too little of the road for one window.
+    ConfigError if the camera sees too little of the road for one window.
     """
 
     def __init__(self, model: CameraModel) -> None:

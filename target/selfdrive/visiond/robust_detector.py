@@ -1,7 +1,7 @@
 """The geometric lane detector: bands as wide as marks, votes for two parallel lines, and a memory.
 
-What it saw last tells where to look next, so that rain, snow or dirt, which give points anywhere, hardly
-count; a line that is not seen stays where the other one puts it, and both stay for a while when none is.
+Its last result decides where to look next, so rain, snow or dirt, which add points anywhere, hardly matter. A
+line that is not seen is placed by the other one; without any, both are kept for a while.
 """
 
 from selfdrive.common.camera_model import CameraModel
@@ -11,19 +11,19 @@ from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_bet
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.voting import Belief, Pose, Vote, vote
 
-SEEN = 0.5  # probability from which on a line is believed to be where it was found
-FADING = 0.92  # by how much a line not seen is less probable with each picture
-FORGET = 20  # pictures without any line after which it may be anywhere
-GONE = 0.01  # a line less probable than this is given up
-MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m a picture; rad: how the car may have moved
-WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: how lane and pitch may have changed
-BEYOND = 0.3  # m over a line from which on the car is in the next lane
+SEEN = 0.5  # probability from which a found line is believed
+FADING = 0.92  # factor on the probability of an unseen line per picture
+FORGET = 20  # pictures without any line after which the position is unknown
+GONE = 0.01  # a less probable line is dropped
+MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m per picture; rad: the car's possible motion
+WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: possible changes of lane and pitch
+BEYOND = 0.3  # m past a line, from which the car is in the next lane
 
 
 class RobustDetector:
-    """Finds the lines of one run's pictures, all taken by one camera. Remembers what it saw last.
+    """Finds the lines in one run's pictures from one camera. Remembers its last result.
 
-    `calculated_by` tells which compiled code `view`, `find` and `choose` calculate with, if any.
+    `calculated_by` identifies the compiled code of `view`, `find` and `choose`, if any.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class RobustDetector:
 
     @property
     def state(self) -> tuple[float, ...]:
-        """All that is remembered, as numbers: what is set here is what was read once."""
+        """The complete memory, as numbers that can be set again."""
         return (self._missed, *self._probs, *(self._pose or ()))
 
     @state.setter
@@ -72,7 +72,7 @@ class RobustDetector:
         )
 
     def _remember(self, pose: Pose) -> None:
-        """Take over what was seen, if anything was."""
+        """Take over the result, if anything was seen."""
         seen = (pose.prob_left, pose.prob_right)
         if max(seen) > SEEN or self._pose is None:
             self._pose, self._missed = pose, 0
@@ -86,7 +86,7 @@ class RobustDetector:
             self._change_lane()
 
     def _change_lane(self) -> None:
-        """Look for the lane the car is in now."""
+        """Switch to the lane that the car is in now."""
         lane = self._pose.width if self._pose.middle < 0.0 else -self._pose.width
         self._pose = self._pose._replace(y_left=self._pose.y_left + lane, y_right=self._pose.y_right + lane)
 
@@ -99,7 +99,7 @@ class RobustDetector:
         return LaneLines(left=left, right=right, path=path_between(left, right, self._pose.width))
 
     def _line(self, y: float, prob: float) -> RoadLine:
-        """The road's line that is seen where the pose has it."""
+        """The road line for the pose's line."""
         model, pose = self._model, self._pose
         a = -y * model.spread(1.0)
         b = model.cx - pose.left - a * (model.horizon - pose.dip)

@@ -1,8 +1,8 @@
 """Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
 
-It learns from windows of rendered roads only, all drawn from the seed, and prints how many windows of other
-such roads it gets right. It takes some minutes; `--small`, for a trial, some seconds. Needs scikit-learn,
-which the detector does not.
+It learns only from windows of rendered roads, drawn from the seed, and prints its accuracy on windows of
+other such roads. It takes some minutes; `--small`, for a trial, some seconds. Needs scikit-learn, which the
+detector does not.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from threadpoolctl import threadpool_limits
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
 from selfdrive.visiond.training_windows import labelled_windows
 
-FULL, SMALL = (600, 60), (12, 4)  # roads to learn from, and to be tested with
+FULL, SMALL = (600, 60), (12, 4)  # roads for training, and for testing
 EPOCHS = 25
 DECAY = 3e-3  # penalty on large weights
 
@@ -37,7 +37,7 @@ def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
         random_state=seed,
     )
     with threadpool_limits(1), warnings.catch_warnings():  # sums depend on the number of threads
-        warnings.simplefilter("ignore", ConvergenceWarning)  # it is meant to stop after so many epochs
+        warnings.simplefilter("ignore", ConvergenceWarning)  # stopping after so many epochs is intended
         model.fit(features, labels)
     hidden, out = (weights.astype(np.float32) for weights in model.coefs_)
     hidden_bias, out_bias = (bias.astype(np.float32) for bias in model.intercepts_)

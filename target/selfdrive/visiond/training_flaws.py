@@ -1,4 +1,4 @@
-"""What rendered roads lack and real pictures have: verges by the lane, long shadows, bends, bad cameras."""
+"""What real pictures have and rendered roads lack: verges by the lane, long shadows, bends, bad cameras."""
 
 from collections.abc import Iterable
 
@@ -8,13 +8,13 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 
 LEAST_BEND = 250.0  # m of a curve's radius
-NEAR_HORIZON = 4.0  # rows below it in which the road is taken to end
+NEAR_HORIZON = 4.0  # rows below it where the road is assumed to end
 
 
 class Ground:
-    """A verge that may begin right beside the lane, and bands along the road that are darker or lighter.
+    """A verge that may begin directly at the lane, and bands along the road that are darker or lighter.
 
-    Such bands are shadows of barriers, strips of newer asphalt, gutters. Drawn once for a scene.
+    Bands are shadows of barriers, strips of newer asphalt, gutters. Drawn once for a scene.
     """
 
     def __init__(self, model: CameraModel, lane_width: float, rng: np.random.Generator) -> None:
@@ -32,7 +32,7 @@ class Ground:
     def changed(
         self, picture: np.ndarray, paint: np.ndarray, offset: float, heading: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The picture of a road seen from there, with verges and bands, and what is left of its paint."""
+        """The picture of a road seen from there, with verges and bands, and the remaining paint."""
         y = self._left + np.float32(heading) * self._ahead + np.float32(offset)
         tones = picture.astype(np.float32)
         for start, width, factor, soft in self._bands:
@@ -51,7 +51,7 @@ class Ground:
 
 
 def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
-    """The pictures with the straight road made a bend, mostly a slight one."""
+    """The pictures with the straight road bent, mostly slightly."""
     bend = rng.uniform(-1.0, 1.0) ** 3 / LEAST_BEND
     rows = np.maximum(np.arange(model.rows), model.horizon + NEAR_HORIZON)
     shift = [0.5 * bend * model.distance(row) ** 2 / model.metres_per_pixel(row) for row in rows]
@@ -63,7 +63,7 @@ def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Genera
 
 
 def taken(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The picture as a camera and its file make it: soft, noisy, compressed, with some other contrast."""
+    """The picture as recorded by a camera and file format: soft, noisy, compressed, with other contrast."""
     if rng.random() < 0.6:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.3, 1.6))
     tones = picture * rng.uniform(0.5, 1.3) + rng.uniform(-25.0, 60.0)
@@ -77,5 +77,5 @@ def taken(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _band(rng: np.random.Generator) -> tuple[float, float, float, float]:
-    """A band's beginning (m left of the lane's middle), width (m), factor on tones, and soft edge (m)."""
+    """A band's start (m left of the lane centre), width (m), factor on tones, and soft edge (m)."""
     return rng.uniform(-8.0, 6.0), rng.gamma(1.5, 1.5) + 0.3, rng.uniform(0.45, 1.3), rng.uniform(0.02, 0.4)

@@ -1,6 +1,6 @@
-"""Scenes to train the lane detector on: rendered roads of all kinds, seen by all kinds of cameras.
+"""Scenes for training the lane detector: rendered roads of all kinds, seen by all kinds of cameras.
 
-Every draw comes from one Generator, so a seed gives the same scenes again.
+All draws come from one Generator, so a seed reproduces the scenes.
 """
 
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ VIEWS = 6  # pictures of each scene
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class View:
-    """A picture (uint8) and how much of each pixel is lane paint (uint8, 255 is all)."""
+    """A picture (uint8) and the share of lane paint in each pixel (uint8, 255 is all)."""
 
     model: CameraModel
     picture: np.ndarray
@@ -29,7 +29,7 @@ class View:
 
 
 def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
-    """`VIEWS` pictures of each of that many scenes."""
+    """`VIEWS` pictures of each of `scenes` scenes."""
     for _ in range(scenes):
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
         road = RoadRenderer(model, look, seed, periods=PERIODS)
@@ -53,7 +53,7 @@ def _hidden(look: Look, model: CameraModel) -> np.ndarray:
 
 
 def _only_paint(look: Look) -> Look:
-    """The same road in black, its paint alone white, nobody on it."""
+    """The same road in black with white paint, without traffic."""
 
     def line(old: Paint | None) -> Paint | None:
         return old and replace(old, tone=255.0, wear=0.0, fade=0.0)

@@ -1,4 +1,4 @@
-"""Labelled detection windows from training scenes: the features of each, and whether it holds a lane mark."""
+"""Labelled detection windows from training scenes: features, and whether they hold a lane mark."""
 
 import cv2
 import numpy as np
@@ -7,15 +7,15 @@ from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.road_region import RoadRegion
 from selfdrive.visiond.training_scenes import VIEWS, View, views
 
-EACH = 12  # windows with a mark, and as many without, taken from each picture at most
+EACH = 12  # windows with a mark, and as many without, per picture at most
 LEAST_PAINT = 40.0  # pixels of paint that make a mark; windows with less, but some, are not used
-LEAST_CONTRAST = 6.0  # grey levels between paint and what is around it; less is not used either
+LEAST_CONTRAST = 6.0  # grey levels between paint and surroundings; less is not used either
 NO_PAINT = 2.0  # pixels
-RING = np.ones((7, 7), np.uint8)  # how far around paint lies what it is compared with
+RING = np.ones((7, 7), np.uint8)  # neighbourhood that paint is compared with
 
 
 def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Features (windows x 1764, float32) and labels (bool) from that many scenes, in equal parts."""
+    """Features (windows x 1764, float32) and labels (bool) from `scenes` scenes, in equal parts."""
     features = np.empty((2 * EACH * VIEWS * scenes, FEATURES), np.float32)
     labels = np.empty(len(features), bool)
     used = 0
@@ -31,7 +31,7 @@ def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray,
 
 
 def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(row, column) of windows drawn with these weights, none twice."""
+    """(row, column) of windows drawn with these weights, without repetition."""
     possible = np.argwhere(weight > 0.0)
     chance = weight[weight > 0.0]
     number = min(EACH, len(possible))
@@ -43,10 +43,10 @@ def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _weights(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
-    """How much each window (rows x columns) is wanted as one with a mark, and as one without.
+    """The sampling weight of each window (rows x columns) with a mark, and without one.
 
-    Those with a mark that can be seen are wanted equally; those without the more edges they have, for only
-    there could the detector go wrong.
+    Windows with a visible mark have equal weights; those without weigh more the more edges they have, because
+    only edges can mislead the detector.
     """
     picture = view.picture[region.part].astype(np.float32)
     paint = (view.paint[region.part] > 127).view(np.uint8)

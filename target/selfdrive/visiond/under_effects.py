@@ -1,10 +1,10 @@
-"""How well detectors find real lanes in bad weather.
+"""Measures how well detectors find real lanes in bad weather.
 
-`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes what `selfdrive.visiond.evaluate` takes. Each
-frame is put behind each level of each effect, once for each seed, and looked at by detectors without a
-past. What is counted are pictures in which a detector misses a line. They are not independent of
-each other: a frame shows the same road each time. `--strips` writes all levels of a frame side by side, to be
-looked at.
+`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as
+`selfdrive.visiond.evaluate`. Each frame is put behind each level of each effect, once per seed, and examined
+by detectors without history. The result counts pictures in which a detector misses a line. They are not
+independent: a frame always shows the same road. `--strips` writes all levels of a frame side by side for
+inspection.
 """
 
 import argparse
@@ -33,7 +33,7 @@ HEADS = "effect", "level", "amount", "unit", "pictures", *(f"missed_{name}" for 
 
 
 class Row(NamedTuple):
-    """One level of an effect: in how many pictures each detector missed a line."""
+    """One level of an effect: the number of pictures in which each detector missed a line."""
 
     kind: type[Effect]
     level: int
@@ -57,7 +57,7 @@ def measure(frames: Sequence[Frame], kinds: Sequence[type[Effect]], seeds: int) 
 
 
 def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, picture: np.ndarray) -> Finding:
-    """What the detector makes of a picture; it forgets it afterwards."""
+    """The detector's result for a picture, which it forgets afterwards."""
     new = detector.state
     finding = look(detector, frame, picture)
     detector.state = new
@@ -67,7 +67,7 @@ def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, pict
 def _pictures(
     frames: Sequence[Frame], kind: type[Effect], amount: float, seeds: int
 ) -> Iterator[tuple[Frame, np.ndarray]]:
-    """The frames behind an effect, for each seed; for one where chance has no part in it."""
+    """The frames behind an effect, for each seed; only one if the effect is not random."""
     before = None
     for seed in range(1, seeds + 1):
         made = {model: kind(amount, seed, model) for model in {frame.model for frame in frames}}
@@ -109,7 +109,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _told(rows: Iterator[Row]) -> Iterator[Row]:
-    """The rows, each printed as it comes."""
+    """The rows, each printed when it is ready."""
     print(f"{'effect':<16}{'level':>6}{'amount':>9}{'pictures':>10}", *(f"{n:>8}" for n in DETECTORS))
     for row in rows:
         counts = "".join(f"{count:>9}" for count in row.missed)

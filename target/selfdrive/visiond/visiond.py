@@ -8,9 +8,9 @@ LEAD_STD = 0.1  # m
 
 
 class Visiond:
-    """Has a detector find the lane in each view, and publishes what it found.
+    """Runs a detector on each view and publishes the result.
 
-    `latest` is the newest published ModelData, None before the first; its `t` tells its age.
+    `latest` is the newest published ModelData, None before the first; its `t` gives its age.
     """
 
     def __init__(self, detector: LaneDetector) -> None:

@@ -1,4 +1,4 @@
-"""From the controller's demand to what the Civic's actuators are sent."""
+"""Converts the controller's demand to commands for the Civic's actuators."""
 
 from math import isfinite
 
@@ -9,9 +9,9 @@ from selfdrive.common.interp import clip
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import CanFrame, CarControl, CarState
 
-BRAKE_ON = 0.02  # a demand from here on starts braking
+BRAKE_ON = 0.02  # a demand of at least this starts braking
 BRAKE_OFF = 0.005  # below this braking ends
-BRAKE_GAP = 0.01  # smaller changes of the demand are not passed on
+BRAKE_GAP = 0.01  # smaller changes of the demand are ignored
 BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake may fall at once
 
 PEDALS_EVERY = 2  # cycles
@@ -19,7 +19,7 @@ DISPLAY_EVERY = 10  # cycles
 
 
 class BrakeHysteresis:
-    """Keeps the brake from chattering: on and off at different demands, small changes ignored."""
+    """Prevents brake chatter: different on and off thresholds, small changes ignored."""
 
     def __init__(self) -> None:
         self._braking = False
@@ -40,7 +40,7 @@ class BrakeHysteresis:
 
 
 class CarController:
-    """Applies limits, hysteresis and rate limits, quantises, packs. One instance drives one run."""
+    """Applies limits, hysteresis and rate limits, quantises, packs. One instance per run."""
 
     def __init__(self) -> None:
         self._hysteresis = BrakeHysteresis()
@@ -48,7 +48,7 @@ class CarController:
         self._can = CommandPacker()
 
     def update(self, control: CarControl, car: CarState, frame: int) -> list[CanFrame]:
-        """Frames of control cycle `frame`; `car` is the state the demand was made from.
+        """Frames of control cycle `frame`; `car` is the state that the demand is based on.
 
         A demand that is not a number is sent as zero.
         """

@@ -1,4 +1,4 @@
-"""From the Civic's CAN frames to a CarState."""
+"""Converts the Civic's CAN frames to a CarState."""
 
 from collections.abc import Sequence
 
@@ -22,7 +22,7 @@ from selfdrive.messages import ButtonEvent, CanFrame, CarState
 
 SPEED_GAINS = (0.12287673, 0.29666309)  # of the speed estimate's Kalman filter at 100 Hz
 
-# The wheels' own sensors are too coarse at walking pace; the gearbox is trusted there.
+# The wheel sensors are too coarse at walking pace; the gearbox is used there.
 _BLEND_BP = (1.0, 6.0)  # m/s
 _BLEND_V = (0.0, 1.0)  # weight of the wheel speed
 
@@ -34,10 +34,10 @@ _BUTTON_NAMES = {
 
 
 class CarStateReader:
-    """Listens to the car bus; `update` gives a CarState of what has been received so far.
+    """Listens to the car bus; `update` returns a CarState of everything received so far.
 
-    The speed estimate starts at 0 like the original's, whatever the car's speed: it overshoots
-    by a tenth in its first half second.
+    The speed estimate starts at 0, as in the original, whatever the car's speed, so it overshoots by a tenth
+    in its first half second.
     """
 
     def __init__(self) -> None:
@@ -82,7 +82,7 @@ class CarStateReader:
         pedal, cruise_enabled, brake_switch, brake_pressed = values["POWERTRAIN_DATA"]
         state.gas = pedal / 255.0
         state.gas_pressed = pedal > 0
-        # the switch alone flickers for single frames; twice in a row it means a foot
+        # the switch flickers for single frames; two in a row mean a foot
         state.brake_pressed = bool(brake_pressed or (brake_switch and self._brake_switch))
         self._brake_switch = bool(brake_switch)
         state.cruise_enabled = bool(cruise_enabled)

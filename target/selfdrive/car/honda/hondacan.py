@@ -7,7 +7,7 @@ from selfdrive.messages import CanFrame
 
 
 class CommandPacker:
-    """Packs commands from counts; every message keeps its own running counter."""
+    """Packs commands from counts; every message has its own counter."""
 
     def __init__(self) -> None:
         messages = load(CAR_DBC)

@@ -25,9 +25,9 @@ from selfdrive.controls.lib.events import (
 )
 from selfdrive.messages import CanFrame, CarControl, CarState
 
-CAN_ERROR_CYCLES = 5  # invalid in a row, before it counts
+CAN_ERROR_CYCLES = 5  # consecutive invalid cycles before an error is raised
 
-# What each condition of CarState asks for while it lasts.
+# What each condition of CarState requests while it lasts.
 _CONDITIONS = (
     ("steer_error", Event("steer_unavailable", (NO_ENTRY, IMMEDIATE_DISABLE, PERMANENT))),
     ("steer_not_allowed", Event("steer_temp_unavailable", (NO_ENTRY, WARNING))),
@@ -78,7 +78,7 @@ def get_params() -> CarParams:
 
 
 class CarInterface:
-    """Reads the car and commands it. One instance drives one run; all state lives here."""
+    """Reads the car and commands it. One instance per run holds all state."""
 
     def __init__(self, params: CarParams | None = None) -> None:
         self.params = params or get_params()
@@ -88,7 +88,7 @@ class CarInterface:
         self._invalid_cycles = 0
 
     def update(self, frames: Sequence[CanFrame], t: float) -> CarState:
-        """Take all frames received since the last call at time `t` (s); returns a new CarState."""
+        """Take all frames received since the last call, at time `t` (s); returns a new CarState."""
         previous, car = self._car, self._reader.update(frames, t)
         self._invalid_cycles = 0 if car.can_valid else self._invalid_cycles + 1
         car.events = tuple(self._events(car, previous))
@@ -98,8 +98,8 @@ class CarInterface:
     def apply(self, control: CarControl, frame: int) -> list[CanFrame]:
         """Limit and pack the demand of control cycle `frame` (0, 1, ...); returns frames to send.
 
-        Steering is sent every cycle, gas and brake every second, the dashboard every tenth.
-        With `control.enabled` False all actuators are sent as zero, whatever the demand.
+        Steering is sent every cycle, gas and brake every second, the dashboard every tenth. If
+        `control.enabled` is False, all actuators are sent as zero.
         """
         return self._controller.update(control, self._car, frame)
 

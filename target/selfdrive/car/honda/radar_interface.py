@@ -25,10 +25,10 @@ class RadarInterface:
         self._tracking = False
 
     def update(self, frames: Sequence[CanFrame], t: float) -> RadarData | None:
-        """Take the frames of this step at time `t` (s); a RadarData when a cycle is complete, else None.
+        """Take the frames of this step at time `t` (s); returns RadarData when a cycle is complete, else
+        None.
 
-        A radar that falls silent gives None for ever: its age is for the receiver to judge.
-        """
+        A silent radar returns None for ever: the receiver must check the age."""
         parser = self._parser
         parser.update(frames, t)
         if _LAST_OF_CYCLE not in parser.updated:

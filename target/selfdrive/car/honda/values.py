@@ -1,4 +1,4 @@
-"""Facts of the car's electronics: bus numbers, codes, what is sent how often."""
+"""Constants of the car's electronics: buses, codes, message rates."""
 
 from pathlib import Path
 
@@ -24,20 +24,20 @@ GEARS = {1: "park", 2: "reverse", 4: "neutral", 8: "drive", 16: "sport", 32: "lo
 GEAR_CODES = {name: code for code, name in GEARS.items()}
 
 STEER_STATUS_NORMAL = 0
-STEER_STATUS_FAULT = 5  # what is assumed until the EPS has said otherwise
-STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS refuses torque for now at most, it is not broken
+STEER_STATUS_FAULT = 5  # assumed until the EPS reports otherwise
+STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS may refuse torque for now, but is not broken
 
 RADAR_GOOD = 0x79
-NO_TRACK_DISTANCE = 255.0  # m; a track at this distance or beyond has ended
+NO_TRACK_DISTANCE = 255.0  # m; a track at this distance or more has ended
 
 STEER_COUNTS = 0x1000  # sent for a demand of 1
 STEER_FULL_COUNTS = 0xF00  # what the EPS takes as full torque
 BRAKE_COUNTS = 256
 PEDAL_COUNTS = 1004  # of the pedal interceptor, for a demand of 1
 PEDAL_REST = 328
-STEER_OVERRIDE_TORQUE = 1200  # counts of the driver's torque that mean hands on the wheel
+STEER_OVERRIDE_TORQUE = 1200  # driver's torque in counts that means hands on the wheel
 
-# What the controller listens to. STEER_STATUS, seat belt and the like start in their unsafe state.
+# The messages that the controller reads. STEER_STATUS, seat belt etc. start in their unsafe state.
 CAR_MESSAGES = {
     "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100),
     "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100),

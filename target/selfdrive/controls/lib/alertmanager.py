@@ -1,4 +1,4 @@
-"""Keeps the alerts that are on and shows the most urgent."""
+"""Tracks active alerts and shows the most urgent."""
 
 from collections.abc import Mapping
 from math import inf
@@ -7,12 +7,12 @@ from selfdrive.controls.lib.alerts import ALERTS, Alert
 
 
 class AlertManager:
-    """Alerts last for their duration after they were last raised; higher priority, then newer, is shown."""
+    """Alerts last for their duration after the last raise; shown is the highest priority, then the newest."""
 
     def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
         self._table = table
         self._raised: dict[str, float] = {}  # name: time last raised
-        self._next_change = inf  # s, until then nothing runs out
+        self._next_change = inf  # s, no alert expires before this
         self.active: tuple[str, ...] = ()
         self.text1 = ""
         self.text2 = ""
@@ -27,7 +27,7 @@ class AlertManager:
         self._next_change = t
 
     def process(self, t: float) -> None:
-        """Drop what has run out and set what is shown at time `t` (s)."""
+        """Drop expired alerts and set the shown one at time `t` (s)."""
         if t < self._next_change:
             return
         self._raised = {n: t0 for n, t0 in self._raised.items() if t0 + self._table[n].duration > t}

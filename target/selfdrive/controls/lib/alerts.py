@@ -1,4 +1,4 @@
-"""What each alert says, and for how long. Texts are ours; priorities and durations the original's."""
+"""Text and duration of each alert. Texts are ours; priorities and durations the original's."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -8,7 +8,7 @@ LOWEST, LOW, MID, HIGH = range(4)
 
 
 class Alert(NamedTuple):
-    """An alert's text, looks and sound; durations in s since it was last raised."""
+    """An alert's text, appearance and sound; durations in s since the last raise."""
 
     text1: str
     text2: str
@@ -21,12 +21,12 @@ class Alert(NamedTuple):
 
     @property
     def ends(self) -> tuple[float, float, float]:
-        """Seconds until sound, picture and text are over."""
+        """Seconds until sound, picture and text end."""
         return self.sound_s, self.visual_s, self.text_s
 
     @property
     def duration(self) -> float:
-        """Seconds until nothing of it is left."""
+        """Seconds until the alert ends completely."""
         return max(self.ends)
 
 
@@ -49,7 +49,7 @@ _SPECIAL = {
     ),
 }
 
-# Event name: what is wrong, in a few words.
+# Event name: the problem in a few words.
 _IMMEDIATE = {
     "can_error": "CAN messages are missing",
     "radar_error": "No data from the radar",

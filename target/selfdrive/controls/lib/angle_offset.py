@@ -11,13 +11,13 @@ TURN_FACTOR = 0.02 * RAD_TO_DEG  # 1/(rad m/s), learn less in turns
 
 
 class AngleOffset:
-    """Integrates the distance from the middle of the lane (20 Hz)."""
+    """Integrates the distance from the lane centre (20 Hz)."""
 
     def __init__(self, value: float = 0.0) -> None:
         self.value = value  # rad at the steering wheel
 
     def update(self, v_ego: float, lane_center: float, lane_prob: float, steering_angle: float) -> None:
-        """Learn from the middle of the lane, `lane_center` m to the left of the car."""
+        """Learn from the lane centre, `lane_center` m to the left of the car."""
         slow = 1.0 / (1.0 + TURN_FACTOR * abs(steering_angle) * v_ego)
         rate = LEARN_RATE * lane_prob * max(v_ego - MIN_LEARN_SPEED, 0.0) * slow
         self.value = clip(self.value + lane_center * rate, -MAX_OFFSET, MAX_OFFSET)

@@ -1,4 +1,4 @@
-"""Fitting a cubic in C, where that was compiled."""
+"""Fits a cubic in compiled C, if available."""
 
 import ctypes
 from array import array
@@ -14,13 +14,13 @@ C_SOURCE = Path(__file__).with_name("cubic_fit.c")
 
 
 def build_fit() -> CubicFit:
-    """A CubicFit, compiled where it is to be used and has been."""
+    """A CubicFit, compiled if available and enabled."""
     library = compiled.library(C_SOURCE)
     return CompiledFit(library) if library else CubicFit()
 
 
 class CompiledFit(CubicFit):
-    """Does what CubicFit does: `library` is `cubic_fit.c`, compiled."""
+    """Same as CubicFit, with `library`, compiled `cubic_fit.c`."""
 
     def __init__(self, library: compiled.Library) -> None:
         self._fit = library.code.fit
@@ -35,7 +35,7 @@ class CompiledFit(CubicFit):
         """The cubic through `points` (m)."""
         try:
             self._points[:] = array("d", points)
-        except (TypeError, OverflowError, BufferError):  # a fault may make them no numbers, or fewer
+        except (TypeError, OverflowError, BufferError):  # a fault may replace or drop points
             return super().__call__(points)
         self._fit(*self._arguments)
         a, b, c, d = self._poly

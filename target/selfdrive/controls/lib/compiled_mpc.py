@@ -1,6 +1,6 @@
-"""The solvers of both model-predictive controllers: in C where that was compiled, else CasADi's.
+"""The solvers of both model-predictive controllers: compiled C if available, else CasADi's.
 
-CasADi is imported only for its own: to import it and to build both takes as long as seconds of driving.
+CasADi is imported only if needed: importing it and building both takes as long as seconds of driving.
 """
 
 import ctypes
@@ -16,13 +16,13 @@ from selfdrive.controls.lib.horizon import INTERVALS, N_NODES
 from selfdrive.controls.lib.mpc_iteration import Solver
 
 C_SOURCE = Path(__file__).with_name("mpc.c")
-CASADI = "3.8.2"  # whose arithmetic the C file has; another version may simplify otherwise
+CASADI = "3.8.2"  # the version whose arithmetic the C file has; others may simplify differently
 LONGITUDINAL_WEIGHTS = (5.0, 0.1, 10.0, 20.0)  # as in `long_ocp`
-LATERAL_WEIGHTS = (1.0, 1.0, 1.0, 1.0)  # as in `lateral_ocp`, but for the steering rate's
+LATERAL_WEIGHTS = (1.0, 1.0, 1.0, 1.0)  # as in `lateral_ocp`, except for the steering rate's
 
 
 class Code(NamedTuple):
-    """What compiled solvers are made of: the library of `mpc.c`, and the address of DAQP's function."""
+    """The parts of compiled solvers: the library of `mpc.c`, and the address of DAQP's function."""
 
     library: ctypes.CDLL
     daqp: ctypes.c_void_p
@@ -59,7 +59,7 @@ def _code() -> Code | None:
 
 @cache
 def _daqp() -> ctypes.c_void_p | None:
-    """`daqp_quadprog` of the DAQP that CasADi itself calls; None without it, or with another CasADi."""
+    """`daqp_quadprog` of the DAQP in CasADi; None if it is missing or CasADi's version differs."""
     casadi = find_spec("casadi")
     if casadi is None or casadi.origin is None:
         return None
@@ -73,7 +73,7 @@ def _daqp() -> ctypes.c_void_p | None:
 
 
 class CompiledSolver:
-    """Does what CasADi's function does: `iteration` names the one of `mpc.c`."""
+    """Same as CasADi's function: `iteration` is the function of `mpc.c`."""
 
     def __init__(
         self, code: Code, iteration: str, weights: Sequence[float], *, n_state: int, n_param: int
@@ -94,13 +94,13 @@ class CompiledSolver:
         return self._outputs[i]
 
     def buffer(self) -> tuple["Addresses", Callable[[], None]]:
-        """Addresses to be set, and what solves from and to them."""
+        """Addresses to set, and the function that solves with them."""
         addresses = Addresses(self._daqp, memoryview(self._weights))
         return addresses, partial(self._iterate, addresses.call)
 
 
 class Addresses:
-    """What an iteration is handed: the addresses of DAQP, of the weights, of arguments and results."""
+    """The arguments of an iteration: addresses of DAQP, weights, arguments and results."""
 
     def __init__(self, daqp: ctypes.c_void_p, weights: memoryview) -> None:
         self.call = (ctypes.c_void_p * 8)(daqp)

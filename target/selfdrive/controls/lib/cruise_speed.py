@@ -18,10 +18,10 @@ def initial_v_cruise(v_ego: float) -> int:
 
 
 def button_v_cruise(v_cruise: int, buttons: Iterable[ButtonEvent]) -> int:
-    """Set speed (km/h) after the buttons released this cycle while engaged.
+    """Set speed (km/h) after the buttons released in this cycle while engaged.
 
-    Both buttons go from the multiple of 8 at or below the set speed, so a first `decel` from
-    95 gives 80: that is what the original does.
+    Both buttons start from the multiple of 8 at or below the set speed, so a first `decel` from 95 gives 80,
+    as in the original.
     """
     for button in buttons:
         if button.pressed:

@@ -1,4 +1,4 @@
-"""Whether the driver is still there: six minutes without a hand on anything, and the car slows down."""
+"""Driver awareness: after six minutes without any driver action, the car slows down."""
 
 from selfdrive.common.realtime import DT_CTRL
 
@@ -8,18 +8,18 @@ PRE_ALERT_TIME = 4.0  # s, how long the first alert is shown
 
 
 class DriverAwareness:
-    """Counts down from 1 while engaged; any action of the driver sets it back."""
+    """Counts down from 1 while engaged; any driver action resets it."""
 
     def __init__(self) -> None:
         self.status = 1.0
 
     @property
     def absent(self) -> bool:
-        """True when the car has to slow down by itself."""
+        """True if the car must slow down on its own."""
         return self.status < 0.0
 
     def count_down(self) -> str:
-        """One engaged cycle; returns the alert to raise, or an empty text."""
+        """One engaged cycle; returns the alert to raise, or an empty string."""
         self.status -= DT_CTRL / AWARENESS_TIME
         if self.status <= 0.0:
             return "driver_distracted"
@@ -31,5 +31,5 @@ class DriverAwareness:
         )
 
     def reset(self) -> None:
-        """The driver did something, or is driving."""
+        """The driver acted, or is driving."""
         self.status = 1.0

@@ -1,4 +1,4 @@
-"""Events: what happened, and which transitions of the control state it asks for."""
+"""Events, and the control state transitions that they request."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
@@ -14,17 +14,17 @@ PERMANENT = "permanent"  # shown as long as it lasts, engaged or not
 
 
 class Event(NamedTuple):
-    """One event of one control cycle, with the kinds of reaction it asks for."""
+    """One event of one control cycle, with the reactions that it requests."""
 
     name: str
     kinds: tuple[str, ...]
 
 
 def has_kind(events: Iterable[Event], kind: str) -> bool:
-    """Whether any event asks for this kind of reaction."""
+    """Whether any event requests this kind of reaction."""
     return any(kind in event.kinds for event in events)
 
 
 def names_of_kind(events: Sequence[Event], kind: str) -> list[str]:
-    """Names of the events that ask for this kind of reaction, in order of occurrence."""
+    """Names of the events that request this kind of reaction, in order of occurrence."""
     return [event.name for event in events if kind in event.kinds]

@@ -1,4 +1,4 @@
-"""Forward collision warning: all conditions must have held for a while before the driver is warned."""
+"""Forward collision warning: all conditions must hold for a while before the warning."""
 
 from collections.abc import Sequence
 from math import inf, sqrt
@@ -8,13 +8,13 @@ from selfdrive.messages import CarState, LeadData
 
 MAX_TTC = 5.0  # s
 WARN_TTC = 2.5  # s
-LEAD_STOP_TIME = 2.0  # s, no lead is taken to stop sooner than this
+LEAD_STOP_TIME = 2.0  # s, a lead is assumed to need at least this long to stop
 COUNT_ENOUGH = 10.0
 SEEN_STEP = 0.33  # a lead must have been seen for 30 cycles
 BLINKER_STEP = 10.0 / 60.0  # no blinker for 3 s
 MIN_INTERVAL = 5.0  # s between warnings
-PLAN_NODES = 9  # of the plan's nodes, 0..2.8 s, are looked at for braking
-A_HARD = -3.0  # m/s^2, a plan that brakes harder warns in any case
+PLAN_NODES = 9  # of the plan's nodes, 0..2.8 s, are checked for braking
+A_HARD = -3.0  # m/s^2, a plan that brakes harder always warns
 A_THRESHOLD = ((0.0, 30.0), (-3.0, -2.0))  # m/s^2 over the lead's speed in m/s
 
 
@@ -35,7 +35,7 @@ class FcwChecker:
         self.reset()
 
     def reset(self) -> None:
-        """A new lead: count anew."""
+        """A new lead: restart all counts."""
         self._last_warning = -inf  # s
         self._v_lead_max = 0.0
         self._speed = self._ttc = self._lead_moved = self._closing = 0
@@ -43,7 +43,7 @@ class FcwChecker:
         self._seen = self._no_blinker = 0.0
 
     def update(self, t: float, car: CarState, lead: LeadData, a_plan: Sequence[float]) -> bool:
-        """True when the driver is to be warned now; `a_plan` is the planned acceleration (m/s^2)."""
+        """Whether to warn the driver now; `a_plan` is the planned acceleration (m/s^2)."""
         self._v_lead_max = max(self._v_lead_max, lead.v_lead)
         if not lead.fcw:
             return False

@@ -13,10 +13,10 @@ MIN_SATURATION_ERROR = 0.1 * DEG_TO_RAD  # rad
 
 
 class LatControl:
-    """A wanted steering-wheel angle from the MPC at 20 Hz, held by a PI loop at 100 Hz.
+    """Desired steering-wheel angle from the MPC at 20 Hz, tracked by a PI loop at 100 Hz.
 
-    As in the original the angle is taken as it comes and kept until the next one. One that is not a
-    number, from an MPC without a solution, gives full torque to the left: the limiter's upper end.
+    As in the original, each angle is kept until the next. If an MPC without a solution returns NaN, the
+    torque is full left: the limiter's upper end.
     """
 
     def __init__(self, params: CarParams) -> None:
@@ -30,7 +30,7 @@ class LatControl:
 
     @property
     def saturated(self) -> bool:
-        """The wanted angle has been out of the steering's reach for some time."""
+        """The desired angle has been out of the steering's reach for some time."""
         return self._pid.saturated
 
     def plan(self, car: CarState, lanes: Lanes, angle_offset: float) -> None:

@@ -14,8 +14,8 @@ from selfdrive.controls.lib.mpc_iteration import Iteration
 
 Poly = tuple[float, float, float, float]
 
-MIN_SPEED = 5.0  # m/s, the plan is not made for less: it would be rough
-FIRST_RATE = 0.1  # rad/s, the guess to start from when there is no plan yet
+MIN_SPEED = 5.0  # m/s; below this, the plan uses it to avoid rough solutions
+FIRST_RATE = 0.1  # rad/s, the initial guess without a plan
 
 
 @dataclass(slots=True)
@@ -31,18 +31,18 @@ class Lanes:
 
 
 class LateralMpc:
-    """Plans the road-wheel angle; one real-time iteration an update (20 Hz, with each model message).
+    """Plans the road-wheel angle; one real-time iteration per update (20 Hz, with each model message).
 
-    Results: `angle_desired` (rad at the steering wheel, offset included), `delta_desired` (rad at the
-    road wheels, 0.05 s ahead), `delta_plan` (21 nodes, 0..2.5 s: every 0.05 s to 0.25 s, then every
-    0.15 s; that of the last finite solution), `nans` (the last solution was not finite), `resets`, the
-    number of such solutions.
+    Results: `angle_desired` (rad at the steering wheel, offset included), `delta_desired` (rad at the road
+    wheels, 0.05 s ahead), `delta_plan` (21 nodes, 0..2.5 s: every 0.05 s to 0.25 s, then every 0.15 s; from
+    the last finite solution), `nans` (the last solution was not finite), `resets` (the number of such
+    solutions).
 
-    A solution that is not finite (lanes hundreds of metres away, NaN in the input) gives NaN for both
-    angles until the next update, which starts from nothing and the angle measured. Where the problem
-    has no solution (a heading or wheel angle out of bounds by more than the steering rate can mend) or
-    is too badly conditioned to find one (lanes more than about 20 m from the plan), the steering rates
-    planned before are kept; `unsolved` counts this.
+    A non-finite solution (lanes hundreds of metres away, NaN in the input) gives NaN for both angles until
+    the next update, which starts from nothing and the measured angle. If the problem has no solution (a
+    heading or wheel angle out of bounds by more than the steering rate can correct) or is too badly
+    conditioned (lanes more than about 20 m from the plan), the previous steering rates are kept; `unsolved`
+    counts this.
     """
 
     def __init__(self, params: CarParams) -> None:
@@ -52,7 +52,7 @@ class LateralMpc:
         self.reset()
 
     def reset(self) -> None:
-        """Back to the state after construction, without building the solver again."""
+        """Return to the initial state without rebuilding the solver."""
         self._iteration.restart(control=FIRST_RATE)
         self._delta = 0.0  # rad, where the next plan starts
         self.angle_desired = 0.0
@@ -63,7 +63,7 @@ class LateralMpc:
 
     @property
     def unsolved(self) -> int:
-        """Number of updates in which the solver failed and the plan's steering rates were kept."""
+        """Number of updates in which the solver failed and the previous steering rates were kept."""
         return self._iteration.unsolved
 
     def update(
@@ -76,13 +76,13 @@ class LateralMpc:
     ) -> float:
         """Plan for `lanes`; returns `angle_desired` (rad at the steering wheel).
 
-        Speed in m/s; measured steering-wheel angle and its learnt offset in rad; `curvature_factor`
-        in 1/m, the curvature of the car's path for a road-wheel angle of 1 rad. Call it with
-        every model message, engaged or not, as the original does: the plan starts from its own last
-        angle. A solution that is not finite gives NaN; the next one starts anew at the measured angle.
+        Speed in m/s; measured steering-wheel angle and its learnt offset in rad; `curvature_factor` in 1/m is
+        the path curvature for a road-wheel angle of 1 rad. Call it with every model message, engaged or not,
+        as the original does: the plan starts from its own last angle. A non-finite solution gives NaN; the
+        next one starts at the measured angle.
         """
         ratio = self.params.steer_ratio
-        driven = v_ego * self.params.steer_actuator_delay  # m, until a command acts
+        driven = v_ego * self.params.steer_actuator_delay  # m, until a command takes effect
         start = (driven, 0.0, driven * curvature_factor * steering_angle / ratio, self._delta)
         road = (*lanes.left_poly, *lanes.right_poly, *lanes.path_poly)
         probs = (lanes.left_prob, lanes.right_prob, lanes.lane_width)

@@ -1,4 +1,4 @@
-"""Longitudinal model-predictive control: how to follow one lead vehicle.
+"""Longitudinal model-predictive control: following one lead vehicle.
 
 The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
 """
@@ -16,42 +16,42 @@ FUTURE_NODE = 10  # 4 s ahead
 
 LEAD_DECAY = 1.5  # 1/s, rate at which a lead's acceleration fades
 LEAD_DECAY_FACTOR = 0.9  # each update while it lasts
-LEAD_STEADY_ACCEL = 0.5  # m/s^2, below it counts as none
+LEAD_STEADY_ACCEL = 0.5  # m/s^2, less counts as none
 LEAD_STOPPED_SPEED = 0.1  # m/s
-LEAD_JUMP = 2.5  # m from one update to the next: another car
+LEAD_JUMP = 2.5  # m between updates: a different car
 NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead that never matters
 CRASH_GAP = -50.0  # m
 BACKWARDS_SPEED = -0.01  # m/s
 
 
 class LongitudinalMpc:
-    """Plans the host's speed behind one lead; one real-time iteration an update (20 Hz).
+    """Plans the host's speed behind one lead; one real-time iteration per update (20 Hz).
 
-    Call `set_cur_state` with the plan's speed and acceleration now, then `update`. Results:
-    `v_mpc`, `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status`
-    (the solution is for a real lead and may compete for the plan), `new_lead` (the lead appeared or
-    jumped in this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s
-    to 1 s, then every 0.6 s), and `resets`, the number of times a solution was thrown away.
+    Call `set_cur_state` with the plan's current speed and acceleration, then `update`. Results: `v_mpc`,
+    `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status` (the solution is
+    for a real lead and may compete for the plan), `new_lead` (the lead appeared or jumped in this update),
+    `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s to 1 s, then every 0.6 s), and
+    `resets` (the number of discarded solutions).
 
-    A solution is thrown away when it is not finite (the plan of the update before stays readable), and,
-    for a real lead, when it goes 50 m through the lead or backwards. The next one then starts from
-    nothing, `v_mpc` and `a_mpc` are the car's own, and the next lead is a new one.
+    A solution is discarded if it is not finite (the previous plan stays readable) or if, for a real lead, it
+    goes 50 m through the lead or backwards. The next one then starts from nothing, `v_mpc` and `a_mpc` are
+    the car's own, and the next lead is new.
 
-    v >= 0 is asked of all nodes but the first. The plan's own speed may be slightly negative, as it is
-    in the original at the end of a stop; jerk has no limit, so some jerk always meets the bounds and
-    the problem is never infeasible. Where the solver fails all the same, the jerk planned before is
-    kept (`unsolved` counts this), and the rules above judge the outcome.
+    v >= 0 is required at all nodes except the first. The plan's own speed may be slightly negative, as in the
+    original at the end of a stop; jerk has no limit, so some jerk always meets the bounds and the problem is
+    always feasible. If the solver still fails, the previous jerk is kept (`unsolved` counts this), and the
+    rules above judge the result.
     """
 
     def __init__(self, mpc_id: int, solver: Solver | None = None) -> None:
-        """`mpc_id` is 1 or 2, for the log. `solver`: that of another instance, which has no memory."""
+        """`mpc_id` is 1 or 2, for the log. `solver` may be another instance's, which is stateless."""
         self.mpc_id = mpc_id
         self.solver = solver or build_longitudinal()
         self._iteration = Iteration(self.solver)
         self.reset()
 
     def reset(self) -> None:
-        """Back to the state after construction, without building the solver again."""
+        """Return to the initial state without rebuilding the solver."""
         self._iteration.restart()
         self._v_start = self._a_start = 0.0
         self._decay = LEAD_DECAY
@@ -62,11 +62,11 @@ class LongitudinalMpc:
 
     @property
     def unsolved(self) -> int:
-        """Number of updates in which the solver failed and the plan's jerk was kept."""
+        """Number of updates in which the solver failed and the previous jerk was kept."""
         return self._iteration.unsolved
 
     def set_cur_state(self, v: float, a: float) -> None:
-        """Where the plan starts: speed (m/s) and acceleration (m/s^2)."""
+        """The plan's start: speed (m/s) and acceleration (m/s^2)."""
         self._v_start, self._a_start = v, a
 
     def update(self, v_ego: float, a_ego: float, lead: LeadData | None) -> None:
@@ -86,12 +86,12 @@ class LongitudinalMpc:
             self._discard(v_ego, a_ego)
 
     def _follow(self, lead: LeadData) -> tuple[float, float, float, float]:
-        """Lead's position, speed, acceleration and its decay as the plan takes them."""
+        """The lead's position, speed, acceleration and its decay for the plan."""
         x, v, a = lead.d_rel, max(0.0, lead.v_lead), lead.a_lead_k
         if v < LEAD_STOPPED_SPEED or -a / 2 > v:  # stopped, or soon will be
             v = a = 0.0
         self._decay = LEAD_DECAY if abs(a) < LEAD_STEADY_ACCEL else self._decay * LEAD_DECAY_FACTOR
-        decay = max(self._decay, -a / (v + 0.01))  # a braking lead stops, it does not reverse
+        decay = max(self._decay, -a / (v + 0.01))  # a braking lead stops; it does not reverse
         if not self.prev_lead_status or abs(x - self._prev_x_lead) > LEAD_JUMP:
             self._simulate(x, v, a, decay)
             self.new_lead = True
@@ -118,7 +118,7 @@ class LongitudinalMpc:
         self._iteration.restart(nodes)
 
     def _publish(self, z: array) -> None:
-        """Take the results out of the trajectory `z`."""
+        """Extract the results from the trajectory `z`."""
         end = 6 * N_NODES
         self.x_plan, self.v_plan, self.a_plan = z[0:end:6], z[1:end:6], z[2:end:6]
         self.x_lead_plan = z[3:end:6]
@@ -131,7 +131,7 @@ class LongitudinalMpc:
         return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
 
     def _discard(self, v_ego: float, a_ego: float) -> None:
-        """Throw the solution away and start anew from the car's own speed."""
+        """Discard the solution and restart from the car's own speed."""
         self.resets += 1
         self._iteration.restart()
         self.v_mpc, self.a_mpc = v_ego, a_ego

@@ -8,10 +8,10 @@ from selfdrive.messages import CarState, Plan
 
 OFF = "off"
 PID = "pid"  # following the target in closed loop
-STOPPING = "stopping"  # the loop fits badly near standstill: brake open loop
+STOPPING = "stopping"  # the loop works badly near standstill: brake open loop
 STARTING = "starting"  # release the brake open loop before the loop takes over
 
-MIN_CAN_SPEED = 0.3  # m/s, below it the car reports 0
+MIN_CAN_SPEED = 0.3  # m/s, below this the car reports 0
 STOPPING_EGO_SPEED = 0.5  # m/s
 STOPPING_TARGET_SPEED = MIN_CAN_SPEED + 0.01  # m/s
 STARTING_TARGET_SPEED = 0.5  # m/s
@@ -25,7 +25,7 @@ CREEP_BRAKE = 0.15  # brake that holds it at rest
 
 
 class LongControl:
-    """Gas and brake as one output in -1..1, the states around standstill included."""
+    """Gas and brake as one output in -1..1, including the states around standstill."""
 
     def __init__(self, params: CarParams) -> None:
         self._params = params

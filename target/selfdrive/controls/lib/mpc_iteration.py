@@ -1,4 +1,4 @@
-"""Iterations of model-predictive control, one after the other, whatever solver makes them."""
+"""Successive iterations of model-predictive control, with any solver."""
 
 from array import array
 from collections.abc import Callable, Sequence
@@ -6,7 +6,7 @@ from typing import Protocol
 
 
 class Buffers(Protocol):
-    """Where a solver finds its arguments and puts its results."""
+    """The memory of a solver's arguments and results."""
 
     def set_arg(self, i: int, values: memoryview) -> None:
         """Doubles that argument `i` is read from."""
@@ -16,9 +16,9 @@ class Buffers(Protocol):
 
 
 class Solver(Protocol):
-    """One iteration as a function of three arguments and with three results, as `build_solver` says them.
+    """One iteration as a function with three arguments and three results (see `build_solver`).
 
-    It is what is used of a CasADi function.
+    The part of a CasADi function's interface that is used.
     """
 
     def size1_in(self, i: int) -> int:
@@ -28,15 +28,15 @@ class Solver(Protocol):
         """Length of result `i`."""
 
     def buffer(self) -> tuple[Buffers, Callable[[], None]]:
-        """Buffers to be set, and what solves from and to them."""
+        """Buffers to set, and the function that solves with them."""
 
 
 class Iteration:
-    """Runs a solver on buffers of its own; holds the trajectory from one iteration to the next.
+    """Runs a solver on its own buffers; holds the trajectory between iterations.
 
-    `guess` is the trajectory the next iteration linearises at, `solution` the last one computed: the
-    states node by node, then the controls. They are written in place. `unsolved` counts the finite
-    iterations that kept the controls.
+    `guess` is the trajectory at which the next iteration linearises, `solution` the last computed one: the
+    states node by node, then the controls. Both are written in place. `unsolved` counts the finite iterations
+    that kept the controls.
     """
 
     def __init__(self, solver: Solver) -> None:
@@ -53,13 +53,13 @@ class Iteration:
         self.unsolved = 0
 
     def restart(self, nodes: Sequence[float] | None = None, control: float = 0.0) -> None:
-        """Guess anew: the states of all nodes (None: zeros) and the same control all along."""
+        """Reset the guess: the states of all nodes (None: zeros) and a constant control."""
         controls = array("d", [control]) * self._n_control
         states = array("d", nodes or bytes(8 * (len(self.guess) - self._n_control)))
         self.guess[:] = states + controls
 
     def run(self, start: Sequence[float], param: Sequence[float]) -> bool:
-        """One iteration from the state `start`; False when the solution is not finite."""
+        """One iteration from the state `start`; False if the solution is not finite."""
         self._start[:] = array("d", start)
         self._param[:] = array("d", param)
         self._evaluate()

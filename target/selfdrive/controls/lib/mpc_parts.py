@@ -1,8 +1,8 @@
 """Writes a part of `mpc.c`: `python -m selfdrive.controls.lib.mpc_parts`, after a change of a problem.
 
-It is what CasADi derives from each optimal control problem, one statement for each of its operations and in
-their order: a step of RK4, the residuals of the stages and of the end, and their derivatives. With a new
-CasADi, the tests of `compiled_mpc` tell whether the rest of `mpc.c` still has its bits.
+The part is what CasADi derives from each optimal control problem, one statement per operation, in order: a
+step of RK4, the residuals of the stages and of the end, and their derivatives. With a new CasADi, the tests
+of `compiled_mpc` show whether the rest of `mpc.c` still has its bits.
 """
 
 from collections.abc import Iterator
@@ -56,7 +56,7 @@ def _of(ocp: Ocp) -> Iterator[str]:
 
 
 def _over(a: ca.SX, factor: float) -> ca.SX:
-    """What is multiplied by `factor` in the elements of `a` that are such products."""
+    """The factors that `factor` multiplies in those elements of `a` that are such products."""
     of_product = ca.SX(a.shape[0], a.shape[1])
     for i, j in zip(*a.sparsity().get_triplet(), strict=True):
         element = a[i, j]
@@ -66,7 +66,7 @@ def _over(a: ca.SX, factor: float) -> ca.SX:
 
 
 def _under(c: ca.SX) -> ca.SX:
-    """What 1 is divided by in the elements of `c` that are such quotients."""
+    """The divisors of 1 in those elements of `c` that are such quotients."""
     of_quotient = ca.SX(c.shape[0], c.shape[1])
     for i, j in zip(*c.sparsity().get_triplet(), strict=True):
         element = c[i, j]
@@ -78,10 +78,10 @@ def _under(c: ca.SX) -> ca.SX:
 
 
 def _function(name: str, of: ca.Function, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> str:
-    """A C function: matrices lie row by row, and of these only what is not always 0 is written."""
+    """A C function: matrices are row-major, and only elements that are not always 0 are written."""
     words = [f"const double *{word}" for word in inputs] + [f"double *{word}" for word in outputs]
     lines = [f"static void {name}({', '.join(words)})", "{"]
-    now: list[str] = [""] * of.sz_w()  # what each place of the work vector is called now
+    now: list[str] = [""] * of.sz_w()  # the current name of each place of the work vector
     for k in range(of.n_instructions()):
         operation, to, at = of.instruction_id(k), of.instruction_output(k), of.instruction_input(k)
         if operation == ca.OP_INPUT:
@@ -101,7 +101,7 @@ def _function(name: str, of: ca.Function, inputs: tuple[str, ...], outputs: tupl
 
 
 def with_parts(text: str) -> str:
-    """The text of `mpc.c` with its parts as they are to be."""
+    """The text of `mpc.c` with its generated parts updated."""
     before, rest = text.split(BEGIN)
     return before + BEGIN + parts() + END + rest.split(END)[1]
 

@@ -1,4 +1,4 @@
-"""Where the road goes: lane lines and the model's path, and the path to follow between them."""
+"""The road ahead: lane lines, the model's path, and the path to follow between them."""
 
 from selfdrive.common.interp import interp
 from selfdrive.controls.lib.compiled_fit import build_fit
@@ -6,18 +6,18 @@ from selfdrive.controls.lib.lateral_mpc import Lanes
 from selfdrive.controls.lib.polynomial import ZERO, Poly, blend, shifted
 from selfdrive.messages import ModelData
 
-WIDTH_RATE = 0.005  # share of a new width that enters the estimate, each model message
+WIDTH_RATE = 0.005  # share of a new width that enters the estimate, per model message
 CERTAINTY_RATE = 0.05
 USUAL_WIDTH = ((0.0, 31.0), (3.0, 3.8))  # m over m/s: roads for higher speeds are wider
-WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))  # trust in the right line over the error of the width in m
-PATH_PROB = 1.0  # the model does not tell how sure it is of its path
+WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))  # trust in the right line over the width error in m
+PATH_PROB = 1.0  # the model does not report the probability of its path
 MIN_LANE_PROB = 0.01
 
 
 class ModelFit:
     """Cubics through the three lines of a model message.
 
-    Two readers ask for the same message in turn, and fitting is dear, so the last answer is kept.
+    Two readers request the same message, and fitting is slow, so the last result is cached.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class ModelFit:
 
 
 class PathPlanner:
-    """Keeps the lane's width and, after each model message, the lanes and the path to follow."""
+    """Tracks the lane's width and, after each model message, the lanes and the path to follow."""
 
     def __init__(self, fit: ModelFit) -> None:
         self.lanes = Lanes(ZERO, ZERO, ZERO, 0.0, 0.0, 3.7)
@@ -69,7 +69,7 @@ class PathPlanner:
         return self._width_certainty * self._width_estimate + doubt * interp(v_ego, *USUAL_WIDTH)
 
     def _choose_path(self) -> None:
-        """Middle of the lane as far as lines are seen, weighed against the model's path."""
+        """Centre of the lane as far as lines are seen, weighted against the model's path."""
         lanes = self.lanes
         left_prob, right_prob = lanes.left_prob, lanes.right_prob
         if left_prob + right_prob > MIN_LANE_PROB:

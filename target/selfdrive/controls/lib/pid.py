@@ -5,7 +5,7 @@ from collections.abc import Callable
 from selfdrive.common.interp import clip, interp
 from selfdrive.common.realtime import DT_CTRL
 
-UNWIND_RATE = 0.3  # 1/s, how fast the integrator empties while the driver overrides
+UNWIND_RATE = 0.3  # 1/s, rate at which the integrator empties while the driver overrides
 SATURATION_TIME = 0.8  # s
 
 Table = tuple[tuple[float, ...], tuple[float, ...]]
@@ -14,8 +14,8 @@ Table = tuple[tuple[float, ...], tuple[float, ...]]
 class PIController:
     """PI controller at 100 Hz. Gains are tables over speed (m/s).
 
-    `convert(control, speed)` turns the sum of the terms into the actuator's unit before limits apply.
-    `saturated` becomes true after more than 0.8 s beyond a limit with an error above `min_error`.
+    `convert(control, speed)` converts the sum of the terms to the actuator's unit before limits. `saturated`
+    becomes true after more than 0.8 s at a limit with an error above `min_error`.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class PIController:
         return self._convert(control, speed) if self._convert else control
 
     def _integrate(self, error: float, speed: float) -> None:
-        """Take the integrator's step, unless it would press further against a limit."""
+        """Integrate, unless this would push further against a limit."""
         integral = self.i + error * interp(speed, *self._ki) * DT_CTRL
         control = self._output(integral, speed)
         up_ok = error >= 0.0 and (control <= self.pos_limit or integral < 0.0)

@@ -24,7 +24,7 @@ def shifted(poly: Poly, dy: float) -> Poly:
 
 
 def blend(first: Poly, weight1: float, second: Poly, weight2: float) -> Poly:
-    """Weighted mean of two curves; zero when neither has weight."""
+    """Weighted mean of two curves; zero if neither has weight."""
     total = weight1 + weight2
     if total <= 0.0:
         return ZERO

@@ -1,4 +1,4 @@
-"""Radar tracks, and what belongs together among them."""
+"""Radar tracks and their clusters."""
 
 from collections.abc import Sequence
 from math import dist, pi
@@ -11,18 +11,18 @@ from selfdrive.messages import LeadData
 
 LEAD_GAINS = (0.1988689, 0.28555364)  # of the lead speed's Kalman filter at 20 Hz
 
-STATIONARY_SPEED = 4.0  # m/s, slower objects may stand
+STATIONARY_SPEED = 4.0  # m/s, slower objects may be stationary
 ONCOMING_SPEED = -3.9  # m/s
-STATIONARY_MIN_EGO = 4.0  # m/s, below it nothing is said to stand
+STATIONARY_MIN_EGO = 4.0  # m/s, below this no object is called stationary
 
 LAT_FILTER = 2.0 * pi * 0.2 * DT_MDL / (1.0 + 2.0 * pi * 0.2 * DT_MDL)  # low pass of 0.2 Hz
 A_REL_FILTER = 2.0 * pi * 0.5 * DT_MDL / (1.0 + 2.0 * pi * 0.5 * DT_MDL)  # low pass of 0.5 Hz
 A_REL_MAX = 10.0  # m/s^2
 
 CLUSTER_DISTANCE = 2.5
-LANE_HALF = 1.5  # m from the path, within which an object is ahead of the car
+LANE_HALF = 1.5  # m from the path; nearer objects are ahead of the car
 CUT_IN_MAX = 1.0  # m of correction for lateral speed
-SECOND_GAP = 8.0  # m; closer and as fast as the first lead, it is the same vehicle's other axle
+SECOND_GAP = 8.0  # m; closer and as fast as the first lead: the same vehicle's other axle
 SECOND_SPEED = 1.0  # m/s
 
 FUSIONS_FOR_MOVING = 3
@@ -57,10 +57,10 @@ class Track:
     def update(
         self, d_rel: float, y_rel: float, v_rel: float, d_path: float, v_ego: float, driver_steers: bool
     ) -> None:
-        """A new measurement; `v_ego` is the car's speed when the radar measured."""
+        """A new measurement; `v_ego` is the car's speed at that time."""
         a_rel = clip((v_rel - self.v_rel) / DT_MDL, -A_REL_MAX, A_REL_MAX)
         self.a_rel += A_REL_FILTER * (a_rel - self.a_rel)
-        # while the driver steers, the distance to the path says nothing about the object
+        # while the driver steers, the path distance says nothing about the object
         v_lat = 0.0 if driver_steers else (d_path - self.d_path) / DT_MDL
         self.v_lat += LAT_FILTER * (v_lat - self.v_lat)
         self.filter.update(v_rel + v_ego)
@@ -72,21 +72,21 @@ class Track:
         self.v_rel = v_rel
         self.d_path = d_path
         self.v_lead = v_rel + v_ego
-        # what has moved once is never taken for standing again
+        # an object that has moved never counts as stationary again
         self.stationary = (
             self.stationary and v_ego > STATIONARY_MIN_EGO and abs(self.v_lead) < STATIONARY_SPEED
         )
         self.oncoming = self.v_lead < ONCOMING_SPEED
 
     def fuse(self) -> None:
-        """The camera sees the same object; what it sees often enough does not stand."""
+        """The camera sees the same object; an object seen often enough is not stationary."""
         self.fusions += 1
         if self.fusions >= FUSIONS_FOR_MOVING:
             self.stationary = False
 
 
 class Cluster:
-    """Tracks that are taken for one vehicle; its values are the means of theirs."""
+    """Tracks taken for one vehicle; values are means."""
 
     __slots__ = ("_tracks", "d_path", "d_rel", "v_lat", "v_rel")
 
@@ -98,22 +98,22 @@ class Cluster:
         self.v_lat = self._mean([t.v_lat for t in tracks])
 
     def _mean(self, values: Sequence[float]) -> float:
-        if len(values) == 1:  # as nearly always
+        if len(values) == 1:  # the usual case
             return 0.0 + values[0]
         return total(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
-        """Whether it drives ahead of the car, or is about to cut in."""
+        """Whether it drives ahead of the car or is about to cut in."""
         if all(t.stationary for t in self._tracks) or all(t.oncoming for t in self._tracks):
             return False
-        # the closer a vehicle, the more its sideways movement counts; far ahead the path is unsure
+        # lateral speed counts more for closer vehicles; far ahead the path is uncertain
         horizon = interp(self.d_rel, (10.0, 40.0 + v_ego / 1.2), (1.0, 0.0))
         correction = clip(horizon * self.v_lat, -CUT_IN_MAX, CUT_IN_MAX)
         moved = self.d_path + correction
         return abs(clip(moved, min(0.0, self.d_path), max(0.0, self.d_path))) < LANE_HALF
 
     def is_apart(self, first: "Cluster") -> bool:
-        """Whether it is another vehicle than the first lead."""
+        """Whether it is a different vehicle than the first lead."""
         return self.d_rel - first.d_rel > SECOND_GAP or abs(self.v_rel - first.v_rel) > SECOND_SPEED
 
     def lead_data(self, radar_offset: float) -> LeadData:
@@ -137,7 +137,7 @@ class Cluster:
 def cluster_tracks(tracks: Sequence[Track]) -> list[Cluster]:
     """Centroid linkage on (distance, twice the lateral position, speed) up to a distance of 2.5.
 
-    Lateral positions weigh double as the radar measures them badly.
+    Lateral positions count double because the radar measures them badly.
     """
     groups = [((t.d_rel, 2.0 * t.y_rel, t.v_rel), [t]) for t in tracks]
     while len(groups) > 1:

@@ -1,9 +1,9 @@
-"""How a speed target is reached within acceleration and jerk limits."""
+"""Reaches a speed target within acceleration and jerk limits."""
 
 from math import sqrt
 from typing import NamedTuple
 
-WRONG_WAY_FACTOR = 3.0  # jerk may be this much higher while accelerating away from the target
+WRONG_WAY_FACTOR = 3.0  # allowed jerk factor while accelerating away from the target
 
 
 class Limits(NamedTuple):
@@ -16,7 +16,7 @@ class Limits(NamedTuple):
 
 
 def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float) -> tuple[float, float]:
-    """Speed and acceleration `dt` s from now, on the quickest way from (v, a) to (v_target, 0)."""
+    """Speed and acceleration `dt` s from now, on the fastest way from (v, a) to (v_target, 0)."""
     a_min, a_max, j_min, j_max = limits
     dv = v_target - v
     if dv > 0.0 and a < 0.0:
@@ -24,7 +24,7 @@ def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float)
     elif dv < 0.0 and a > 0.0:
         j_min *= WRONG_WAY_FACTOR
 
-    if a > a_max or a < a_min:  # back within the limits first
+    if a > a_max or a < a_min:  # first return to the limits
         bound, jerk = (a_max, j_min) if a > a_max else (a_min, j_max)
         t_back = (bound - a) / jerk
         if dt <= t_back:
@@ -32,9 +32,9 @@ def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float)
         gained = 0.5 * (bound * bound - a * a) / jerk
         v, dv, a, dt = v + gained, dv - gained, bound, dt - t_back
 
-    # speed still gained if acceleration is taken back to zero at once
+    # speed still gained if acceleration returns to zero immediately
     dv_settle = -0.5 * a * a / (j_min if a >= 0.0 else j_max)
-    if dv < dv_settle:  # slowing down is speeding up with all signs turned
+    if dv < dv_settle:  # slowing down: speeding up with all signs reversed
         gained, a = _raise(-dv, -a, -a_min, -j_max, -j_min, dt)
         return v - gained, -a
     gained, a = _raise(dv, a, a_max, j_min, j_max, dt)
@@ -43,12 +43,12 @@ def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float)
 
 def _raise(dv: float, a: float, a_max: float, j_min: float, j_max: float, dt: float) -> tuple[float, float]:
     """Speed gained and acceleration after `dt` of jerk up, hold, jerk down towards a gain of `dv`."""
-    # the small term keeps the root's argument from falling below zero
+    # the small term keeps the root's argument non-negative
     a_peak = sqrt((0.5 * a * a / j_max + dv + 1e-9) / (0.5 / j_max - 0.5 / j_min))
     if a_peak > a_max:
         a_peak = a_max
         t1 = (a_peak - a) / j_max
-        if a_peak <= 0.0:  # the target cannot be reached: hold the limit
+        if a_peak <= 0.0:  # the target is out of reach: hold the limit
             t2 = t1 + dt + 1e-9
             t3 = t2
         else:

@@ -1,4 +1,4 @@
-"""Engaged or not: how events move the control state."""
+"""The control state: how events engage and disengage."""
 
 from collections.abc import Sequence
 
@@ -24,7 +24,7 @@ SOFT_DISABLE_CYCLES = 300
 
 
 class StateMachine:
-    """The four control states. Nothing but an ENABLE event without a NO_ENTRY engages."""
+    """The four control states. Only an ENABLE event without a NO_ENTRY engages."""
 
     def __init__(self) -> None:
         self.state = DISABLED
@@ -32,7 +32,7 @@ class StateMachine:
 
     @property
     def enabled(self) -> bool:
-        """Engaged, though perhaps still waiting for the driver's foot."""
+        """Engaged, perhaps still waiting for the driver's foot."""
         return self.state != DISABLED
 
     @property
@@ -41,10 +41,10 @@ class StateMachine:
         return self.state == ENABLED or self.state == SOFT_DISABLING
 
     def update(self, events: Sequence[Event], alerts: AlertManager, t: float) -> bool:
-        """Move on by one cycle at time `t` (s) and raise the alerts of the move; True if just engaged."""
+        """Advance one cycle at time `t` (s) and raise the alerts of the transition; True if just engaged."""
         self._cycles_left = max(0, self._cycles_left - 1)
         if not events and self.state in (DISABLED, ENABLED):
-            return False  # as in nearly all cycles
+            return False  # the usual case
         if self.state == DISABLED:
             return self._try_engage(events, alerts, t)
         if has_kind(events, USER_DISABLE):
@@ -55,7 +55,7 @@ class StateMachine:
             self._soften(events, alerts, t)
         elif self.state == SOFT_DISABLING:
             self._harden(events)
-        elif has_kind(events, SOFT_DISABLE):  # pre-enabled: nothing to hand over gently
+        elif has_kind(events, SOFT_DISABLE):  # pre-enabled: no gradual hand-over needed
             self._disable(names_of_kind(events, SOFT_DISABLE), alerts, t)
         elif not has_kind(events, PRE_ENABLE):
             self.state = ENABLED
@@ -88,7 +88,7 @@ class StateMachine:
             self._cycles_left = SOFT_DISABLE_CYCLES
 
     def _harden(self, events: Sequence[Event]) -> None:
-        """Soft disabling: back when the reason is gone, off when the time has run out."""
+        """Soft disabling: return if the reason is gone, disengage if the time is up."""
         if not has_kind(events, SOFT_DISABLE):
             self.state = ENABLED
         elif self._cycles_left == 0:

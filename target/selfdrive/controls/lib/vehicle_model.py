@@ -15,7 +15,7 @@ class VehicleModel:
         rear = params.wheelbase - params.center_to_front
         stiff_front, stiff_rear = params.tire_stiffness_front, params.tire_stiffness_rear
         balance = stiff_front * params.center_to_front - stiff_rear * rear
-        # s^2/m^2; negative for an understeering car: curvature falls with speed
+        # s^2/m^2; negative for understeer: curvature falls with speed
         self.slip_factor = params.mass * balance / (params.wheelbase**2 * stiff_front * stiff_rear)
 
     def curvature_factor(self, v_ego: float) -> float:

@@ -1,4 +1,4 @@
-"""The camera's lead vehicle, smoothed, to be matched with radar tracks."""
+"""The camera's lead vehicle, smoothed for matching with radar tracks."""
 
 from collections.abc import Iterable
 from math import hypot
@@ -15,14 +15,14 @@ Q_DISTANCE = 0.5  # m^2, each cycle
 Q_RATE = 1.0  # (m/s)^2, each cycle
 
 MAX_DISTANCE = 4.0
-MAX_SPEED_DIFF = 10.0  # m/s, a camera estimates speed badly
+MAX_SPEED_DIFF = 10.0  # m/s, cameras estimate speed badly
 
 
 class VisionPoint:
-    """Distance and relative speed of the camera's lead; alone it never makes a lead.
+    """Distance and relative speed of the camera's lead; alone it never becomes a lead.
 
-    The simulated camera tells the distance from the bumper, as the original's did, while tracks have it
-    from the camera, 2.7 m further back; the match is wide enough for both.
+    The simulated camera measures from the bumper, as the original's did, while tracks are measured from the
+    camera, 2.7 m further back; the match is wide enough for both.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class VisionPoint:
             self._filter.restart(lead.d_rel, variance, RATE_VARIANCE)
 
     def best_match(self, tracks: Iterable[Track], path: Poly) -> Track | None:
-        """The track that is most likely the camera's lead, taken to be on the path; None if none is near."""
+        """The track most likely to be the camera's lead, assumed on the path; None if none is near."""
         if not self.valid:
             return None
         d_rel, v_rel = self._filter.value, self._filter.rate

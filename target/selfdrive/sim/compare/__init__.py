@@ -1,1 +1,1 @@
-"""Holding the controller's traces against references: reading, measuring, reporting."""
+"""Compares the controller's traces with references: reading, measuring, reporting."""

@@ -1,4 +1,4 @@
-"""A trace against its reference, channel by channel."""
+"""Compares a trace with its reference by channel."""
 
 from dataclasses import dataclass
 from math import inf
@@ -11,14 +11,14 @@ from selfdrive.sim.compare.tolerances import Limits, Tolerances
 from selfdrive.sim.compare.trace_csv import BY_CHANNEL, STEPS_PER_SECOND, Column, Reference, channels_of
 
 _LONGEST_LAG = 100  # steps, that is 1 s
-_STEADY = 1e-6  # a channel that varies less has no lag to be seen
+_STEADY = 1e-6  # a channel that varies less has no measurable lag
 
 _NOTHING = Limits()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """An interval (s) in which the difference is beyond the band; `worst` is its largest, at `at` s."""
+    """An interval (s) with the difference outside the band; `worst` is its largest, at `at` s."""
 
     begin: float
     end: float
@@ -60,7 +60,7 @@ class FigureResult:
 
     @property
     def difference(self) -> float:
-        """How far they are apart."""
+        """The distance of both values."""
         return figures.difference(self.name, self.reference, self.ours)
 
     @property
@@ -90,8 +90,8 @@ def compare(
 ) -> Comparison:
     """Compare a recorded trace (100 Hz) with its reference.
 
-    `free_road`: without a lead, its own speed is not compared. Raises ConfigError if the two do not cover
-    the same time, or a limited channel is not in the reference.
+    `free_road`: without a lead, its own speed is not compared. ConfigError if the two cover different times,
+    or the reference lacks a limited channel.
     """
     ours = channels_of(trace)
     _same_time(reference, len(trace["t"]))
@@ -121,7 +121,7 @@ def _same_time(reference: Reference, steps: int) -> None:
 
 
 def _complete(reference: Reference, tolerances: Tolerances) -> None:
-    """Whatever has a tolerance must be there to be compared."""
+    """Every channel with a tolerance must be present."""
     needed = {name: (name,) for name in tolerances.channels}
     needed |= {name: figures.CHANNELS[name] for name in tolerances.figures}
     for limited, channels in needed.items():
@@ -140,7 +140,7 @@ def _complete(reference: Reference, tolerances: Tolerances) -> None:
 def _figures(
     reference: Reference, ours: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[FigureResult, ...]:
-    """Both from the reference's rows, but our engaging from every step."""
+    """Both from the reference's rows, except that our engagement uses every step."""
     theirs = figures.key_figures(reference.steps, reference.channels)
     rows = {name: values[reference.steps] for name, values in ours.items()}
     mine = figures.key_figures(reference.steps, rows)
@@ -181,9 +181,9 @@ def _both_see_a_lead(reference: Reference, ours: dict[str, np.ndarray]) -> np.nd
 
 
 def _differences(column: Column, theirs: np.ndarray, channel: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Ours at `steps` minus the reference: 0 or 1 for exclusive values, infinite where ours is no number.
+    """Ours at `steps` minus the reference: 0 or 1 for exclusive values, infinite if ours is NaN.
 
-    The headway alone may rightly be infinite, at standstill, and then is not compared.
+    Only the headway may be infinite, at standstill; it is not compared then.
     """
     ours = channel[np.maximum(steps, 0)]
     if column.exclusive:
@@ -197,7 +197,7 @@ def _rms(differences: np.ndarray) -> float:
 
 
 def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tuple[Crossing, ...]:
-    """The intervals of rows with a difference beyond `band`."""
+    """The intervals of rows with a difference outside `band`."""
     outside = np.abs(differences) > band + 1e-9
     edges = np.flatnonzero(np.diff(np.concatenate(([0], outside.astype(int), [0]))))
     found = []
@@ -215,12 +215,12 @@ def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tupl
 
 
 def time_lag(steps: np.ndarray, reference: np.ndarray, channel: np.ndarray) -> float | None:
-    """By how much (s, at most 1) the channel follows the reference: the shift with the highest correlation.
+    """The channel's delay behind the reference (s, at most 1): the shift with the highest correlation.
 
-    None where nothing varies enough to tell. Of shifts that are about as good the smallest counts: a steady
-    slope fits with any.
+    None without enough variation. Among similarly good shifts, the smallest counts: a steady slope fits any
+    shift.
     """
-    apart: dict[int, float] = {}  # what is missing from full correlation, by shift
+    apart: dict[int, float] = {}  # 1 minus correlation, by shift
     for shift in sorted(range(-_LONGEST_LAG, _LONGEST_LAG + 1), key=abs):
         inside = (steps + shift >= 0) & (steps + shift < len(channel))
         ours, theirs = channel[steps[inside] + shift], reference[inside]

@@ -1,4 +1,4 @@
-"""Key figures of a run: what one would ask first about it."""
+"""Key figures of a run."""
 
 from math import inf, isnan
 
@@ -15,7 +15,7 @@ FIGURES = {
     "max_brake": "the hardest braking command",
 }
 
-CHANNELS = {  # what each is made of
+CHANNELS = {  # the channels of each figure
     "engaged_s": ("engaged",),
     "set_speeds_kph": ("engaged", "v_cruise"),
     "min_hwt_s": ("v_ego", "hwt"),
@@ -23,13 +23,13 @@ CHANNELS = {  # what each is made of
     "max_brake": ("brake",),
 }
 
-_STANDSTILL = 0.3  # m/s; slower, the headway says nothing
+_STANDSTILL = 0.3  # m/s; the headway is meaningless below
 
 Value = float | tuple[float, ...] | None
 
 
 def key_figures(steps: np.ndarray, channels: dict[str, np.ndarray]) -> dict[str, Value]:
-    """Those of `FIGURES` that the channels tell, from rows at `steps`; None for what did not happen."""
+    """The key figures (`FIGURES`) of channels with rows at `steps`; None for events that did not happen."""
     read = {
         "engaged_s": lambda engaged: _engaging(steps, engaged),
         "set_speeds_kph": _set_speeds,
@@ -45,7 +45,7 @@ def key_figures(steps: np.ndarray, channels: dict[str, np.ndarray]) -> dict[str,
 
 
 def difference(name: str, reference: Value, ours: Value) -> float:
-    """How far two values of figure `name` are apart; infinite where only one has it.
+    """The difference of two values of figure `name`; infinite if only one exists.
 
     Engaging: the distance between the two spans. Set speeds: 0 if the lists are equal, else the largest
     difference of a pair, infinite if one list is longer.
@@ -62,7 +62,7 @@ def difference(name: str, reference: Value, ours: Value) -> float:
 
 
 def text(name: str, value: Value) -> str:
-    """A figure's value for people."""
+    """A figure's value for display."""
     if value is None:
         return "never"
     if name == "engaged_s":
@@ -74,7 +74,7 @@ def text(name: str, value: Value) -> str:
 
 
 def _engaging(steps: np.ndarray, engaged: np.ndarray) -> tuple[float, float] | None:
-    """The span from the row before the first engaged one to that one; a single step is no span."""
+    """The span from the row before the first engaged one to that row; empty for a single step."""
     rows = np.flatnonzero(engaged == 1.0)
     if not rows.size:
         return None

@@ -1,4 +1,4 @@
-"""The page of maneuvers: for each run its key figures and plots, over the reference where there is one."""
+"""The page of maneuvers: each run's key figures and plots, with the reference if there is one."""
 
 from dataclasses import dataclass
 from html import escape
@@ -60,7 +60,7 @@ _LEAD_ESTIMATES = ("lead_v_lead_k", "lead_a_lead_k")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maneuver:
-    """A run, and if there is one its reference with the comparison."""
+    """A run, and its reference with the comparison if there is one."""
 
     run: Run
     reference: Reference | None
@@ -68,7 +68,7 @@ class Maneuver:
 
 
 def page(maneuvers: list[Maneuver], plant: str) -> str:
-    """The whole HTML page; it loads nothing."""
+    """The self-contained HTML page."""
     rows = "".join(_overview_row(one) for one in maneuvers)
     head = "".join(f"<th>{_TITLES[name]}</th>" for name in figures.FIGURES)
     return (
@@ -164,7 +164,7 @@ def _panels(one: Maneuver) -> list[Panel]:
 
 
 def _visible(channels: dict[str, np.ndarray], channel: str) -> np.ndarray:
-    """A channel, blank where it means nothing: no set speed while off, no estimate without a lead."""
+    """A channel, blank where it is meaningless: no set speed while off, no estimate without a lead."""
     values, condition = channels[channel], None
     if channel == "v_cruise":
         condition = channels.get("engaged")

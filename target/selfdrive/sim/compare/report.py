@@ -1,11 +1,11 @@
-"""A comparison in text."""
+"""A comparison as text."""
 
 from math import isfinite
 
 from selfdrive.sim.compare import figures
 from selfdrive.sim.compare.differences import ChannelResult, Comparison, FigureResult
 
-_SMALLEST = 5e-5  # differences below are rounded to 0, and then their time means nothing
+_SMALLEST = 5e-5  # smaller differences are rounded to 0, and their time is meaningless
 
 _HEAD = f"  {'channel':<16}{'unit':<6}{'rms':>10}{'largest':>11}{'at [s]':>9}{'lag [s]':>9}  limits"
 

@@ -1,4 +1,4 @@
-"""Runs to be compared or shown: made now from a scenario, or taken from finished folders."""
+"""Runs to compare or show: made from a scenario, or loaded from finished folders."""
 
 import json
 import zipfile
@@ -12,8 +12,8 @@ from selfdrive.sim.recorder import CHANNELS
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import Scenario, load_scenario
 
-SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the project around this tree
-NO_LEAD = "_nolead"  # a run's name is its scenario's, with this at the end if the lead was left out
+SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the surrounding project
+NO_LEAD = "_nolead"  # suffix of the run's name if the lead was left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -27,12 +27,12 @@ class Run:
 
     @property
     def free_road(self) -> bool:
-        """Whether there was no lead."""
+        """Whether there is no lead."""
         return self.record["no_lead"]
 
 
 def find(name: str, scenarios: Path) -> Scenario:
-    """The scenario of a run. Raises ConfigError if there is none, or its file is wrong."""
+    """The scenario of a run. ConfigError if it is missing or invalid."""
     path = scenarios / f"{name.removesuffix(NO_LEAD)}.yaml"
     if not path.is_file():
         raise ConfigError(
@@ -54,7 +54,7 @@ def drive(name: str, scenario: Scenario) -> Run:
 
 
 def load(folder: Path, plant: str) -> Run:
-    """A finished run's folder of that name. Raises ConfigError if it is none, or of something else."""
+    """Load a finished run's folder. ConfigError if it is not one, or belongs to another run or plant."""
     try:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         with np.load(folder / "trace.npz", allow_pickle=False) as arrays:

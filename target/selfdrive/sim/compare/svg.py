@@ -1,4 +1,4 @@
-"""Small line plots as inline SVG, in the colours of the page around them."""
+"""Small line plots as inline SVG, in the page's colours."""
 
 from dataclasses import dataclass
 from html import escape
@@ -7,21 +7,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-# All in tenths of a pixel, so that whole numbers are fine enough.
+# In tenths of a pixel, so that integers are fine enough.
 _WIDTH, _HEIGHT = 3600, 2000
 _LEFT, _RIGHT, _TOP, _BOTTOM = 380, 3540, 150, 1750
-_SLACK = 2.5  # how far a line may run from its points
+_SLACK = 2.5  # allowed distance of a line from its points
 _TICKS = 4
 
 
 class Line(NamedTuple):
-    """A line: its label in the legend, its number among the panel's colours, times (s) and values."""
+    """A line: its legend label, colour number in the panel, times (s) and values."""
 
     label: str
     colour: int
     seconds: np.ndarray
     values: np.ndarray
-    reference: bool = False  # drawn broad and pale, beneath the others
+    reference: bool = False  # drawn broad and pale below the others
 
 
 class Mark(NamedTuple):
@@ -34,7 +34,7 @@ class Mark(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One plot; its lines share a unit."""
+    """One plot; its lines have the same unit."""
 
     title: str
     unit: str
@@ -42,7 +42,7 @@ class Panel:
 
 
 def draw(panel: Panel, marks: tuple[Mark, ...], end: float) -> str:
-    """The panel as an <svg> from time 0 to `end` (s), reference lines beneath."""
+    """The panel as an <svg> from time 0 to `end` (s), reference lines at the bottom."""
     low, high, step = _scale(panel.lines)
     parts = [
         f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img"><title>{escape(panel.title)}</title>',
@@ -58,7 +58,7 @@ def draw(panel: Panel, marks: tuple[Mark, ...], end: float) -> str:
 
 
 def simplify(points: np.ndarray, slack: float) -> np.ndarray:
-    """Those rows of `points` (n, 2; x ascending) through which a line misses none by over `slack` in y."""
+    """The rows of `points` (n, 2; x ascending) for a line that misses no point by more than `slack` in y."""
     keep = {0, len(points) - 1}
     spans = [(0, len(points) - 1)]
     while spans:
@@ -77,7 +77,7 @@ def simplify(points: np.ndarray, slack: float) -> np.ndarray:
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:
-    """Path data of the finite stretches, in whole numbers, each point relative to the one before."""
+    """Path data of the finite sections, as integers relative to the previous point."""
     finite = np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], finite.astype(int), [0]))))
     parts = []
@@ -91,7 +91,7 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
 
 
 def _scale(lines: tuple[Line, ...]) -> tuple[float, float, float]:
-    """Lowest and highest value of the axis and the distance of its ticks; never less than 0.1 high."""
+    """Lowest and highest value of the axis and its tick distance; the range is at least 0.1."""
     finite = np.concatenate([line.values[np.isfinite(line.values)] for line in lines] or [np.zeros(1)])
     if not finite.size:
         finite = np.zeros(1)

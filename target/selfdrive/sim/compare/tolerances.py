@@ -1,4 +1,4 @@
-"""The tolerance table: how far a trace may be from its reference."""
+"""The tolerance table: the allowed distance of a trace from its reference."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ _LIMIT_KEYS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of one channel; None: not limited. `rms` and `max` in the channel's SI unit, `lag` in s."""
+    """Limits of one channel; None: no limit. `rms` and `max` in the channel's SI unit, `lag` in s."""
 
     rms: float | None = None
     max: float | None = None
@@ -32,7 +32,7 @@ class Limits:
 
     @property
     def band(self) -> float | None:
-        """The difference beyond which a single moment is worth listing."""
+        """The smallest single difference worth listing."""
         return self.rms if self.max is None else self.max
 
 
@@ -45,7 +45,7 @@ class Tolerances:
 
 
 def load_tolerances(path: Path) -> Tolerances:
-    """Read the table. Raises ConfigError for anything a user can mend."""
+    """Read the table. ConfigError for anything a user can fix."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

@@ -1,7 +1,7 @@
-"""Reference traces as CSV: a header, then one row for each time, an empty cell where nothing was published.
+"""Reference traces as CSV: a header, then one row for each time; cells without a published value are empty.
 
-Row `time` = t is the state after the simulation step that began at t, as in trace.npz. Every column has a
-channel of the recorder behind it; files of 20 Hz are usual, any multiple of 10 ms is read.
+Row `time` = t is the state after the simulation step that began at t, as in trace.npz. Every column maps to a
+recorder channel. 20 Hz is usual; any multiple of 10 ms is accepted.
 """
 
 import csv
@@ -18,24 +18,24 @@ from selfdrive.common.errors import ConfigError
 from selfdrive.sim.recorder import COUNTED_ALERTS, LONG_STATES, PLAN_SOURCES
 
 STEPS_PER_SECOND = 100
-ROW_STEPS = 5  # steps between the rows that are written
+ROW_STEPS = 5  # steps between written rows
 
 _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")
 
 
 class Column(NamedTuple):
-    """One column. `factor` makes SI of its numbers; `words` are the names it may hold instead of numbers."""
+    """One column. `factor` converts its numbers to SI; `words` are the names that it may hold instead."""
 
     name: str
     channel: str
     unit: str = "-"
     factor: float = 1.0
     words: tuple[str, ...] = ()
-    published: bool = False  # a message of the controller, seen up to a control cycle later
+    published: bool = False  # a controller message, visible up to a control cycle later
 
     @property
     def exclusive(self) -> bool:
-        """Whether its values are equal or not, and no distance is between them."""
+        """Whether values are only equal or not, without a distance."""
         return self.channel in ("engaged", "fcw", "lead_status") or bool(self.words)
 
 
@@ -68,7 +68,7 @@ COLUMNS = (
     Column("cum_path", "lateral_offset", "m"),
 )
 BY_CHANNEL = {column.channel: column for column in COLUMNS}
-UNCOMPARED = ("distance", "distance_lead", "alertText1", "alertText2")  # may stand in a file
+UNCOMPARED = ("distance", "distance_lead", "alertText1", "alertText2")  # allowed in a file
 
 _BY_NAME = {column.name: column for column in COLUMNS}
 
@@ -91,9 +91,9 @@ def channels_of(trace: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def read_reference(path: Path) -> Reference:
-    """Read a file. Raises ConfigError, with the line, for anything that is not such a trace."""
+    """Read a file. ConfigError, with the line, if it is not such a trace."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:  # some spreadsheets write a mark first
+        with path.open(newline="", encoding="utf-8-sig") as file:  # some files begin with a mark
             rows = csv.reader(file)
             names = _header(next(rows, []), path)
             lines = [(rows.line_num, row) for row in rows]
@@ -118,7 +118,7 @@ def read_reference(path: Path) -> Reference:
 
 
 def write_reference(path: Path, trace: dict[str, np.ndarray]) -> None:
-    """Write a recorded trace as a reference, every fifth step. Raises ConfigError if it cannot be written."""
+    """Write every fifth step of a recorded trace as a reference. ConfigError if it cannot be written."""
     channels = channels_of(trace)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

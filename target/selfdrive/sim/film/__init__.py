@@ -1,1 +1,1 @@
-"""Films of runs: what the camera showed and what the controller made of it, and how they are watched."""
+"""Films of runs: camera frames and the controller's view of them, and a viewer."""

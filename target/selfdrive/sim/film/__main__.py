@@ -1,6 +1,6 @@
 """Shows the films of two runs side by side: `python -m selfdrive.sim.film --golden DIR --faulty DIR ...`.
 
-A video for `--out` .mp4 or .gif, a still picture of the moment `--at` for .png or .jpg. Exit code 2 for wrong
+Writes a video for `--out` .mp4 or .gif, or a still at time `--at` for .png or .jpg. Exit code 2 for invalid
 input.
 """
 

@@ -1,4 +1,4 @@
-"""What the camera showed, with the lines, path and lead that were seen drawn in."""
+"""The camera's frame, with the seen lines, path and lead drawn in."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -14,11 +14,11 @@ from selfdrive.sim.film.reel import Frame, SeenLine
 from selfdrive.sim.lead_picture import CAMERA_TO_BUMPER, FURTHEST, NEAREST, draw_lead
 from selfdrive.sim.road_renderer import RoadRenderer
 
-LINE_HALF, PATH_HALF = 0.06, 0.8  # m; half the width at which they are drawn
-LINE_SHARE, PATH_SHARE = 0.8, 0.3  # by which they cover the picture
+LINE_HALF, PATH_HALF = 0.06, 0.8  # m; half the drawn width
+LINE_SHARE, PATH_SHARE = 0.8, 0.3  # opacity over the picture
 CAR_HALF, CAR_HEIGHT = 1.0, 1.55  # m; of the frame around the lead
 FRAME_MARGIN = 4  # pixels
-WRONG_DISTANCE = 2.0  # m between a lead and where the camera's message has it, to be worth a frame
+WRONG_DISTANCE = 2.0  # m between the lead and the camera's message that is worth a frame
 
 
 class CameraPane:
@@ -27,7 +27,7 @@ class CameraPane:
     def __init__(self, model: CameraModel, width: int, height: int) -> None:
         self._model, self._width = model, width
         self._scale = width / model.width
-        self._top = height - round(model.rows * self._scale)  # row at which the picture begins; it may be < 0
+        self._top = height - round(model.rows * self._scale)  # the picture's top row; may be < 0
         near = max(0.0, model.distance(model.rows - 1.0))
         self._x = np.concatenate([[near], np.arange(np.ceil(near + 0.1), KNOTS[-1] + 1.0)])
 
@@ -46,7 +46,7 @@ class CameraPane:
         return pane
 
     def _picture(self, frame: Frame) -> np.ndarray:
-        """The grey picture that the detector had, or, without one, the road in colour; with the lead."""
+        """The detector's grey picture with the lead, or the road in colour if there is none."""
         grey = frame.image()
         if grey is None:
             picture = self._road.colour(frame.position, -frame.middle, frame.heading)
@@ -59,7 +59,7 @@ class CameraPane:
         return picture
 
     def _bent(self, picture: np.ndarray, frame: Frame) -> np.ndarray:
-        """A straight road's picture with each row shifted as the road bends there."""
+        """A straight road's picture with each row shifted by the road's bend."""
         model = self._model
         bend = np.array(frame.bend) + np.tan(frame.heading) * np.array(KNOTS)
         if np.allclose(bend, 0.0, atol=1e-6):
@@ -81,7 +81,7 @@ class CameraPane:
         )
 
     def _fitted(self, picture: np.ndarray) -> np.ndarray:
-        """The picture at the pane's width, its foot at the pane's."""
+        """The picture scaled to the pane's width, aligned at the bottom."""
         width = self._width
         rows = round(self._model.rows * self._scale)
         scaled = cv2.resize(picture, (width, rows), interpolation=cv2.INTER_LINEAR)
@@ -94,7 +94,7 @@ class CameraPane:
             pen.glaze(pane, self._strip(line.y, LINE_HALF), pen.line_colour(line.prob), LINE_SHARE)
 
     def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
-        """A frame around the lead with its distance, and one where the camera's message has it instead."""
+        """A frame around the lead with its distance, and one at the camera's message if it differs."""
         told = frame.camera_lead
         if frame.d_rel is not None:
             self._frame_lead(pane, frame, frame.d_rel, pen.INK, f"{frame.d_rel:.1f} m")
@@ -123,23 +123,23 @@ class CameraPane:
         pen.tag(pane, label, (right + 8, top + 10), colour)
 
     def _sideways(self, frame: Frame, distance: float) -> float:
-        """How far (m) the lane has moved to the left in view where the lead is."""
+        """The lane's shift to the left (m) in view at the lead."""
         beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])
         return float(np.interp(distance, KNOTS, frame.bend)) + beyond
 
     def _strip(self, knots: Sequence[float], half: float) -> np.ndarray:
-        """The outline of a strip of the road along a line that is given at KNOTS."""
+        """The outline of a strip of road along a line that is given at KNOTS."""
         y = np.interp(self._x, KNOTS, knots)
         sides = [self._seen_at(self._x, y + half), self._seen_at(self._x, y - half)[::-1]]
         return np.concatenate(sides)
 
     def _seen_at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Where in the pane points (x, y) of the road are."""
+        """The positions of road points (x, y) in the pane."""
         model = self._model
         depth = x * cos(model.pitch) + model.height * sin(model.pitch)
         row = model.horizon + model.fy * model.height / (depth * cos(model.pitch))
         return np.stack(self._in_pane(model.cx - model.fx * y / depth, row), axis=1)
 
     def _in_pane(self, column: float, row: float) -> tuple[float, float]:
-        """Where a place of the picture is in the pane."""
+        """The pane position of a picture position."""
         return (column + 0.5) * self._scale - 0.5, (row + 0.5) * self._scale - 0.5 + self._top

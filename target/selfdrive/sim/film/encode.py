@@ -1,4 +1,4 @@
-"""Writes pictures as a video, H.264 in an .mp4 or an animated .gif, or as a still."""
+"""Writes pictures as H.264 in an .mp4, as an animated .gif, or as a still."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -12,7 +12,7 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import pen
 
 PICTURES_PER_S = 20
-GIF_EVERY = 4  # of the pictures are left out in a GIF, whose files grow large
+GIF_EVERY = 4  # every such picture is left out of a GIF, to limit its size
 GIF_WIDTH = 800
 GIF_COLOURS = 128
 H264 = {"crf": "25", "preset": "veryfast"}
@@ -50,7 +50,7 @@ def write_still(picture: np.ndarray, path: Path) -> None:
 
 
 def _make_room(path: Path) -> None:
-    """Find out before the work is done whether the file can be written."""
+    """Check before the work whether the file can be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.touch()
 
@@ -69,9 +69,9 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """Smaller and with fewer pictures; colours from one palette, so that what stands still costs nothing.
+    """Smaller and with fewer pictures; one palette, so that static parts take no space.
 
-    The palette has the sheet's own colours, and for the rest those of the picture in the middle.
+    The palette has the sheet's own colours, then those of the middle picture.
     """
     small = []
     for index, picture in enumerate(pictures):

@@ -1,4 +1,4 @@
-"""What the harness tells of the faulty run: title, outcome, and what happened when. Read from JSON."""
+"""The harness's data on the faulty run: title, outcome, and event times. Read from JSON."""
 
 import json
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ SCHEMA = "film-events/1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """Something that happened at `t` (s): `kind` is trigger, manifest, alert or hazard."""
+    """An event at `t` (s): `kind` is trigger, manifest, alert or hazard."""
 
     kind: str
     t: float
@@ -20,9 +20,9 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Events:
-    """What the harness knows of the faulty run. Times in s; `active` spans its activations, if there were.
+    """The harness's data on the faulty run. Times in s; `active` spans its activations, if any.
 
-    `names` are short words on hazards, by their id. `end` is when the drive was over, though the run went on.
+    `names` are short hazard names by id. `end` is the end of the drive; the run may go on.
     """
 
     title: str
@@ -34,7 +34,7 @@ class Events:
 
 
 def read_events(path: Path) -> Events:
-    """The events in a JSON file. Raises ConfigError for any other file."""
+    """Read events from a JSON file. ConfigError for any other file."""
     try:
         data = json.loads(path.read_text())
         if data["schema"] != SCHEMA:

@@ -1,4 +1,4 @@
-"""Colours, words and smooth shapes of a film's sheet. Colours are BGR, places (x, y) pixels."""
+"""Colours, text and smooth shapes of a film's sheet. Colours are BGR, positions (x, y) pixels."""
 
 import cv2
 import numpy as np
@@ -10,7 +10,7 @@ PANEL = (40, 35, 31)
 RULE = (74, 66, 60)
 DIM = (160, 150, 142)
 INK = (238, 234, 230)
-GOLDEN = (224, 160, 76)  # blue and vermilion: told apart by colour-blind people and in grey
+GOLDEN = (224, 160, 76)  # blue and vermilion: distinguishable in grey and by colour-blind people
 FAULTY = (62, 122, 240)
 SEEN = (120, 232, 96)  # lane lines, as detected
 DOUBTED = (60, 190, 250)  # the same, with a low probability
@@ -24,21 +24,21 @@ COLOURS = (
     *(PATH, TRIGGER, MANIFESTED, ALERT, HAZARD),
 )
 
-DOUBTFUL = 0.5  # lines of a lower probability are drawn as doubted
+DOUBTFUL = 0.5  # less probable lines are drawn as doubted
 SMALL, NORMAL, LARGE = 0.42, 0.5, 0.66  # of text
 SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
-FAR = 1 << 14  # pixels; what is further out is drawn from there
+FAR = 1 << 14  # pixels; points further out are clipped
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def line_colour(prob: float) -> Colour:
-    """The colour of a lane line that was seen with this probability."""
+    """The colour of a lane line with this probability."""
     return SEEN if prob >= DOUBTFUL else DOUBTED
 
 
 def grey(canvas: np.ndarray) -> None:
-    """Take the colour out of a picture, and some of its light: it shows what no longer counts."""
+    """Remove the colour and dim a picture after the end of the drive."""
     if canvas.size:
         canvas[:] = (0.7 * cv2.cvtColor(canvas, cv2.COLOR_BGR2GRAY)).astype(np.uint8)[..., None]
 
@@ -52,18 +52,18 @@ def write(
     *,
     bold: bool = False,
 ) -> None:
-    """Text whose base line begins at `at`."""
+    """Text with its baseline starting at `at`."""
     cv2.putText(canvas, text, at, _FONT, size, colour, 2 if bold else 1, cv2.LINE_AA)
 
 
 def width(text: str, size: float = NORMAL, *, bold: bool = False) -> int:
-    """How wide `write` would draw it."""
+    """The drawn width of `write`."""
     (columns, _), _ = cv2.getTextSize(text, _FONT, size, 2 if bold else 1)
     return columns
 
 
 def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False) -> str:
-    """The text, or as much of its beginning as fits into `room` pixels."""
+    """The text, or as much of its start as fits into `room` pixels."""
     if width(text, size, bold=bold) <= room:
         return text
     while text and width(text + "...", size, bold=bold) > room:
@@ -72,7 +72,7 @@ def shortened(text: str, room: int, size: float = NORMAL, *, bold: bool = False)
 
 
 def tag(canvas: np.ndarray, text: str, at: tuple[int, int], colour: Colour) -> None:
-    """Small text on a dark plate, whose base line begins at `at`: it can be read on any picture."""
+    """Small text on a dark plate, with its baseline starting at `at`; readable on any picture."""
     x, y = at
     cv2.rectangle(canvas, (x - 4, y - 13), (x + width(text, SMALL) + 4, y + 5), PAPER, cv2.FILLED)
     write(canvas, text, at, colour, SMALL)
@@ -86,7 +86,7 @@ def chip(canvas: np.ndarray, text: str, at: tuple[int, int], fill: Colour, ink: 
 
 
 def chip_width(text: str) -> int:
-    """How wide `chip` would draw it."""
+    """The drawn width of `chip`."""
     return width(text, bold=True) + 16
 
 
@@ -101,7 +101,7 @@ def stroke(canvas: np.ndarray, points: np.ndarray, colour: Colour, thickness: in
 
 
 def glaze(canvas: np.ndarray, points: np.ndarray, colour: Colour, share: float) -> None:
-    """A filled polygon that covers what is beneath by `share`."""
+    """A filled polygon with opacity `share`."""
     layer = canvas.copy()
     fill(layer, points, colour)
     cv2.addWeighted(layer, share, canvas, 1.0 - share, 0.0, dst=canvas)

@@ -1,8 +1,8 @@
-"""Keeps what the camera showed and what the controller made of it, one picture after the other.
+"""Records camera frames and the controller's view of them.
 
-A film is a folder: `film.jsonl`, a heading and a line for each picture, and the pictures as JPEG files. It
-is written as the run goes, so a run that breaks off leaves a film of all that went before. Taking it only
-reads: a run with a film leaves the same bytes as without.
+A film is a folder: `film.jsonl`, with a heading and a line for each picture, and the pictures as JPEG files.
+It is written during the run, so an aborted run leaves a film up to that point. Recording only reads: a run
+with a film gives the same bytes as without.
 """
 
 import json
@@ -21,14 +21,14 @@ from selfdrive.sim.truth import GroundTruth
 
 SCHEMA = "film/1"
 INDEX = "film.jsonl"
-KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead; where lines are kept
-JPEG_QUALITY = 95  # noise that an effect has added is to be seen as it was
+KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead; where lines are recorded
+JPEG_QUALITY = 95  # high, to keep noise from effects visible
 
 
 class Film:
-    """A film in the making, in `folder`, which is made if need be. Raises ConfigError if it cannot be.
+    """A film being recorded in `folder`, which is created if needed. ConfigError if that fails.
 
-    A film that cannot be kept any longer, as on a full disk, ends the run with ConfigError.
+    If recording fails later, as on a full disk, the run ends with ConfigError.
     """
 
     def __init__(self, folder: Path, camera: CameraModel) -> None:
@@ -41,7 +41,7 @@ class Film:
     def take(
         self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
     ) -> None:
-        """Keep a step that had a picture: `view`, and what the controller has published by its end."""
+        """Record a step with a picture: `view`, and what the controller had published by its end."""
         state, radar = manager.controlsd.state, manager.radar_state
         lead = radar.lead_one if radar else None
         entry = {
@@ -69,7 +69,7 @@ class Film:
         """The file of the view's picture."""
         if view.picture is None:
             return None
-        import cv2  # runs without pictures do without
+        import cv2  # not needed in runs without pictures
 
         name = f"{self._count:05d}.jpg"
         data = cv2.imencode(".jpg", np.asarray(view.picture), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])[1]
@@ -82,7 +82,7 @@ class Film:
 
 
 def _seen(model: ModelData | None, t: float) -> dict | None:
-    """What visiond published at `t`; None if it published nothing then."""
+    """What visiond published at `t`; None if nothing."""
     if model is None or model.t != t:
         return None
     lines = {"left": model.left_lane, "right": model.right_lane}

@@ -1,4 +1,4 @@
-"""One picture of a film of two runs: golden on the left, faulty on the right, their story beneath."""
+"""One sheet of a film of two runs: golden on the left, faulty on the right, timeline below."""
 
 import cv2
 import numpy as np
@@ -18,12 +18,12 @@ HEADING = 42
 PANE = 628, 404
 CAPTION = 26
 STRIP = 104
-CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the words under a pane
+CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the text below a pane
 OUTCOMES = {"hazard": pen.HAZARD, "sdc": pen.ALERT, "masked": pen.MANIFESTED}
 
 
 class Sheet:
-    """Draws the sheet of any moment of two films."""
+    """Draws the sheet of two films at any time."""
 
     def __init__(self, golden: Reel, faulty: Reel, events: Events) -> None:
         self._events = events
@@ -97,7 +97,7 @@ class _Side:
             pen.chip(pane, words, (PANE[0] - 8 - pen.chip_width(words), 8), pen.TRIGGER)
 
     def _draw_warnings(self, pane: np.ndarray, frame: Frame) -> None:
-        """The alert that the driver gets, and a frame in red from the first hazard on."""
+        """The driver's alert, and a red frame from the first hazard."""
         alerts = [name for name in frame.alerts if name in COUNTED_ALERTS]
         foot = PANE[1]
         if frame.hazards:
@@ -123,16 +123,16 @@ class _Side:
 
 
 def _lines_seen(frame: Frame) -> tuple[str, pen.Colour]:
-    """The probabilities of both lines, or their absence, in a colour that warns."""
+    """The probabilities of both lines, or that they are missing, in a warning colour."""
     if frame.lines is None:
         return "no camera message", pen.ALERT
     left, right = (frame.lines[name].prob for name in ("left", "right"))
-    doubted = not min(left, right) >= pen.DOUBTFUL  # also where one is no number
+    doubted = not min(left, right) >= pen.DOUBTFUL  # also true for NaN
     return f"lines {left:.2f} | {right:.2f}", pen.ALERT if doubted else pen.INK
 
 
 def _bar(pane: np.ndarray, foot: int, text: str, colour: pen.Colour, ink: pen.Colour) -> int:
-    """A bar of text across the pane that ends at row `foot`; returns the row it begins at."""
+    """A bar of text across the pane that ends at row `foot`; returns its first row."""
     top = foot - 30
     layer = np.full((30, pane.shape[1], 3), colour, np.uint8)
     cv2.addWeighted(layer, 0.9, pane[top:foot], 0.1, 0.0, dst=pane[top:foot])
