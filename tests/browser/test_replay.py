@@ -207,7 +207,7 @@ def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
     replayed.page.mouse.move(5, 5)
 
 
-@pytest.mark.parametrize(("high", "note"), [(30000, "axis cut: values go from 2 to 30000"), (150, None)])
+@pytest.mark.parametrize(("high", "note"), [(30000, "axis cut: values range from 2 to 30000"), (150, None)])
 def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
     replayed: Replayed, high: float, note: str | None
 ) -> None:

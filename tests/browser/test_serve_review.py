@@ -187,7 +187,7 @@ def test_what_changed_since_an_approval_is_shown_as_a_diff(
     try:
         page.wait_for_selector(f"#group-{group} .state.changed")
         page.keyboard.press("a")
-        page.wait_for_selector(f"#group-{group} .kept:text('load this page again')")
+        page.wait_for_selector(f"#group-{group} .kept:text('reload this page')")
         page.reload()
         ready(page)
         page.keyboard.press("j")
@@ -220,7 +220,7 @@ def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
             page.unroute("**/api/review/**")
             page.reload()
             ready(page)
-            page.wait_for_selector(f"#group-{current(page)} .kept:text('load this page again')")
+            page.wait_for_selector(f"#group-{current(page)} .kept:text('reload this page')")
         finally:
             lens.write_text(text)
     assert not load_review(library, "toycar").entries
