@@ -1,4 +1,4 @@
-"""The glue of a target's entry module: how a run is opened, driven, recorded and written."""
+"""The glue of a target's entry module: opening, stepping, recording and writing a run."""
 
 import json
 import random
@@ -13,7 +13,7 @@ from mutator.glue import GlueError, Run, read_scenario, seed_globals
 
 
 class Ball(Run):
-    """A ball that falls, and is caught where it is to be."""
+    """A ball that falls, and is caught at a given place."""
 
     def __init__(self, scenario, seed):
         super().__init__(step_s=0.1, duration_s=scenario["duration_s"])
@@ -33,7 +33,7 @@ class Ball(Run):
 
 @pytest.fixture
 def arguments(tmp_path: Path) -> list[str]:
-    """What starts a run of the ball."""
+    """The arguments that start a run of the ball."""
     scenario = tmp_path / "drop.yaml"
     scenario.write_text(
         "about: A drop: from 4 m  # not far\n\n# times\nduration_s: 0.6\nheight_m: 4\ncaught: false\n"
@@ -52,8 +52,9 @@ def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, obje
 
 
 def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
-    """The trace has time and every channel of every step; the record has when a hazard first came (null: it
-    did not) and when each alert began."""
+    """The trace has time and every channel of every step; the record has when a hazard first came (null:
+    never) and when each alert began.
+    """
     trace, record = driven(arguments)
     assert list(trace) == ["t", "height", "lies"]
     assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -64,13 +65,13 @@ def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
 
 
 def test_a_run_may_end_early(arguments: list[str]) -> None:
-    """The step in which `end` is called is the last, and is recorded."""
+    """The step that calls `end` is the last, and is recorded."""
     trace, _ = driven([*arguments, "--caught"])
     assert trace["height"][-1] == 0.0
 
 
 def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
-    """Neither trace nor record has anything of when or how often it was written; nothing else is left."""
+    """Trace and record do not depend on when or how often they were written; no other files are left."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -81,7 +82,7 @@ def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
 
 
 def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path: Path) -> None:
-    """An engine that drives step by step, into a folder of its own, gets the same bytes."""
+    """An engine that steps a run, into a separate folder, gets the same bytes."""
     driven(arguments)
     run = Ball.open(arguments)
     while not run.done:
@@ -93,7 +94,7 @@ def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path
 
 @pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
 def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], flags: list[str]) -> None:
-    """A further flag with a value replaces a key of the scenario: a change needs no code."""
+    """An extra flag with a value replaces a key of the scenario, so a change needs no code."""
     trace, _ = driven([*arguments, *flags])
     assert trace["height"][0] == -3.0
 
@@ -111,14 +112,14 @@ def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], fla
     ],
 )
 def test_a_wrong_argument_is_told(arguments: list[str], flags: list[str], words: str) -> None:
-    """What a run cannot be started with is named, and what was expected."""
+    """A wrong argument is named with the expectation."""
     with pytest.raises(GlueError) as told:
         Ball.main([*arguments, *flags])
     assert words in str(told.value)
 
 
 def test_values_of_a_scenario(tmp_path: Path) -> None:
-    """Values are those of JSON, and else text, colons included."""
+    """Values are read as JSON, otherwise as text, including colons."""
     path = tmp_path / "a.yaml"
     path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
     expected = {
@@ -137,7 +138,7 @@ def test_values_of_a_scenario(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("line", ["- a", "a:", "  b: 1", "a 1", "first: 2"])
 def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> None:
-    """A line that is no `key: value`, or a key that was there before, is told by file and line."""
+    """A line that is no `key: value`, or repeats a key, is reported with file and line."""
     path = tmp_path / "a.yaml"
     path.write_text(f"first: 1\n{line}\n")
     with pytest.raises(GlueError, match=r"a\.yaml:2: '.*'; expected `key: value`"):
@@ -146,7 +147,7 @@ def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> N
 
 @pytest.mark.parametrize("later", [{"b": 1.0}, {}, {"a": 1.0, "b": 2.0}])
 def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
-    """A step that records other channels than the first one is a mistake, which is told."""
+    """A step that records other channels than the first one is an error."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0)
     with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
@@ -158,7 +159,7 @@ def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     [None, "1", "near", b"1", [1.0], np.zeros(1), np.zeros((2, 3)), 1j, pytest.param(10**400, id="huge")],
 )
 def test_what_is_recorded_is_a_number(value: object) -> None:
-    """Anything else is told with its channel and time."""
+    """A value that is no number is reported with its channel and time."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0, gap=2.0)
     with pytest.raises(GlueError, match=r"^at 0.5 s: gap is .*; expected a number$"):
@@ -167,7 +168,7 @@ def test_what_is_recorded_is_a_number(value: object) -> None:
 
 @pytest.mark.parametrize("value", [True, 3, np.float32(2.5), np.array(4), float("inf")])
 def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
-    """Numbers of Python and numpy, and what is one: true, infinite, an array without dimensions."""
+    """Numbers of Python and numpy, booleans, infinity and arrays without dimensions are recorded."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=value)
     run.write(tmp_path)
@@ -177,7 +178,7 @@ def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("length", [0, -0.1, float("nan"), float("inf"), None])
 def test_steps_have_a_length(length: float) -> None:
-    """Steps without an end, or without a length, are refused, from the start or later."""
+    """Infinite or zero steps are refused, at the start or later."""
     with pytest.raises(GlueError, match=r"step_s is .*; expected"):
         Run(step_s=length, duration_s=1.0)
     run = Run(step_s=0.5, duration_s=1.0)
@@ -188,7 +189,7 @@ def test_steps_have_a_length(length: float) -> None:
 def test_a_run_that_ends_before_it_began_is_told(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever calls `end` in the constructor has nothing recorded, and is told so."""
+    """Calling `end` in the constructor is an error, because nothing is recorded."""
 
     class Ended(Ball):
         def __init__(self, scenario, seed):
@@ -204,8 +205,9 @@ LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
 
 @pytest.mark.parametrize("first", [0.1, 0.7])
 def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
-    """A step that sets `step_s` before it records has that length, and the next begins behind it; the run is
-    as long as it was to be, to the nearest step."""
+    """A step that sets `step_s` before it records has that length, and the next begins after it; the run
+    keeps its duration, to the nearest step.
+    """
 
     class Uneven(Run):
         def __init__(self, scenario, seed):
@@ -225,8 +227,9 @@ def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
 
 
 def test_times_of_equal_steps_are_no_sums() -> None:
-    """With one length for all, a step's time is its number times the length, to the last bit, also where the
-    length is set in each."""
+    """With equal lengths, a step's time is its number times the length, to the last bit, even if each step
+    sets the length.
+    """
     run = Run(step_s=0.1, duration_s=100.0)
     times = []
     while not run.done:
@@ -237,21 +240,21 @@ def test_times_of_equal_steps_are_no_sums() -> None:
 
 
 def test_time_is_recorded_anyhow() -> None:
-    """A channel of the name of time would be lost, and is refused."""
+    """A channel named time is refused, because time would overwrite it."""
     with pytest.raises(GlueError, match="without t"):
         Run(step_s=0.5, duration_s=1.0).record(t=1.0)
 
 
 @pytest.mark.parametrize("rows", [0, 2])
 def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step that records nothing would never end, one that records twice has two times: it is told."""
+    """A step that records nothing, or twice, is an error."""
     monkeypatch.setattr(Ball, "step", lambda run: [run.record(a=1.0) for _ in range(rows)])
     with pytest.raises(GlueError, match=f"recorded {rows} rows"):
         Ball.main(arguments)
 
 
 def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
-    """Whoever forgets to call the constructor of `Run` is told how."""
+    """A subclass that does not call `Run`'s constructor gets an error that says how."""
 
     class Bare(Run):
         def __init__(self, scenario, seed):
@@ -262,13 +265,13 @@ def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
 
 
 def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
-    """`step` is for the subclass to write."""
+    """A subclass without `step` gets an error."""
     with pytest.raises(NotImplementedError, match="Run has no step"):
         Run(step_s=1.0, duration_s=1.0).step()
 
 
 def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
-    """The generators of the process are as they were after a run, and are seeded by `seed_globals` alone."""
+    """A run leaves the process's generators unchanged; only `seed_globals` seeds them."""
     before = random.getstate()
     driven(arguments)
     assert random.getstate() == before
@@ -280,7 +283,7 @@ def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
 
 
 def test_the_glue_needs_numpy_alone() -> None:
-    """Importing it loads nothing of the harness, and no package but numpy."""
+    """Importing the glue loads none of the harness, and no package except numpy."""
     code = (
         "import numpy, sys; known = set(sys.modules); import mutator.glue; print(*sys.modules.keys() - known)"
     )

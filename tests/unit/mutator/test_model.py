@@ -1,4 +1,4 @@
-"""What tables, messages and reports call faults and experiments."""
+"""Labels of faults and experiments in tables, messages and reports."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +28,9 @@ SOURCES = Path(mutator.__file__).parent
     ],
 )
 def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
-    """Spec, value and unit; a plain number has no unit, and a fault without a value is its spec."""
+    """The label has spec, value and unit; a plain number has no unit, and a fault without a value is its
+    spec.
+    """
     assert fault_label("radar/chaff/distance", value, unit) == label
 
 
@@ -36,17 +38,17 @@ def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
 def test_a_fault_and_its_row_of_the_results_have_the_same_label(
     experiment: Callable[..., Experiment], record: Callable[..., object], value: float
 ) -> None:
-    """Whether it is read from the plan or from results.csv, a fault is called the same."""
+    """A fault has the same label from the plan and from results.csv."""
     one = experiment(value=value)
     assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
 
 
 def test_an_experiment_has_one_label(experiment: Callable[..., Experiment]) -> None:
-    """An experiment is named by its fault, value, scenario and trigger, each once."""
+    """The label has fault, value, scenario and trigger, each once."""
     assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
     assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
 def test_nobody_else_strips_a_unit() -> None:
-    """No other module puts value and unit together: that is how six labels came about."""
+    """No other module combines value and unit, which once led to six different labels."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

@@ -15,7 +15,7 @@ from .made_run import COLUMNS, NONE, OK, Page, make_run
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two runs of one plan, the second with another hazard than the first; one damaged folder."""
+    """Two runs of one plan with different hazards, and one damaged folder."""
     calm = OK | NONE | {"outcome": "masked"}
     for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
         (tmp_path / name).mkdir()
@@ -32,7 +32,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
-    """A hazard that came and one that went are two changes; the command that compares them is there."""
+    """A new hazard and one that disappeared are two changes; the command that compares them is shown."""
     written = write_history(folder)
     text = written.markdown.read_text()
     assert written.runs == 2
@@ -43,7 +43,7 @@ def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
 
 
 def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
-    """A name with a space is quoted."""
+    """A run name with a space is quoted."""
     (folder / "before").rename(folder / "the night before")
     written = write_history(folder)
     assert (
@@ -53,7 +53,7 @@ def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
 
 
 def test_a_folder_without_results_is_named(folder: Path) -> None:
-    """It is no reason to show nothing, and it is not passed over."""
+    """A folder without results is named, and the rest is shown."""
     written = write_history(folder)
     [why] = written.left_out
     assert why.startswith("broken: ")
@@ -62,7 +62,7 @@ def test_a_folder_without_results_is_named(folder: Path) -> None:
 
 
 def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) -> None:
-    """Of a run with a report, and of neighbours that were compared; nothing else is a link."""
+    """The page links to existing reports, and to comparisons of neighbouring runs, and nothing else."""
     for page in ("after/report/index.html", "after/report/compare-before/index.html"):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / page).write_text("")
@@ -72,6 +72,6 @@ def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) 
 
 
 def test_no_run_is_an_error(folder: Path) -> None:
-    """A folder that holds none is named."""
+    """A folder without runs is an error that names it."""
     with pytest.raises(MutatorError, match="no run folder, and none in it"):
         write_history(folder / "before" / "plots")

@@ -4,7 +4,7 @@ from mutator.report.panel import marked
 
 
 def test_a_note_is_escaped_and_its_marks_are_elements() -> None:
-    """Code and stress; an asterisk by itself stays one, and so does what is no mark."""
+    """Code and emphasis become elements; a single asterisk stays text, and so does anything else."""
     assert marked("*above x* and `any`, marked with *.") == (
         "<em>above x</em> and <code>any</code>, marked with *."
     )

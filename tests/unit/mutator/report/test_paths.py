@@ -1,4 +1,4 @@
-"""What a report has of paths: shapes and columns for the page, counts by fault type."""
+"""A report's data on paths: shapes and columns for the page, counts by fault type."""
 
 from collections.abc import Callable
 from math import inf
@@ -27,8 +27,9 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
 
 
 def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths are one shape; without a path there is none; deviations have three digits, or a name,
-    and columns of channels are empty where nothing left golden."""
+    """Equal paths share a shape; an experiment without a path has none; deviations have three digits, or a
+    name, and columns of channels are empty if nothing left golden.
+    """
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
@@ -47,8 +48,11 @@ def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
 
 
 def test_counts_of_links_and_components() -> None:
-    """A link counts those that came to its start, unless what is behind it is not recorded; a component those
-    that it stopped, and of these the masked ones, which count once by all that stopped them."""
+    """A link counts the faults that reached its start, unless the part after it is not recorded.
+
+    A component counts those that it stopped and, of these, the masked ones, which count once for all that
+    stopped them.
+    """
     counts = PathCounts()
     counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
     counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))

@@ -1,4 +1,4 @@
-"""The source of a run with operators' mutants: marks of lines, and the page's parts that are made of them."""
+"""The source of a run with operators' mutants: marks of lines, and the page's parts based on them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -32,8 +32,9 @@ def at(text: str) -> int:
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Permanent mutants of the line of `wanted` harm, one of them was not active; transient ones are masked;
-    of the pedals nothing is known."""
+    """Permanent mutants of the line of `wanted` do harm, one of them was not active; transient ones are
+    masked; results for the pedals are unknown.
+    """
     place = str(experiment.fault.value)
     if "3.0" in place or "6.0" in place:
         return FAILED
@@ -54,7 +55,7 @@ def run(
 
 
 def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: Path) -> None:
-    """By line, permanent beside transient, each mutant once; a harness error is no outcome."""
+    """Each line has its permanent and transient outcomes, each mutant once; a harness error is no outcome."""
     source = ReportedRun.open(RunFolder.open(run), toycar).source
     assert source is not None
     (file,) = source.files
@@ -67,7 +68,7 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
 
 
 def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
-    """The panel's links search columns that the page's table has, with values that some row has."""
+    """The panel's links search columns of the page's table, with values of at least one row."""
     reported = ReportedRun.open(RunFolder.open(run), toycar)
     panel = source_panel(reported)
     assert panel is not None
@@ -87,7 +88,7 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
 
 
 def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> None:
-    """The totals are what the command line shows; without golden runs no alert is compared."""
+    """The totals equal those of the command line; without golden runs no alert is compared."""
     loaded = load_run(run, workspace=toycar)
     totals = loaded.mutation_totals()
     assert totals.heads[:3] == ("mutation score", "number", "not activated")
@@ -103,7 +104,7 @@ def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> Non
 
 
 def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:
-    """Lines of another source would be wrong ones; the score stands all the same."""
+    """If the source has changed, its lines are not shown; the score stays."""
     path = toycar.library.parent / "tree" / DRIVER
     path.write_text("# one more line\n" + path.read_text())
     reported = ReportedRun.open(
@@ -119,7 +120,7 @@ def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) ->
 def test_a_run_without_operators_has_neither_panel(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """Its report is as it was: no panel, no column of lines."""
+    """Its report is unchanged: no panel, no column of lines."""
     out = write_run(toycar, tmp_path / "run")
     results.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)

@@ -1,4 +1,4 @@
-"""With `four_eyes` nobody approves what they changed last, as git tells it."""
+"""With `four_eyes` the author of the last change in git cannot approve it."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ OFFSET = "templates/offset.py.j2"
 
 
 def git(folder: Path, *words: str) -> str:
-    """What git says, as Git Smith."""
+    """Run git as Git Smith."""
     names = {"AUTHOR_NAME": "Git Smith", "AUTHOR_EMAIL": "smith@example.org"}
     names |= {"COMMITTER_NAME": "A Robot", "COMMITTER_EMAIL": "robot@example.org"}
     env = os.environ | {f"GIT_{name}": value for name, value in names.items()}
@@ -27,7 +27,7 @@ def git(folder: Path, *words: str) -> str:
 
 
 def commit(root: Path, path: str, author: str) -> str:
-    """A change of a file, committed by its author; the commit."""
+    """Change a file and commit it as the author; return the commit."""
     with (root / path).open("a") as file:
         file.write("{# more #}\n" if path.endswith("j2") else "# more\n")
     git(root, "commit", "-qam", "more", f"--author={author}")
@@ -36,7 +36,7 @@ def commit(root: Path, path: str, author: str) -> str:
 
 @pytest.fixture
 def root(toycar: Workspace) -> Path:
-    """The toy in a clone, with `four_eyes`; all of it was written by Git Smith."""
+    """The toy in a clone, with `four_eyes`, written entirely by Git Smith."""
     root = toycar.library.parent
     (root / "fault_library/reviews").mkdir()
     (root / "fault_library/reviews/toycar.yaml").write_text(HEAD)
@@ -60,8 +60,9 @@ def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
 
 
 def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root: Path) -> None:
-    """Whatever they changed of a group (spec, template, its YAML) and however they sign; others do, and stay
-    under the rule."""
+    """The author is refused for any part of a group (spec, template, its YAML) and under any signature;
+    others may approve.
+    """
     for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
@@ -75,7 +76,7 @@ def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root:
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
 def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path, path: str) -> None:
-    """Who changed the spec or template last is refused, no longer who did before; no other file counts."""
+    """Only the last author of the spec or template is refused, not earlier ones; no other file counts."""
     sha = commit(root, path, "Jane Doe <jane@example.org>")
     commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
     with pytest.raises(MutatorError, match=sha[:12]):
@@ -85,7 +86,7 @@ def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path,
 
 
 def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> None:
-    """Whom the commit's message names as one has changed the group as well as its author has."""
+    """A co-author in the commit's message is refused like the author."""
     commit(root, LANE, "Joe <joe@example.org>")
     words = "more\n\nCo-authored-by: Jane  Doe <jane@example.org>\nCo-Authored-By: Jim <jim@example.org>"
     git(root, "commit", "-q", "--amend", "-m", words)
@@ -96,7 +97,7 @@ def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> N
 
 
 def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
-    """A merge of two people's changes does not let the later one approve theirs, nor is it the merger's."""
+    """A merge does not let the later of two authors approve their own change, and the merger is no author."""
     git(root, "checkout", "-qb", "side")
     commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
     git(root, "checkout", "-q", "-")
@@ -108,7 +109,7 @@ def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
 
 
 def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> None:
-    """A change that is not committed, a file that never was, a library without git: the remedy says so."""
+    """An uncommitted change, an untracked file and a library without git are refused with a remedy."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
     with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):
@@ -124,9 +125,9 @@ def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> Non
 
 
 def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> None:
-    """With `-dirty` where more than reviews is not committed."""
+    """The commit has `-dirty` if anything except reviews is uncommitted."""
     sha = git(root, "rev-parse", "HEAD")
-    for _ in range(2):  # the second time the first decision is not committed
+    for _ in range(2):  # the second time the first decision is uncommitted
         decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
         assert decision is not None and decision.commit == sha
     (root / "fault_library/faults/sensor/new.yaml").write_text("")
@@ -134,7 +135,7 @@ def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> 
 
 
 def test_who_is_at_work(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The clone's own `user.name`, or nobody."""
+    """The name is the clone's own `user.name`, or empty."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     assert user_name(toycar) is None

@@ -1,4 +1,4 @@
-"""`--require-reviewed`: what is not approved as it is now does not start."""
+"""`--require-reviewed`: a plan with unapproved groups does not start."""
 
 from pathlib import Path
 
@@ -21,14 +21,14 @@ def plan(toycar: Workspace) -> Plan:
 
 
 def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
-    """Approve or reject the groups of the plan, or the first `count` of them."""
+    """Approve or reject the groups of the plan, or its first `count`."""
     changes = [Change(group=one, kind=kind, by=f"Reviewer {count}") for one in of_plan(toy, plan)[:count]]
     review = load_review(toy, "toycar")
     record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
 
 
 def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
-    """The run folder keeps who approved what, and a report can say so."""
+    """The run folder stores who approved what, for the report."""
     run = freeze(plan, tmp_path / "run", toycar).path
     assert gate.approval_summary(run) == ""
     decide(toycar, plan)
@@ -44,7 +44,7 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
 
 
 def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
-    """Missing, changed and rejected groups in this order, with reasons, experiments, what to do."""
+    """Missing, changed and rejected groups are listed in this order, with reasons, experiments and remedy."""
     groups = of_plan(toycar, plan)
     missing, changed, rejected = groups[0], groups[1], groups[-1]
     decide(toycar, plan)
@@ -67,7 +67,7 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
 
 
 def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Plan) -> None:
-    """A group that none of the experiments is of is not told with a number of them."""
+    """A group that no experiment uses is listed without a number of experiments."""
     alone = [group for group in of_plan(toycar, plan) if not group.runs]
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, plan)
@@ -76,7 +76,7 @@ def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Pl
 
 
 def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
-    """A campaign that the library does not have under that name, or has with another text."""
+    """A campaign whose name or text is not in the library is named by its path."""
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:
@@ -85,14 +85,16 @@ def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: P
 
 
 def test_nothing_is_planned_without_approval(toycar: Workspace, tmp_path: Path) -> None:
-    """A refused run leaves no plan behind, so that it can be given other options."""
+    """A refused run leaves no plan, so that it can be given other options."""
     with pytest.raises(CheckFailed):
         run_campaign(toycar, "small", tmp_path / "run", reviewed=True)
     assert not (tmp_path / "run" / "run.json").exists()
 
 
 def test_a_run_goes_on_without_the_spec_file_of_its_campaign(toycar: Workspace, tmp_path: Path) -> None:
-    """A run's own copy of a campaign cannot find a file beside the original; what it drew is approved."""
+    """A run's own copy of a campaign cannot find a file next to the original; its drawn faults are
+    approved.
+    """
     mine = tmp_path / "mine"
     mine.mkdir()
     spec = (toycar.library / "faults/sensor/lane.yaml").read_text()

@@ -1,4 +1,4 @@
-"""Shapes of patches: what varies becomes a hole, what does not stays text."""
+"""Shapes of patches: varying parts become holes, the rest stays text."""
 
 from dataclasses import replace
 
@@ -30,7 +30,9 @@ def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
 
 
 def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
-    """Faults of a variant share one diff with holes, which filled with their values is each one's patch."""
+    """Faults of a variant share one diff with holes; filled with a fault's values, it is that
+    fault's patch.
+    """
     pairs = [(fault, trigger) for fault in faults(toycar, "longer") for trigger in (NEAR, FAR)]
     (shape,) = grouped(toycar, pairs)
     assert shape.members == tuple(str(i) for i in range(8))
@@ -40,7 +42,7 @@ def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
 
 
 def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
-    """The table has ids, the trigger's condition and the fault's parameter; what all share is text."""
+    """The table has ids, the trigger's condition and the fault's parameter; common parts stay text."""
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
     named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)
@@ -51,7 +53,7 @@ def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
 
 
 def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
-    """More and less are one diff: `+ 3` and `- 3` fill the same hole."""
+    """`+ 3` and `- 3` fill the same hole of one diff."""
     first, second, *_ = faults(toycar, "longer")
     (injection,) = second.injections
     less = replace(second, injections=(replace(injection, params=(("by", -3.0), ("target", "gap"))),))
@@ -60,7 +62,7 @@ def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
 
 
 def test_not_a_number_is_a_value(toycar: Workspace) -> None:
-    """A number that is none stands where numbers stand."""
+    """NaN fills a hole like any number."""
     first, second, *_ = faults(toycar, "longer")
     (injection,) = second.injections
     params = (("by", float("nan")), ("target", "gap"))
@@ -71,7 +73,7 @@ def test_not_a_number_is_a_value(toycar: Workspace) -> None:
 
 
 def test_what_must_be_in_common(toycar: Workspace) -> None:
-    """Another place, another model, bounds or none: another shape."""
+    """Another place or model, or bounds versus none, makes another shape."""
     longer, nearer = faults(toycar, "longer")[0], faults(toycar, "nearer")[0]
     shifted = faults(toycar, "shifted", "sensor/lane")[0]
     silent = faults(toycar, "no_data", "sensor/silence")[0]
@@ -80,18 +82,18 @@ def test_what_must_be_in_common(toycar: Workspace) -> None:
 
 
 def test_what_triggers_a_change_makes_no_other_shape(toycar: Workspace) -> None:
-    """A context, a time or none, for as long as it holds or to the end: one diff."""
+    """A context, a time or neither, held for a time or to the end, share one diff."""
     longer = faults(toycar, "longer")[0]
     triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
     assert len(grouped(toycar, [(longer, trigger) for trigger in triggers])) == 1
 
 
 def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
-    """A shape has the same id whichever faults it was made from."""
+    """A shape has the same id whichever faults it was built from."""
     one, other, *_ = faults(toycar, "longer")
     (first,), (second,) = grouped(toycar, [(one, NEAR)]), grouped(toycar, [(other, FAR)])
     assert first.id == second.id
-    assert first.diff != second.diff  # of one member, everything is text
+    assert first.diff != second.diff  # for a single member, everything is text
 
 
 @pytest.mark.parametrize(
@@ -104,13 +106,13 @@ def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
     ],
 )
 def test_any_text_is_given_back(patch: str) -> None:
-    """What is no patch of a mutant is a shape as well, of itself."""
+    """Text that is no mutant's patch is a shape of itself."""
     (shape,) = shapes([("a", "", patch), ("b", "", patch)])
     assert shape.patch(1) == patch
 
 
 def test_pristine_lines_are_never_cut() -> None:
-    """Numbers outside injected lines are the target's: patches that differ in them are not alike."""
+    """Numbers outside injected lines are the target's: patches that differ in them have different shapes."""
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,2 @@\n x = 3\n+y = 4  # fi:01234567\n"
     )

@@ -1,4 +1,4 @@
-"""Pictures before and after image effects, of any target: the injected lines themselves are executed."""
+"""Images before and after image effects, for any target, by running the injected lines."""
 
 import io
 from collections.abc import Callable
@@ -23,7 +23,7 @@ Lit = Callable[..., tuple[Workspace, Group]]
 
 @pytest.fixture
 def lit(toycar: Workspace, give_eyes: Callable[..., None]) -> Lit:
-    """Gives the toy eyes, and a fault for what they see: the workspace and its group."""
+    """Give the toy eyes and a fault in what they see; return the workspace and its group."""
 
     def make(**given: str) -> tuple[Workspace, Group]:
         give_eyes(toycar, **given)
@@ -34,7 +34,7 @@ def lit(toycar: Workspace, give_eyes: Callable[..., None]) -> Lit:
 
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of the runs that are made."""
+    """The names of the runs made so far."""
     made: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -59,7 +59,7 @@ def grey(jpeg: bytes) -> float:
 
 
 def test_three_levels_of_an_effect(lit: Lit) -> None:
-    """The target's own picture, and what the least, a middle and the largest value make of it."""
+    """There is the target's own image, and those with the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
@@ -72,7 +72,9 @@ def test_three_levels_of_an_effect(lit: Lit) -> None:
 
 
 def test_one_level_is_asked_for(lit: Lit) -> None:
-    """A pair of files; None for a level that a group with fewer values lacks, and for any other group."""
+    """One level is a pair of files; None for a level that a group with fewer values lacks, and for any other
+    group.
+    """
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
@@ -83,7 +85,7 @@ def test_one_level_is_asked_for(lit: Lit) -> None:
 
 
 def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
-    """Nothing is run twice; another line of the effect, or a damaged entry, is drawn anew."""
+    """Nothing is run twice; a changed line of the effect, or a damaged entry, is drawn again."""
     workspace, group = lit()
     first = drawn(workspace, group)
     runs.clear()
@@ -99,7 +101,7 @@ def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
 
 
 def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -> None:
-    """As many pictures as wanted from one run of the target."""
+    """One run of the target draws any number of images."""
     workspace, group = lit()
     halves = [
         replace(group, id=name, faults=faults)
@@ -114,14 +116,15 @@ def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -
 
 
 def test_a_picture_in_an_attribute(lit: Lit) -> None:
-    """Each value is applied to the target's picture, not to the one that the value before has left."""
+    """Each value is applied to the target's original image, not to the previous result."""
     workspace, group = lit(values="[10, 20, 30]", target="self.picture", place="self.picture")
     assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
 
 
 def test_what_is_more_severe() -> None:
-    """A larger amount, or a smaller one, whichever changes the picture more; with amounts to both sides of
-    none, what changes it more."""
+    """The more severe amount is the one that changes the image more, larger or smaller; with amounts on both
+    sides of zero, too.
+    """
     assert pictures._by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
     assert pictures._by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
     assert pictures._by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
@@ -129,7 +132,7 @@ def test_what_is_more_severe() -> None:
 
 
 def test_chance_does_not_turn_neighbours_round() -> None:
-    """Nine blobs that cover more than ten do are still less severe."""
+    """Nine blobs are less severe than ten, even if they happen to cover more."""
     assert pictures._by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
     assert pictures._by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
     assert pictures._by_severity([2.0, 2.0]) == [0, 1]
@@ -143,13 +146,13 @@ def test_chance_does_not_turn_neighbours_round() -> None:
     ],
 )
 def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None:
-    """An array of bytes is a picture; what fails in the target is told in its words."""
+    """An array of bytes is an image; the target's error is reported in its own words."""
     with pytest.raises(MutatorError, match=said):
         drawn(*lit(picture=picture))
 
 
 def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
-    """A run that ends without it is told, not waited for."""
+    """A run that ends before the place is reported, without waiting."""
     workspace, _ = lit()
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
@@ -160,7 +163,7 @@ def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
 
 @pytest.mark.slow
 def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_path: Path) -> None:
-    """Each has a picture that it changes, at every level."""
+    """Each effect changes an image at every level."""
     manifest = clone.manifest("openpilot")
     wanted = [g for g in of_library(clone, manifest, specs=["vision_*/*"]) if pictures.has_pictures(g)]
     found = pictures.of_groups(clone, manifest, wanted)

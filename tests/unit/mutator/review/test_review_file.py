@@ -1,4 +1,6 @@
-"""The file of reviews: it merges under version control, tells a mistake at its line, and is read when old."""
+"""The review file merges under version control, reports a mistake at its line, and old versions can
+be read.
+"""
 
 import shutil
 import subprocess
@@ -40,7 +42,7 @@ def written(path: Path, *names: str) -> Path:
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """All that a block holds, and the head, come back; the file says the same each time."""
+    """All content of blocks and head is read back; writing it again gives the same text."""
     path = written(tmp_path / "toycar.yaml", "b", "a")
     found = review_file.load(path, "toycar")
     assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
@@ -80,7 +82,7 @@ def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
     ],
 )
 def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, words: str) -> None:
-    """A mistake is told with the file, its line and the offending value."""
+    """A mistake is reported with the file, its line and the offending value."""
     path = written(tmp_path / "toycar.yaml", "a", "b")
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
@@ -92,12 +94,12 @@ def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, w
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """A file of `review/1`: three changes under two kinds of triggers each, and the probe; all approved."""
+    """A file of `review/1`: three changes, each under two kinds of triggers, and the probe; all approved."""
     return shutil.copy(OLD, tmp_path / "toycar.yaml")
 
 
 def edited(path: Path, group: str, old: str, new: str) -> dict[str, Entry]:
-    """The entries by `what`, once the block of that group says something else."""
+    """The entries by `what`, after an edit of that group's block."""
     head, block, rest = path.read_text().partition(f'group: "{group}"')
     assert old in rest
     path.write_text(head + block + rest.replace(old, new, 1))
@@ -112,7 +114,9 @@ PROBE = "the probe, observing at toycar/go.py Drive.step after_assign now"
 
 
 def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
-    """Approved is what was approved under each kind of trigger; what was not kept then is not bound."""
+    """A change is approved if it was approved under each kind of trigger; data that was not stored is not
+    bound.
+    """
     found = {one.what: one for one in review_file.load(old, "toycar").entries.values()}
     assert set(found) == {GAP, OFFSET, SILENCE, PROBE}
     decision = found[OFFSET].decision
@@ -126,21 +130,23 @@ def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
 
 
 def test_an_old_rejection_counts(old: Path) -> None:
-    """A change is rejected if it was under one kind of trigger, by whom it was."""
+    """A change is rejected if it was rejected under one kind of trigger, with that reviewer."""
     edited(old, "d32713d465f1", "approved", "rejected")
     found = edited(old, "d32713d465f1", "Jane Doe", "Joe")[OFFSET].decision
     assert found is not None and (found.verdict, found.by) == (Verdict.REJECTED, "Joe")
 
 
 def test_old_decisions_about_different_things_do_not_hold(old: Path) -> None:
-    """Where two kinds of triggers were approved of different diffs, one of them is no longer true."""
+    """If two kinds of triggers were approved with different diffs, the approval no longer holds."""
     found = edited(old, "50d62901775b", "119123172159a027", "9" * 16)[OFFSET].decision
     assert found is not None
     assert found.bound == Bound(diff="0" * 16, function="3eff22e1db4eaddf", template="3307b2f6026230e8")
 
 
 def test_old_remarks_are_kept(old: Path) -> None:
-    """A decision's remark becomes a remark, of all kinds of triggers; who has approved one has approved."""
+    """A decision's remark becomes a remark, for all kinds of triggers; a reviewer of one kind counts as a
+    reviewer.
+    """
     edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
     edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
     entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]
@@ -152,7 +158,7 @@ def test_old_remarks_are_kept(old: Path) -> None:
 
 
 def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
-    """What is wrong in an old file stands where it always stood."""
+    """A mistake in an old file is reported at its line."""
     with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
         edited(old, "08a4799889df", "approved", "aproved")
     old.write_text('schema: review/1\ntarget: "toycar"\ndecisions: 1.5\n')
@@ -161,7 +167,7 @@ def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
 
 
 def test_writing_upgrades_the_file(old: Path) -> None:
-    """What is written of an old file is a new one that says the same."""
+    """Writing converts an old file to the new schema with the same content."""
     found = review_file.load(old, "toycar")
     review_file.write(old, "toycar", found)
     assert f"schema: {review_file.SCHEMA}\n" in old.read_text()

@@ -1,4 +1,4 @@
-"""One line is changed somewhere, and exactly the approvals that it affects no longer hold."""
+"""A changed line invalidates exactly the approvals that it affects."""
 
 import shutil
 from collections.abc import Callable
@@ -100,7 +100,7 @@ IN_SENSE = {VEIL, GLARE, HELPER, GAP, LOW, LANE, SILENCE}
 
 @pytest.fixture(scope="module")
 def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy with two image effects and a fault model that calls a helper; all of it is approved."""
+    """A toy with two image effects and a fault model that calls a helper; everything is approved."""
     toycar = copy_toycar(tmp_path_factory.mktemp("approved"))
     car = toycar.library.parent / "tree" / "toycar"
     (car / "effects.py").write_text(EFFECTS)
@@ -155,8 +155,9 @@ def groups(toy: Workspace) -> tuple[Group, ...]:
 def test_exactly_what_is_affected_is_stale(
     approved: Workspace, file: str, old: str, new: str, stale: set[str], why: str
 ) -> None:
-    """An effect, a base of it, a helper or a constant that it or a template calls, a template, a function, a
-    range: each makes those approvals stale that have to do with it, and says so."""
+    """A change in an effect, its base, a called helper or constant, a template, a function or a range makes
+    exactly the related approvals stale, with the reason.
+    """
     path = approved.library.parent / file
     text = path.read_text()
     assert old in text
@@ -170,7 +171,7 @@ def test_exactly_what_is_affected_is_stale(
 
 @pytest.mark.slow
 def test_a_line_of_an_effect_of_openpilots(clone: Workspace, tmp_path: Path) -> None:
-    """Of its groups exactly those are stale whose effect, a base or a helper of it, has another line."""
+    """Of its groups exactly those with a changed effect, base or helper are stale."""
     target = tmp_path / "target"
     shutil.copytree(clone.library.parent / "target", target, ignore=shutil.ignore_patterns("__pycache__"))
     library = tmp_path / "fault_library"

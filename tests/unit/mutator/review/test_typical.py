@@ -1,4 +1,4 @@
-"""What became of a group's mutants in a run."""
+"""The outcomes of a group's mutants in a run."""
 
 import shutil
 from collections.abc import Callable
@@ -27,7 +27,9 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
 def test_counts_a_typical_and_the_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """Of the group alone: the median of the most frequent ending, and the worst of all."""
+    """The counts cover the group only; the examples are the median of the most frequent ending, and the worst
+    of all.
+    """
     plan = make_plan(toycar, "toy", Choices())
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
@@ -46,7 +48,7 @@ def test_counts_a_typical_and_the_worst_experiment(
 
 
 def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """There is nothing to tell of a group that a campaign left out, nor of the probe, which all have."""
+    """A group that the campaign left out has no verdict, nor has the probe, which all mutants share."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -55,7 +57,7 @@ def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: W
 
 
 def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """A run that went on is read anew."""
+    """The results of a resumed run are read again."""
     group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
@@ -70,7 +72,7 @@ def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_
 def test_many_who_ask_at_once_read_the_table_once(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The table of a large run takes seconds, and more memory than there may be for each group on a page."""
+    """The table of a large run takes seconds, and too much memory to read it for each group on a page."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -118,5 +120,5 @@ def row(**given: Any) -> Row:
     ],
 )
 def test_a_verdict_in_words(given: dict[str, Any], words: str) -> None:
-    """What came, when, and whether anybody was warned."""
+    """The verdict says what happened, when, and whether there was a warning."""
     assert verdict_of(row(**given), {"H1": "a crash"}) == words

@@ -1,4 +1,4 @@
-"""What the values of a group may be follows from its specs, not from what a seed has drawn."""
+"""The possible values of a group follow from its specs, not from a seed's draws."""
 
 from dataclasses import replace
 
@@ -15,7 +15,9 @@ def faults(toy: Workspace, spec: str, seed: int = 0) -> list[Fault]:
 
 
 def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
-    """From the least end of the ranges to the greatest, in the variable's unit, whatever the seed."""
+    """The range goes from the least to the greatest end of all ranges, in the variable's unit, for
+    any seed.
+    """
     specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
     for seed in (0, 1):
         longer, nearer = (
@@ -28,7 +30,7 @@ def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
 
 
 def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
-    """A fault of a spec that is not known has the values that it has."""
+    """Without its spec, a fault has only its own values."""
     fault = faults(toycar, "sensor/distance")[0]
     assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
 
@@ -39,13 +41,13 @@ def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
         ([3.0, -1.0], (-1.0, 3.0)),
         ([float("nan"), 3.0], (3.0, 3.0, "nan")),
         ([float("inf"), float("-inf")], ("-inf", "inf")),
-        ([True, "word", None], None),  # the group's name tells these
+        ([True, "word", None], None),  # the group's name gives these
     ],
 )
 def test_what_is_no_number_is_a_word(
     toycar: Workspace, values: list[Value], found: tuple[object, ...] | None
 ) -> None:
-    """Values without an order stand beside the range."""
+    """Values without an order are listed next to the range."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = [replace(fault, injections=(replace(injection, params=(("by", one),)),)) for one in values]
@@ -53,7 +55,7 @@ def test_what_is_no_number_is_a_word(
 
 
 def test_several_injections_are_numbered_and_limits_are_values(toycar: Workspace) -> None:
-    """Which execution, and of which instance, is a value, too; a seed is drawn, and none."""
+    """The chosen execution and instance are values, too; a seed is drawn and is no value."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))

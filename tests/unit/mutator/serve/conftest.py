@@ -1,4 +1,6 @@
-"""A server in this process, on a toy library and a made-up run folder, and a client that says anything."""
+"""A server in this process, on a toy library and a made-up run folder, and a client that can send
+anything.
+"""
 
 import http.client
 import json
@@ -28,7 +30,7 @@ SECRET = "what others must not read"
 
 @dataclass(frozen=True)
 class Answer:
-    """What the server said."""
+    """The server's response."""
 
     status: int
     headers: Mapping[str, str]
@@ -45,7 +47,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Client:
-    """Asks the server. No answer may have the token, the secret, or a place on the disk."""
+    """A client of the server. No response may contain the token, the secret, or a path on the disk."""
 
     port: int
     place: Path
@@ -64,7 +66,7 @@ class Client:
         *,
         chunked: bool = False,
     ) -> Answer:
-        """Ask as a page of the server would, but for `headers`: None leaves one out."""
+        """Send a request like the server's page, except for `headers`: None leaves one out."""
         own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
         if method == "POST":
             own |= {"Origin": self.origin, "Content-Type": "application/json"}
@@ -79,7 +81,7 @@ class Client:
                 sent["Content-Length"] = str(len(data))
             for name, value in sent.items():
                 connection.putheader(name, value)
-            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before all was sent
+            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before everything was sent
                 connection.endheaders(data, encode_chunked=chunked)
             answer = connection.getresponse()
             found = Answer(answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read())
@@ -98,7 +100,7 @@ class Client:
         return self.ask("POST", path, body=body)
 
     def ended(self, job: str, within_s: float = 300.0) -> dict[str, Any]:
-        """The job once it has ended."""
+        """Wait until the job has ended, and return it."""
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             found = next(one for one in self.get("/api/jobs").json["jobs"] if one["id"] == job)
@@ -110,7 +112,7 @@ class Client:
 
 @pytest.fixture(scope="session")
 def served_at(_caches: Path) -> Callable[[Workspace, Path], Any]:
-    """Serves a library and a folder of runs until the end of a `with`."""
+    """Serve a library and a folder of runs until the end of a `with`."""
 
     @contextmanager
     def serve(workspace: Workspace, runs: Path) -> Iterator[Client]:
@@ -136,7 +138,7 @@ def client(
     copy_toycar: Callable[[Path], Workspace],
     served_at: Callable[[Workspace, Path], Any],
 ) -> Iterator[Client]:
-    """A server of a copy of the toy's library and of the made-up run `night`, beside which lies a secret."""
+    """A server of a copy of the toy's library and of the made-up run `night`, with a secret next to it."""
     place = tmp_path_factory.mktemp("served")
     workspace = copy_toycar(place)
     shutil.rmtree(workspace.library / "faults" / "hostile")

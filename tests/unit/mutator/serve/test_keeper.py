@@ -1,4 +1,4 @@
-"""The keeper of a job: nothing of a command outlives the server, which holds the other end of its pipe."""
+"""A job's keeper: no process of a command outlives the server, which holds the other end of its pipe."""
 
 import os
 import signal
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-# A keeper of another command than mutator, with less patience.
+# A keeper of another command than mutator, with a shorter timeout.
 KEEPER = """
 import os, sys
 from mutator.serve import keeper
@@ -19,7 +19,7 @@ execv = os.execv
 keeper.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
 sys.exit(keeper.main())
 """
-# Starts a process in another session, says so, and waits; `{}` says what it does when it is asked to end.
+# Starts a process in another session, reports it, and waits; `{}` is its reaction to a request to end.
 COMMAND = """
 import pathlib, signal, subprocess, sys, time
 def end(number, frame):
@@ -41,7 +41,7 @@ def eventually(holds: Callable[[], bool]) -> bool:
 
 
 def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
-    """A keeper of a script, and the end of the pipe that its server holds."""
+    """A keeper of a script, and its server's end of the pipe."""
     watched, hold = os.pipe()
     words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
     keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)
@@ -64,7 +64,7 @@ def child_of(folder: Path) -> int:
 
 
 def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
-    """It is asked to end as soon as the pipe is closed, and what it started is gone with it."""
+    """When the pipe is closed, the command is asked to end, and its children end, too."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     os.close(hold)
@@ -74,7 +74,7 @@ def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
 
 
 def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
-    """After a while, with all that it started."""
+    """After a timeout the command is killed with all its children."""
     keeper, hold = kept(tmp_path, COMMAND.format("pass"), patience_s=0.2)
     child = child_of(tmp_path)
     os.close(hold)
@@ -83,7 +83,7 @@ def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
 
 
 def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
-    """Should somebody kill the keeper, the kernel kills the command."""
+    """If the keeper is killed, the kernel kills the command."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     [command] = Path(f"/proc/{keeper.pid}/task/{keeper.pid}/children").read_text().split()
@@ -96,7 +96,7 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("code", [0, 1, 3])
 def test_the_exit_code_is_the_commands(tmp_path: Path, code: int) -> None:
-    """So that the server tells a failed job from a good one."""
+    """The exit code lets the server distinguish failed jobs."""
     keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
     assert keeper.wait(20) == code
     os.close(hold)

@@ -1,4 +1,4 @@
-"""Reviews for the page's script: decisions are in the library's file as soon as they are answered."""
+"""Reviews for the page's script: when the response arrives, the decision is in the library's file."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -21,14 +21,14 @@ API = "/api/review/toycar"
 def reviewed(
     toycar: Workspace, tmp_path: Path, served_at: Callable[[Workspace, Path], Any]
 ) -> Iterator[tuple[Client, list[str]]]:
-    """A server of a library that a test may write to, and the ids of its groups, specs of the lane alone."""
+    """A server of a writable library, and the ids of its groups, for the lane specs only."""
     (tmp_path / "runs").mkdir()
     with served_at(toycar, tmp_path / "runs") as client:
         yield client, list(client.get(f"{API}?spec=sensor/*").json["groups"])
 
 
 def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more: Any) -> Any:
-    """The answer to changes (group, kind), made by somebody who sees all as it is now."""
+    """The response to changes (group, kind) by somebody with the current view."""
     groups = client.get(f"{API}?spec=sensor/*").json["groups"]
     body = {
         "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],
@@ -40,7 +40,7 @@ def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more:
 
 
 def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """An approval, a remark and a flag are in the file, and a page that is loaded again has them."""
+    """An approval, a remark and a flag are in the file, and a reloaded page has them."""
     client, (first, second, *_) = reviewed
     answer = decided(client, (first, "approve"), (second, "flag"))
     assert answer.status == 200
@@ -56,7 +56,9 @@ def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Wor
 
 
 def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """What somebody else has said since is told, nothing is written, and who has then seen it may decide."""
+    """A newer decision of somebody else is reported, nothing is written, and after seeing it the reviewer may
+    decide.
+    """
     client, (first, second, *_) = reviewed
     group = next(
         one for one in of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",)) if one.id == first
@@ -74,7 +76,7 @@ def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: W
 def test_another_diff_than_the_page_shows_is_not_approved(
     reviewed: tuple[Client, list[str]], toycar: Workspace
 ) -> None:
-    """A page that was made before the target changed cannot decide about what it does not show."""
+    """A page from before a change of the target cannot decide about what it does not show."""
     client, [*names] = reviewed
     before = client.get(f"{API}?spec=sensor/*").json["groups"]
     sensing = toycar.library.parent / "tree/toycar/sensing.py"
@@ -109,7 +111,7 @@ NO_DECISIONS: tuple[tuple[Any, int], ...] = (
 
 
 def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """Nothing is written for it."""
+    """An invalid decision is refused, and nothing is written."""
     client, (first, *_) = reviewed
     for body, status in NO_DECISIONS:
         sent = json.dumps(body).replace("ID", first)
@@ -119,7 +121,7 @@ def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toyc
 
 
 def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
-    """A script in a name, a remark or an address is in no page as markup; the page's data are packed."""
+    """A script in a name, a remark or an address never becomes markup; the page's data are packed."""
     client, (first, *_) = reviewed
     assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
     answer = client.get(f"{API}?spec=sensor/*")
@@ -132,7 +134,7 @@ def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
 
 
 def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[str]]) -> None:
-    """A group without pictures, a level and a run that are not there: no such thing."""
+    """A group without images, an unknown level and an unknown run give "not found"."""
     client, (first, *_) = reviewed
     assert client.get(f"/review/toycar/{first}/picture/most-after.jpg?spec=sensor/*").status == 404
     assert client.get(f"{API}/{first}/typical?spec=sensor/*&run=none").status == 404
@@ -142,7 +144,7 @@ def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[st
 
 
 def test_a_review_file_is_no_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """No page tells what stands in a file that the review file leads to, and no decision goes there."""
+    """A linked review file is neither shown nor written."""
     client, (first, *_) = reviewed
     other = client.place / "secret.txt"
     other.write_text(SECRET)

@@ -1,6 +1,6 @@
-"""The statistics of a report a second time, in plain Python: from formulas, with nothing of the harness.
+"""A report's statistics computed a second time in plain Python, from formulas, without the harness.
 
-Rows are dicts as `made_up` draws them; times that did not come are absent.
+Rows are dicts as `made_up` draws them; missing times are absent.
 """
 
 import math
@@ -19,7 +19,8 @@ ALERTS = ("fcw", "steer_saturated", "driver_distracted")
 
 def made_up(seed: int) -> list[dict[str, Any]]:
     """A campaign of guided and random runs: faults in scenarios and context rows, some without a partner,
-    some crashed; times on a grid of 0.1 s, so that there are ties."""
+    some crashed; times lie on a grid of 0.1 s, so that there are ties.
+    """
     draw = random.Random(seed)
     faults = draw.randint(4, 30)
     scenarios = list(ENDS)[: draw.randint(1, 3)]
@@ -77,7 +78,7 @@ def hazard_at(row: Row) -> float | None:
 
 
 def counts(rows: Sequence[Row]) -> dict[str, int]:
-    """By what the summary calls them."""
+    """Counts by the summary's names."""
     hazard = [hazard_at(row) is not None for row in rows]
     alert = ["t_alert" in row for row in rows]
     return {
@@ -105,7 +106,7 @@ Fourfold = tuple[int, int, int, int]  # guided: hazard, none; random: hazard, no
 
 
 def fourfolds(rows: Sequence[Row], whole: str) -> dict[str, Fourfold]:
-    """By fault type, those with runs of both methods."""
+    """The fourfold tables by fault type, for those with runs of both methods."""
     found = {}
     for kind in sorted({kind_of(row) for row in rows}):
         cells: list[int] = []
@@ -151,7 +152,7 @@ def _cochran(tables: Sequence[Fourfold]) -> float:
 
 
 def _breslow_day(table: Fourfold, ratio: float) -> float:
-    """The squared distance of a cell from what it would be at the common odds ratio, by bisection."""
+    """The squared distance of a cell from its value at the common odds ratio, by bisection."""
     a, b, c, d = table
     low, high = float(max(0, a - d)), float(min(a + b, a + c))
     for _ in range(200):
@@ -170,7 +171,7 @@ def chi_squared_tail(x: float, df: int) -> float:
 
 
 def fisher(table: Fourfold) -> float:
-    """The probability of all tables with these margins that are no likelier than this one."""
+    """The probability of all tables with these margins that are at most as likely as this one."""
     a, b, c, d = table
     first, hazards, n = a + b, a + c, a + b + c + d
     ways = {
@@ -181,7 +182,7 @@ def fisher(table: Fourfold) -> float:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The k-th smallest of m times m - k + 1, none below one before it."""
+    """The k-th smallest times m - k + 1, and none below an earlier one."""
     order = sorted(range(len(p_values)), key=lambda i: p_values[i])
     adjusted, least = [0.0] * len(p_values), 0.0
     for rank, i in enumerate(order):
@@ -200,7 +201,7 @@ def matched(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
 
 
 def sign_test(first: int, second: int) -> float:
-    """Two-sided: as many or fewer heads or tails of so many throws."""
+    """Two-sided sign test: at most as many heads or tails in that many throws."""
     n, least = first + second, min(first, second)
     return min(1.0, 2 * sum(math.comb(n, k) for k in range(least + 1)) / 2**n)
 
@@ -208,7 +209,7 @@ def sign_test(first: int, second: int) -> float:
 def bootstrap(
     clusters: Sequence[Sequence[Row]], rate: Callable[[Sequence[Row]], float], draws: int
 ) -> tuple[float, float]:
-    """Percentiles of a rate of the rows of as many clusters drawn anew."""
+    """Percentiles of a rate over as many clusters, resampled."""
     draw = random.Random(99)
     found = sorted(
         rate([row for cluster in draw.choices(clusters, k=len(clusters)) for row in cluster])

@@ -27,7 +27,7 @@ def pair(fault: str, guided: dict[str, object], random: dict[str, object]) -> li
 
 @pytest.fixture(scope="module")
 def frame() -> pd.DataFrame:
-    """Five pairs: both hit; guided only; random only (c, and d where the guided one slept); neither."""
+    """Five pairs: both hit; guided only; random only (c, and d with an inactive guided fault); neither."""
     made = [
         *pair("a", HIT, HIT),
         *pair("b", HIT, RAN),
@@ -35,7 +35,7 @@ def frame() -> pd.DataFrame:
         *pair("d", {}, HIT),
         *pair("e", RAN, RAN),
     ]
-    return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one that has no partner yet
+    return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one without a partner so far
 
 
 def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
@@ -53,7 +53,7 @@ def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
 
 
 def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
-    """A type that never is a hazard says nothing of the odds; if all are so, nothing is known."""
+    """A type without hazards contributes nothing to the odds; if all types are so, the result is unknown."""
     one = stratum((10, 20), (5, 20))
     pooled = contrasts.mantel_haenszel([one, stratum((0, 9), (0, 9))])
     assert pooled.odds_ratio == pytest.approx(contrasts.mantel_haenszel([one]).odds_ratio)
@@ -61,13 +61,13 @@ def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:
-    """The smallest of three is tripled, the next doubled, and none is below one before it."""
+    """The smallest of three is tripled, the next doubled, and none is below an earlier one."""
     assert contrasts.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
     assert contrasts.holm([]) == ()
 
 
 def test_holm_adjusts_as_statsmodels_does() -> None:
-    """To the bit, whatever the p-values are: ties, 0 and 1, and tests that gave none."""
+    """The result has the same bits for all p-values: ties, 0 and 1, and tests without a result."""
     draw = random.Random(1)
     for _ in range(20):  # that takes 50 ms for one
         p_values = [
@@ -78,7 +78,9 @@ def test_holm_adjusts_as_statsmodels_does() -> None:
 
 
 def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
-    """Every guided run meets its random partner by the name of the row; one without is left out."""
+    """Every guided run is paired with its random partner by the name of the row; one without a partner is
+    left out.
+    """
     found = contrasts.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
     assert contrasts.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
@@ -91,7 +93,7 @@ def test_mcnemar_is_exact() -> None:
 
 
 def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.DataFrame) -> None:
-    """Both are told, in total and by fault type."""
+    """Both are reported, in total and by fault type."""
     lines = [line[:7] for line in pairs_sheet(frame).lines]
     assert lines == [
         ("all", "total", 5, 1, 1, 2, 1),
@@ -102,7 +104,7 @@ def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.Dat
 
 
 def test_resampling_draws_whole_faults() -> None:
-    """Copies of a run in other scenarios add no information: the interval stays that of the faults."""
+    """Copies of a run in other scenarios add no information: the interval is that of the faults."""
     once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
     often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
     single, copied = (contrasts.resampled(results(*rows), "injected") for rows in (once, often))
@@ -112,7 +114,9 @@ def test_resampling_draws_whole_faults() -> None:
 
 
 def test_faults_that_all_say_the_same_have_no_interval() -> None:
-    """That three faults did no harm at all, or only when guided, does not bound what others would do."""
+    """If three faults all did no harm, or did harm only when guided, that does not bound what others would
+    do.
+    """
     for guided in (RAN, HIT):
         rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
         found = contrasts.resampled(results(*rows), "injected")
@@ -122,7 +126,7 @@ def test_faults_that_all_say_the_same_have_no_interval() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_an_interval_needs_both_methods_in_every_draw() -> None:
-    """Where each fault has runs of one method only, some draws have no difference: no interval is told."""
+    """If each fault has runs of one method only, some draws have no difference, so there is no interval."""
     found = contrasts.resampled(
         results(HIT | {"fault_id": "a"}, RAN | {"fault_id": "b", "method": "random"}), "activated"
     )

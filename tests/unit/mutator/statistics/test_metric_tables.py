@@ -30,7 +30,9 @@ FRAME = pd.DataFrame(
 
 
 def test_the_spread_of_each_metric_by_fault_type() -> None:
-    """Median, worse quartile and worst are by hand; what was not activated and what has no value is out."""
+    """Median, worse quartile and worst equal hand-computed ones; experiments without activation or value are
+    left out.
+    """
     sheet = metrics_sheet(FRAME, METRICS)
     told = [(*line[:6], *line[8:]) for line in sheet.lines]
     assert told == [
@@ -52,7 +54,7 @@ def test_without_a_value_there_is_no_line() -> None:
 
 
 def test_classes_of_severity_by_fault_type() -> None:
-    """Each class is counted of the activated faults, and any contact before them."""
+    """Each class is counted among the activated faults, and any contact comes before the classes."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
@@ -64,7 +66,7 @@ def test_classes_of_severity_by_fault_type() -> None:
 
 
 def test_times_to_the_hazard() -> None:
-    """Only what came before the hazard is a time to it; an alert that came with it is none."""
+    """Only events before the hazard have a time to it; an alert at the same time has none."""
     told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
@@ -78,7 +80,7 @@ def test_times_to_the_hazard() -> None:
 def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The interval is what a plain loop finds that copies the runs of each drawn fault."""
+    """The interval equals that of a plain loop that copies the runs of each drawn fault."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
     monkeypatch.setattr(medians, "_CELLS", 300)  # several batches
     rng = np.random.default_rng(3)
@@ -100,7 +102,7 @@ def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
 
 
 def test_where_nothing_can_be_said_of_a_median() -> None:
-    """One fault, or runs that all say the same, have no interval; no pair has no difference."""
+    """One fault, or equal runs, have no interval; without pairs there is no difference."""
     ones, faults = pd.Series([1.0, 1.0, 1.0]), pd.Series(["a", "b", "c"])
     assert all(map(math.isnan, median_interval(ones, faults)))
     assert all(map(math.isnan, median_interval(pd.Series([1.0, 2.0]), pd.Series(["a", "a"]))))

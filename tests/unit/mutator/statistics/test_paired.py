@@ -15,14 +15,14 @@ def flags(text: str) -> pd.Series:
 
 
 def test_mcnemar_looks_at_pairs_that_differ() -> None:
-    """The counts are those of the pairs, the p-value the exact binomial one of those that differ."""
+    """The counts are those of the pairs, the p-value the exact binomial one of the differing pairs."""
     found = mcnemar(flags("1111111100"), flags("1000000010"))
     assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
     assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
 
 
 def test_nothing_differs() -> None:
-    """Equal flags have p 1 and a difference of 0; how rarely others would differ they do not say."""
+    """Equal flags have p 1 and a difference of 0, without an interval."""
     same = flags("1100")
     assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
@@ -31,7 +31,7 @@ def test_nothing_differs() -> None:
 
 
 def test_whole_faults_are_drawn_anew() -> None:
-    """Ten equal pairs of each of few faults say little: the interval is as wide as that of few faults."""
+    """Ten equal pairs of each of few faults have the wide interval of few faults."""
     first, second = flags("0" * 40), flags("1" * 10 + "0" * 30)
     alike = rate_difference(first, second, pd.Series([i // 10 for i in range(40)]))
     apart = rate_difference(first, second, pd.Series(range(40)))
@@ -41,14 +41,14 @@ def test_whole_faults_are_drawn_anew() -> None:
 
 
 def test_one_fault_has_no_interval() -> None:
-    """With a single fault there is nothing to draw anew."""
+    """With a single fault there is nothing to resample."""
     found = rate_difference(flags("00"), flags("10"), pd.Series(["a", "a"]))
     assert found.difference == 0.5
     assert math.isnan(found.low)
 
 
 def test_times_of_pairs() -> None:
-    """Medians and their difference are of the pairs that have both times; the interval is exact."""
+    """Medians and their difference cover the pairs with both times; the interval is exact."""
     first = pd.Series([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, None, 9.0])
     second = first + pd.Series([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.0, None])
     found = times(first, second)
@@ -58,7 +58,7 @@ def test_times_of_pairs() -> None:
 
 
 def test_equal_and_missing_times() -> None:
-    """Where no time differs there is nothing to test; where there is none, no number is made up."""
+    """If no time differs there is nothing to test; without times there are no numbers."""
     same = pd.Series([1.0, 0.1 + 0.2])
     assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
     none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
@@ -68,8 +68,7 @@ def test_equal_and_missing_times() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
-    """Of five faults there are 5^5 resamples: the interval ends between their percentiles around 2.5 and
-    97.5 %."""
+    """Five faults have 5^5 resamples: the interval ends between their percentiles around 2.5 and 97.5 %."""
     draw = np.random.default_rng(seed)
     cluster = pd.Series(np.repeat(range(5), [1, 2, 3, 5, 8]))
     first, second = (pd.Series(draw.random(19) < chance) for chance in (0.3, 0.6))
@@ -83,7 +82,9 @@ def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [5, 6, 9, 10, 30])
 def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
-    """The interval has as few differences as covers 95 %: the sign test by hand, none for fewer than six."""
+    """The interval drops as many differences as 95 % coverage allows: the sign test by hand, none for fewer
+    than six.
+    """
     change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
     found = times(pd.Series(np.zeros(size)), change).median
     tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]
@@ -97,7 +98,7 @@ def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
 
 @pytest.mark.parametrize("size", [4, 7, 10])
 def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
-    """Of all signs that the ranks may have, the share that is as far to a side as the one seen."""
+    """The p-value is the share of all sign assignments at least as extreme as the observed one."""
     change = pd.Series(np.random.default_rng(size).normal(0.5, 1.0, size))
     ranks = change.abs().rank()
     sums = [

@@ -118,7 +118,7 @@ def test_student() -> None:
 
 
 def test_by_hand_gives_the_published_numbers_too() -> None:
-    """What the ten tables are checked against is right where the literature says what is right."""
+    """The reference for the ten tables reproduces the numbers of the literature."""
     odds = by_hand.pooled_odds(BERKELEY)
     assert (odds["odds ratio"], odds["low"]) == pytest.approx((0.9046968, 0.7719074), abs=1e-7)
     assert by_hand.fisher((3, 1, 1, 3)) == pytest.approx(0.4857, abs=5e-5)

@@ -1,4 +1,4 @@
-"""The spread between seeds: hand-made frames whose numbers are known."""
+"""The spread between seeds: hand-made frames with known results."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ COLUMNS = ("share", "low", "high", "least", "its", "largest", "other", "seeds")
 
 
 def seed(number: int, hazards: int, runs: int = 10, **more: Any) -> list[dict[str, Any]]:
-    """So many activated runs of a seed, of which the first ones have H1."""
+    """That many activated runs of a seed; the first ones have H1."""
     ran = {"seed": number, "t_activation": 1.0, **more}
     return [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(runs)]
 
@@ -32,19 +32,21 @@ def test_one_seed_has_no_spread() -> None:
 
 
 def test_the_least_and_the_largest_seed() -> None:
-    """Shares of all seeds pooled, beside those of the seeds with least and most, the lowest seed where
-    several have it; seeds go by their size, not by their text."""
+    """The pooled share of all seeds is shown with those of the lowest and highest seed, the lower seed in a
+    tie; seeds sort numerically.
+    """
     frame = results(*seed(10, 1), *seed(9, 6, runs=20), *seed(2, 5), *seed(30, 1))
     assert seeds_of(frame) == ["2", "9", "10", "30"]
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert (found["share"].count, found["share"].of, found["seeds"]) == (13, 50, 4)
     assert (found["least"], found["its"], found["largest"], found["other"]) == (0.1, 10, 0.5, 2)
-    assert cells(seeds_sheet(frame), "all", "H1", "injected") == found  # no other hazard came
+    assert cells(seeds_sheet(frame), "all", "H1", "injected") == found  # no other hazard occurred
 
 
 def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
     """Two seeds of equal size, 0.2 and 0.6: a draw of two is 0.2, 0.4 or 0.6, in 1, 2 and 1 of 4 cases, so
-    the middle 95 % go from 0.2 to 0.6. Twenty seeds have an interval as numpy's draws of them have it."""
+    the middle 95 % go from 0.2 to 0.6. The interval of twenty seeds equals that of numpy's draws.
+    """
     found = cells(seeds_sheet(results(*seed(1, 2), *seed(2, 6))), "all", "hazards", "activated")
     assert (found["low"], found["high"]) == pytest.approx((0.2, 0.6))
     hazards = [(7 * k) % 10 for k in range(20)]
@@ -57,8 +59,7 @@ def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
 
 
 def test_seeds_that_say_the_same_have_no_interval() -> None:
-    """Where all seeds say the same nothing is known of others; a seed in which there was nothing to count is
-    in no share."""
+    """If all seeds agree there is no interval; a seed with nothing to count is in no share."""
     frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])
@@ -68,7 +69,7 @@ def test_seeds_that_say_the_same_have_no_interval() -> None:
 
 
 def test_methods_and_fault_types_by_themselves() -> None:
-    """Each method and each fault type has lines of its own; without alerts there is nothing of them."""
+    """Each method and each fault type has its own lines; without alerts there are none of them."""
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )

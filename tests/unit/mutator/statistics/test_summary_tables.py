@@ -23,7 +23,7 @@ def test_wilson_interval_of_a_published_example() -> None:
 
 
 def test_a_table_without_published_counts_has_only_ours() -> None:
-    """Where nothing is published there are no empty lines, and no word of a publication."""
+    """Without published counts there are no empty lines and no mention of a publication."""
     coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
     assert [line[1] for line in coverage.lines] == ["here", "here"]
     summary = summary_sheet("guided", by_scenario(results(HIT)), None)
@@ -32,7 +32,7 @@ def test_a_table_without_published_counts_has_only_ours() -> None:
 
 
 def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
-    """What says nothing about its fault is left out; a crash does not count as activated by itself."""
+    """Runs without information about their fault are left out; a crash alone does not count as activated."""
     frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
     assert by_scenario(frame)["guided", "S1"] == Tally(
         injected=2,
@@ -46,7 +46,7 @@ def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
 
 
 def test_a_file_that_is_no_results_table_is_told(tmp_path: Path) -> None:
-    """A missing file and a missing column are the user's error, with the file's name."""
+    """A missing file and a missing column are a user's error, with the file's name."""
     with pytest.raises(MutatorError, match=r"results\.csv"):
         load(tmp_path / "results.csv")
     (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")

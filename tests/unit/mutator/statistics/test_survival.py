@@ -1,4 +1,4 @@
-"""Censored times against lifelines 0.30.3, against published curves, and against a median by hand."""
+"""Censored times agree with lifelines 0.30.3, with published curves, and with a hand-computed median."""
 
 import json
 import math
@@ -23,7 +23,7 @@ ALERT_S = 5.0
 
 
 def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
-    """The reaction of runs with an alert at 5 s, then a hazard or the end of a scenario of their own."""
+    """Reaction times of runs with an alert at 5 s, then a hazard or the end of their scenario."""
     rows, ends = [], {}
     for i, (time, event) in enumerate(zip(sample["times"], sample["status"], strict=True)):
         ends[f"S{i}"] = ALERT_S + time
@@ -42,7 +42,9 @@ def test_the_curve_is_that_of_lifelines(sample: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(("name", "sample"), LIFELINES.items(), ids=LIFELINES)
 def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: dict[str, Any]) -> None:
-    """Where the curve is one half for a while, lifelines has its beginning, and the report its middle."""
+    """If the curve stays at one half for a while, lifelines returns its beginning, and the report
+    its middle.
+    """
     found = reaction(sample)
     assert (found.at_risk, found.events) == (len(sample["times"]), sum(sample["status"]))
     if name in FLAT:
@@ -53,10 +55,11 @@ def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
 def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any]) -> None:
-    """It lies where lifelines' interval of the curve holds one half.
+    """The interval is where lifelines' interval of the curve contains one half.
 
-    Lifelines takes the interval of a curve at 0 for (0, 0), so it ends there at the latest: four times alone
-    would bound a median, though all of them are below it once in sixteen. The report leaves it open, as R.
+    Lifelines uses (0, 0) as the interval of a curve at 0, so its interval ends there at the latest: four
+    times alone would bound a median, though all of them are below it once in sixteen. The report leaves it
+    open, like R.
     """
     found = reaction(sample)
     high = sample["median_high"]
@@ -86,14 +89,14 @@ def test_the_published_medians_of_miller() -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 20, 21, 50, 51])
 def test_without_censoring_the_median_is_the_ordinary_one(size: int) -> None:
-    """Of an even number of times it is the middle of the two in the middle."""
+    """For an even number of times it is the mean of the middle two."""
     drawn = np.random.default_rng(size).uniform(0.5, 9.0, size).round(3)
     sample = {"times": drawn, "status": [1] * size}
     assert reaction(sample).median == pytest.approx(np.median(drawn))
 
 
 def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> None:
-    """Nothing tells how long it would have stayed: the beginning, not infinity."""
+    """The end of the half is unknown, so the median is its beginning, not infinity."""
     assert reaction(LIFELINES["one half to the end"]).median == 2.0
 
 

@@ -1,4 +1,4 @@
-"""Every number of a report's tables, of ten made-up campaigns, computed a second time by hand."""
+"""Every number in a report's tables, for ten made-up campaigns, is computed a second time by hand."""
 
 import math
 from collections import Counter
@@ -49,7 +49,7 @@ def campaign(seed: int) -> Campaign:
     return Campaign(by_hand.usable(made), {sheet.name: sheet for sheet in sheets})
 
 
-# Three at each change, all in the slow tests.
+# Three for each change, all ten in the slow tests.
 SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(10)]
 
 
@@ -209,7 +209,7 @@ def test_from_alert_to_hazard(made: Campaign) -> None:
 
 
 def test_alerts_before_hazards(made: Campaign) -> None:
-    """In how many runs with a hazard each alert, any and none came before it."""
+    """The number of runs with a hazard that each alert, any, or none preceded."""
     expected: list[tuple[Any, ...]] = []
     for method, hazard in ((m, h) for m in METHODS for h in ("H1", "H3")):
         time = f"t_{hazard.lower()}"
@@ -225,7 +225,7 @@ def test_alerts_before_hazards(made: Campaign) -> None:
 
 
 def test_orders_of_hazards(made: Campaign) -> None:
-    """How many runs had one hazard, both at once, or one after the other."""
+    """The number of runs with one hazard, both at once, or one after the other."""
     counts: Counter[tuple[str, str, str]] = Counter()
     for row in made.rows:
         h1, h3 = row.get("t_h1"), row.get("t_h3")

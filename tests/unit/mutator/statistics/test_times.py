@@ -1,4 +1,4 @@
-"""Times from activation on, censored reaction times, alerts before hazards, and hazards in order."""
+"""Times from activation, censored reaction times, alerts before hazards, and hazards in order."""
 
 import math
 from typing import Any
@@ -20,7 +20,7 @@ def run(alert: float | str = "", hazard: float | str = "", **more: Any) -> dict[
 
 
 def test_times_count_from_activation() -> None:
-    """Manifestation, alert and hazard are as late as they came after activation, where they came."""
+    """Manifestation, alert and hazard count from the activation, if they occurred."""
     found = times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, ""), run("", ""), {}))
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
     assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
@@ -29,7 +29,7 @@ def test_times_count_from_activation() -> None:
 
 
 def test_no_reaction_time_without_an_alert_that_came_first() -> None:
-    """An alert with or after the hazard leaves no time to react: not 0, and not negative."""
+    """An alert with or after the hazard leaves an empty reaction time: not 0, and not negative."""
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run("", 9.0))
     assert times.propagation(frame)["alert to hazard"].n == 0
     found = times.reaction(frame, ENDS, DRIVER_S)
@@ -53,7 +53,7 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
 
 
 def test_the_censored_lengthen_the_median() -> None:
-    """Alerts that no hazard follows push the median out, here beyond what was observed."""
+    """Alerts without a later hazard raise the median, here beyond the observed times."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
     assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
     many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
@@ -62,14 +62,14 @@ def test_the_censored_lengthen_the_median() -> None:
 
 
 def test_alerts_without_any_hazard_are_no_median() -> None:
-    """Nothing but censored runs: everyone had time, and there is no median."""
+    """With only censored runs there is no median."""
     found = times.reaction(results(run(10.0, "")), ENDS, DRIVER_S)
     assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
     assert math.isnan(found.median)
 
 
 def test_runs_that_did_not_end_well_are_not_censored_at_the_end_of_others() -> None:
-    """Of a crashed run nobody knows how long it would have been watched."""
+    """It is unknown how long a crashed run would have been observed."""
     assert times.reaction(results(run(10.0, "", status="crashed")), ENDS, DRIVER_S).at_risk == 0
 
 
@@ -79,7 +79,7 @@ def test_a_reaction_of_just_the_drivers_time_is_not_longer() -> None:
 
 
 def test_the_alerts_before_each_hazard() -> None:
-    """Each hazard of a run counts by itself: an alert between two hazards warned of the second alone."""
+    """Each hazard of a run counts separately: an alert between two hazards warned only of the second."""
     frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
     alerts = {
         "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
@@ -99,13 +99,13 @@ def test_the_alerts_before_each_hazard() -> None:
 
 
 def test_hazards_in_the_order_in_which_they_came() -> None:
-    """H1 alone, H3 before H1, both at once; runs without hazard are not listed."""
+    """H1 alone, H3 before H1, and both at once are listed; runs without hazard are not."""
     frame = results(run("", 9.0), run("", 9.0, t_h3=7.0), run("", 9.0, t_h3=9.0), run())
     assert times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
 
 
 def test_the_sheets_are_by_method_and_scenario() -> None:
-    """Scenarios of a method, then all of them; every line has a cell for each head."""
+    """Each method lists its scenarios, then their total; every line has a cell for each head."""
     frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
     sheets = (
         propagation_sheet(frame, None),

@@ -24,7 +24,7 @@ def keys(path: Path) -> list[str]:
 
 
 def test_blocks_come_back_in_order(file: Path) -> None:
-    """With their kinds, and where their content begins."""
+    """Blocks have their kinds and the offsets of their content."""
     found = read_blocks(file)
     assert [(one.kind, one.key, one.data) for one in found.blocks] == [
         (kind, key, data) for kind, (key, data) in enumerate(CONTENT.items())
@@ -35,7 +35,7 @@ def test_blocks_come_back_in_order(file: Path) -> None:
 
 
 def test_a_block_cut_short_is_no_damage(file: Path) -> None:
-    """However far it had come."""
+    """Any prefix of the last block counts as unfinished, not as damage."""
     whole = file.read_bytes()
     for length in range(len(whole) - len(as_block(2, "three", b"")), len(whole)):
         file.write_bytes(whole[:length])
@@ -44,7 +44,7 @@ def test_a_block_cut_short_is_no_damage(file: Path) -> None:
 
 
 def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
-    """Wherever it is: in a head, a key or the content."""
+    """A changed byte in a head, a key or the content costs only its block."""
     whole = file.read_bytes()
     second = len(as_block(0, "one", CONTENT["one"]))
     for place in range(second, second + len(as_block(1, "two", CONTENT["two"]))):
@@ -54,6 +54,6 @@ def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
 
 
 def test_no_file_is_written_to_twice(file: Path) -> None:
-    """Each has one process."""
+    """Each file has only one process."""
     with pytest.raises(FileExistsError):
         BlockWriter(file)

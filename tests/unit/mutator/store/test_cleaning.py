@@ -1,4 +1,4 @@
-"""Cleaning: what a run wrote is deleted, and nothing else."""
+"""Cleaning deletes exactly what a run wrote."""
 
 import os
 import re
@@ -26,7 +26,7 @@ def contents(folder: Path) -> set[Path]:
 
 
 def test_all_that_a_run_wrote_goes(run: Path) -> None:
-    """A run folder goes whole: with what a kill left half-written, and with scratch of any shape."""
+    """A run folder is deleted whole, including half-written files of a kill and scratch of any shape."""
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / ".REPORT.md.4711").touch()
     odd = run / "work" / "1-x" / "out"
@@ -59,7 +59,7 @@ def test_all_that_a_run_wrote_goes(run: Path) -> None:
     ],
 )
 def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
-    """A run folder that holds anything else is left as it was, and the answer names it."""
+    """A run folder that holds anything else stays unchanged, and the error names it."""
     path = run / stranger
     path.parent.mkdir(parents=True, exist_ok=True)
     path.mkdir() if stranger.endswith("/") else path.touch()
@@ -73,7 +73,7 @@ def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
 
 
 def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
-    """A folder of other things with a run.json in it is left as it was; so is one of another schema."""
+    """A folder of other things with a run.json stays unchanged; so does one of another schema."""
     for head, names in (
         ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
         ('{"schema":"run/99"}', []),
@@ -93,7 +93,7 @@ def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
-    """What is no run folder at all is told as such, and nothing is written into it."""
+    """A folder that is no run folder is reported as such, and nothing is written into it."""
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(MutatorError, match="not a run folder"):
         clean(tmp_path)
@@ -101,7 +101,7 @@ def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
 
 
 def test_the_reference_lists_what_may_be_in_it() -> None:
-    """The page about run folders and the names that cleaning knows are the same, folder by folder."""
+    """The page about run folders lists the same names as cleaning, folder by folder."""
     [listed] = re.findall(r"^DIR/\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     names = {name for line in listed.splitlines() for name in re.split(r" {2,}", line.strip())[0].split(", ")}
     inside = {name.partition("/")[0] for name in names if not name.startswith(".")}
@@ -109,7 +109,7 @@ def test_the_reference_lists_what_may_be_in_it() -> None:
 
 
 def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
-    """Neither a link to a run folder nor one in it is followed: what it leads to stays."""
+    """Links to a run folder and in one are not followed: their targets stay."""
     link = tmp_path / "latest"
     link.symlink_to(run)
     with pytest.raises(MutatorError, match=r"a link to .*; name the link.s target"):
@@ -130,7 +130,7 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
 
 
 def test_what_was_written_while_it_was_deleted_goes_too(run: Path) -> None:
-    """A report that another command was writing makes no folder of what has been deleted."""
+    """A report that another command was writing does not recreate the deleted folder."""
     assert not finish_deletion(run)
     clean(run)
     assert finish_deletion(run)

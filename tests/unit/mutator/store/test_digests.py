@@ -1,4 +1,4 @@
-"""The ledger of digests: what it accepts, and that no kill leaves a folder that does not open."""
+"""The ledger of digests: what it accepts, and that the folder opens after any kill."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from mutator.store.lines import LineWriter
 
 
 class Killed(BaseException):
-    """The process is gone."""
+    """Stands for the end of the process."""
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def segment(run: Path, name: str, *values: int) -> Path:
 
 
 def test_the_ledger_comes_back(run: Path) -> None:
-    """Files, announcements and whether the run is finished are read as they were written."""
+    """Files, announcements and the finished flag are read as written."""
     one = Digest(size=3, sha256="ab" * 32, lines=2)
     ledger = Ledger(files={"records/x.jsonl": one}, rewriting={"a": one, "b": None}, finished=True)
     digests.write(run, ledger)
@@ -51,7 +51,7 @@ def test_the_ledger_comes_back(run: Path) -> None:
 
 
 def test_every_change_of_the_ledger_is_found(run: Path) -> None:
-    """Whatever byte of it is another one, it is refused in words: its own checksum, or it is no JSON."""
+    """Any changed byte is refused with a clear error: its own checksum fails, or it is not JSON."""
     path = run / digests.FILE
     data = path.read_bytes()
     for place in range(len(data)):
@@ -62,7 +62,7 @@ def test_every_change_of_the_ledger_is_found(run: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
-    """A file cut short, of another kind, or of a newer schema is the user's to mend."""
+    """A truncated file, one of another kind, or one of a newer schema is a user's error."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         digests.read(run)
@@ -72,7 +72,7 @@ def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
 
 
 def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
-    """A checksum that fits is no ledger yet."""
+    """A valid checksum alone does not make a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
     with pytest.raises(MutatorError, match="no ledger"):
@@ -80,8 +80,9 @@ def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
 
 
 def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> int:
-    """Do `work` again and again, killed before its first, second, ... write, until it comes to its end; the
-    folder must be accepted after each. How often it was killed."""
+    """Repeat `work`, killed before its first, second, ... write, until it completes, checking after each that
+    the folder is accepted. Return the number of kills.
+    """
     for survived in range(100):
         left = survived
 
@@ -111,7 +112,7 @@ def test_a_kill_while_a_file_is_rewritten(run: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file that a kill caught is one of two, not any."""
+    """After a kill a file may be one of two versions, and no other."""
     with monkeypatch.context() as patch, pytest.raises(Killed):
         patch.setattr(digests, "write_atomic", lambda path, data: (_ for _ in ()).throw(Killed))
         digests.rewrite(run, "a", b"new a")
@@ -121,7 +122,7 @@ def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.M
 
 
 def test_files_may_go(run: Path) -> None:
-    """What is announced to go is known no more; until then it may be there or not."""
+    """A file announced for deletion may exist or not; afterwards it is unknown."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()
@@ -130,7 +131,7 @@ def test_files_may_go(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """With the bytes that count: what a kill left of a last line goes, and what is added later is found."""
+    """The entry covers the valid bytes: a torn last line is cut, and later additions are found."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
@@ -144,7 +145,7 @@ def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
 
 
 def test_a_damaged_segment_is_not_entered(run: Path) -> None:
-    """Nothing vouches for a line that is not as it was written."""
+    """A line that differs from what was written is not vouched for."""
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
@@ -152,7 +153,7 @@ def test_a_damaged_segment_is_not_entered(run: Path) -> None:
 
 
 def test_closing_twice_writes_once(run: Path) -> None:
-    """A ledger that says all that there is to say stays as it is."""
+    """A complete ledger is not written again."""
     segment(run, "records/0001-gw0.jsonl", 1)
     digests.close_segments(run, finished=True)
     before = (run / digests.FILE).stat().st_mtime_ns

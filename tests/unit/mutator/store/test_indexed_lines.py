@@ -1,4 +1,4 @@
-"""Lines of files by the experiment that they are of: read when asked for, verified at once."""
+"""Lines of files by experiment: read on request, verified at once."""
 
 from pathlib import Path
 from typing import Any
@@ -26,8 +26,9 @@ def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
 
 
 def test_the_newest_line_counts_in_the_place_of_the_first(tmp_path: Path) -> None:
-    """Experiments come in the order of their first lines, each with its last one, whatever else names one;
-    many files are read with few of them open."""
+    """Experiments keep the order of their first lines, each with its last one; many files are read with few
+    open at a time.
+    """
     told = {"note": '"experiment_id":"zz"', "within": ['{"experiment_id":"yy"}']}
     many = {f"f{i:02}": [{"experiment_id": f"e{i}", "n": i}] for i in range(30)}
     found = things(tmp_path, a=[{"experiment_id": "aa", "n": 0, **told}], b=[{"experiment_id": "bb"}], **many)
@@ -39,7 +40,7 @@ def test_the_newest_line_counts_in_the_place_of_the_first(tmp_path: Path) -> Non
 
 
 def test_damage_is_told_before_anything_is_read(tmp_path: Path) -> None:
-    """A changed line is an error with its number at once; what a kill cut off at the end is none."""
+    """A changed line is an error with its number at once; a line cut off at the end by a kill is not."""
     things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
     path = tmp_path / "a.jsonl"
     data = path.read_bytes()
@@ -51,8 +52,9 @@ def test_damage_is_told_before_anything_is_read(tmp_path: Path) -> None:
 
 
 def test_a_line_that_is_nothing_of_the_kind(tmp_path: Path) -> None:
-    """A line without an experiment is an error at once, one that cannot be made into what it should be is
-    one when it is asked for, both with file and line."""
+    """A line without an experiment is an error at once, one with invalid content when it is read, both with
+    file and line.
+    """
     path = tmp_path / "a.jsonl"
     lines = LineWriter(path, {"schema": SCHEMA})
     lines.append({"experiment_id": "aa"})

@@ -1,4 +1,4 @@
-"""Opening a run folder: whatever is not as it was written is told with its file, and nothing else is."""
+"""Opening a run folder reports exactly the files that differ from what was written."""
 
 import json
 import random
@@ -26,7 +26,7 @@ Make = Callable[..., object]
 def made(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_finished: Write
 ) -> Path:
-    """A finished run, all made up."""
+    """A finished, made-up run."""
     place = tmp_path_factory.mktemp("made")
     return write_finished(copy_toycar(place), place / "run")
 
@@ -57,7 +57,7 @@ SEALED = (
 @pytest.mark.parametrize("name", [name for name in SEALED if name != "run.json"])
 @pytest.mark.parametrize("what", ["folder", "loop"])
 def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
-    """A folder in the place of a file is told with its name, and so is a link to itself."""
+    """A folder in the place of a file is reported by name, and so is a link to itself."""
     (run / name).unlink()
     if what == "folder":
         (run / name).mkdir()
@@ -67,7 +67,7 @@ def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
 
 
 def test_what_is_sealed_is_all_of_it(run: Path) -> None:
-    """The folder opens, and has no file that the tests below leave out."""
+    """The folder opens, and the tests below cover all its files."""
     folder = RunFolder.open(run)
     assert folder.verifiable and folder.finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
@@ -77,7 +77,7 @@ def test_what_is_sealed_is_all_of_it(run: Path) -> None:
 
 @pytest.mark.parametrize("name", SEALED)
 def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
-    """Flipped bits, lost and added ends, zeroed bytes, an empty and a missing file."""
+    """Flipped bits, lost and added ends, zeroed bytes, an empty and a missing file are reported by file."""
     path = run / name
     data, draw = path.read_bytes(), random.Random(name)
     damaged = [data + b"\n", data + data, b"", data[: draw.randrange(len(data))]]
@@ -94,7 +94,7 @@ def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
 def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
-    """One digit in the middle of a long file is found by whoever is to look at it."""
+    """One digit in the middle of a long file is reported with its line number."""
     path = run / name
     lines = path.read_bytes().splitlines(keepends=True)
     lines[2] = lines[2].replace(b"0", b"1", 1)
@@ -103,7 +103,7 @@ def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
 
 
 def test_lost_lines_are_counted(run: Path) -> None:
-    """A segment that ends too early, at a line's end, says how many lines it has and had."""
+    """If a segment ends too early, at a line's end, the error gives both line counts."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-2]))
@@ -114,7 +114,7 @@ def test_lost_lines_are_counted(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["records/0002-a.jsonl", "proof/x.jsonl", "golden/A/more", "plan/old"])
 def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
-    """Nothing joins a run that is finished."""
+    """A finished run accepts no new files."""
     (run / name).write_bytes(b"")
     assert str(problem(run)).startswith(f"{run / name}: not named in digests.json")
 
@@ -123,14 +123,14 @@ def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
     "name", ["timings/x.jsonl", "traces/a", "plots/a.svg", "report/index.html", "notes.txt"]
 )
 def test_what_is_outside_the_seal_is_left_alone(run: Path, name: str) -> None:
-    """Costs, pictures, reports and what people put beside them do not make a folder wrong."""
+    """Timings, images, reports and the user's own files next to them are not checked."""
     (run / name).parent.mkdir(exist_ok=True)
     (run / name).write_text("anything")
     assert RunFolder.open(run).finished
 
 
 def test_swapped_files_are_told(run: Path) -> None:
-    """Two files that took each other's place are no longer what they were."""
+    """Two swapped files are both reported."""
     a, b = run / "golden" / "A" / "log.npz", run / "golden" / "A" / "said.json"
     content = a.read_bytes()
     a.write_bytes(b.read_bytes())
@@ -139,7 +139,7 @@ def test_swapped_files_are_told(run: Path) -> None:
 
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
-    """The run as a killed session left it: `lines` are in a segment that nobody has closed."""
+    """The run as a killed session left it: `lines` are in an unclosed segment."""
     digests.close_segments(run, finished=False)
     head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
@@ -150,7 +150,7 @@ def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> P
 
 
 def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
-    """Its whole lines count, a torn last one does not, and a damaged one is told."""
+    """The segment's whole lines count, a torn last one does not, and a damaged one is reported."""
     again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
     path = unsealed(run, again, again)
     path.write_bytes(path.read_bytes() + b'{"sum"')
@@ -160,19 +160,19 @@ def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
 
 
 def test_records_of_another_plan_are_told(run: Path) -> None:
-    """A segment of another run folder is no part of this one, whatever its name."""
+    """A segment of another run folder is refused, whatever its name."""
     path = unsealed(run, plan="0" * 64)
     assert str(problem(run)).startswith(f"{path}:1: records of plan 0000000000000000")
 
 
 def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
-    """There are not 25 of 24 experiments done."""
+    """A record of an unplanned experiment is refused: 25 of 24 cannot be finished."""
     path = unsealed(run, {"experiment_id": "0" * 16, "status": "ok"})
     assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
 
 
 def test_a_second_record_is_told(run: Path) -> None:
-    """An experiment has one final record; a harness error beside it does not count."""
+    """An experiment has one final record; harness errors do not count."""
     lines = (run / "records" / "0001-a.jsonl").read_text().splitlines()
     one = {k: v for k, v in json.loads(lines[1]).items() if k != "sum"}
     path = unsealed(run, one | {"status": Status.HARNESS_ERROR.value}, one)
@@ -180,7 +180,7 @@ def test_a_second_record_is_told(run: Path) -> None:
 
 
 def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path], None]) -> None:
-    """Who drops a record, and computes all digests anew, is still told which is missing."""
+    """A dropped record is reported, even with all digests recomputed."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], *lines[5:]]))
@@ -189,7 +189,7 @@ def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path],
 
 
 def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable[[Path], None]) -> None:
-    """So is one with more or fewer experiments than its chunks."""
+    """A plan with a duplicate, or with more or fewer experiments than its chunks, is refused."""
     path = run / plan_file.EXPERIMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
@@ -201,7 +201,7 @@ def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable
 
 
 def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
-    """Who calls it one of before there were digests is told, with the ledger or without."""
+    """A folder disguised as one from before digests is refused, with or without the ledger."""
     head = run / "run.json"
     head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
     assert "run/1 in a folder with digests.json" in str(problem(run))
@@ -213,7 +213,7 @@ def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
 
 
 def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who opens a folder while its owner rewrites a file sees the old or the new one, never damage."""
+    """Opening a folder while its owner rewrites a file finds the old or the new one, never damage."""
     real, seen = integrity.problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:
@@ -230,7 +230,7 @@ def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: 
 
 @pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
 def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> None:
-    """Nothing verifies the run.json of an older version; what cannot be is told all the same."""
+    """The run.json of an older version has no digest; invalid values are still reported by key."""
     data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
     (run / digests.FILE).unlink()
     for value in (3, [3], [[3]], {"a": [None]}):
@@ -244,8 +244,9 @@ def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> 
 
 @pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
 def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
-    """An audit tells what a folder was driven with before anything is verified: of each stretch every key is
-    there and holds what it should."""
+    """Each stretch must have every key with a valid value, because an audit prints them before verifying
+    anything.
+    """
     data = json.loads((run / "run.json").read_text())
     [stretch] = data["stretches"]
     for value in (3, [3], {"a": [None]}, [{"library": "openblas"}], {"mutator": {"commit": "abc"}}):
@@ -253,7 +254,7 @@ def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
         (run / "run.json").write_text(json.dumps(data))
         with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
             RunFolder.unverified(run)
-    if key == "machines":  # nothing is said where there were no others
+    if key == "machines":  # nothing is printed if there were no others
         return
     data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
     (run / "run.json").write_text(json.dumps(data))

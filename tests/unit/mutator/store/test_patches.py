@@ -1,4 +1,4 @@
-"""Packed patches: which file a lost one is looked for in."""
+"""Packed patches: the file where a lost one is searched."""
 
 from pathlib import Path
 
@@ -18,12 +18,12 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
-    """A patch that is there has a file, whatever its record says of the worker."""
+    """An existing patch has a file, whatever worker its record names."""
     assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 
 def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
-    """A flipped byte loses a patch, and the file that it is in is named."""
+    """A flipped byte loses a patch, and its file is named."""
     path = run / "patches" / "0001-gw1.blocks"
     data = bytearray(path.read_bytes())
     data[-1] ^= 1
@@ -34,7 +34,7 @@ def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
 
 
 def test_a_lost_file_is_that_of_the_worker(run: Path) -> None:
-    """Where a whole file is gone, the record says which it was; without a record there is the folder."""
+    """If a whole file is missing, the record gives its name; without a record the folder is named."""
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
     assert Patches(run).file("b" * 16, "0001-gw1") == path

@@ -1,4 +1,4 @@
-"""The frozen plan on disk, and plans that other versions wrote."""
+"""The frozen plan on disk, and plans of other versions."""
 
 import json
 import os
@@ -22,7 +22,7 @@ def lines(run: Path, name: str) -> list[dict[str, object]]:
 
 
 def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
-    """A plan comes back equal, with its ids, whole or chunk by chunk."""
+    """A plan is read back equal, with its ids, whole or chunk by chunk."""
     plan = tuple(experiment(value, changes=("no_lead",)) for value in (1.0, 2.5, 3.0))
     chunks = plan_file.write(tmp_path, plan, (2, 1))
     faults = plan_file.read_faults(tmp_path)
@@ -32,8 +32,9 @@ def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
 
 
 def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> None:
-    """The quick way gives the experiment that the long way gives, and leaves to that one all that is not as
-    it was written, or not what its id stands for."""
+    """The fast path returns the same experiment as the slow one, and leaves to it any line with another
+    format or a wrong id.
+    """
     for planned in (
         experiment(),
         experiment(2.5, changes=("no_lead",)),
@@ -57,7 +58,7 @@ def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> Non
 
 
 def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
-    """A line without a field that has a default since is read as if it held that default."""
+    """A missing field that now has a default is read as that default."""
     planned = experiment()
     planned = replace(planned, trigger=replace(planned.trigger, armed_after_s=0.0))
     line = plan_file.to_plain(planned)
@@ -67,7 +68,7 @@ def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
 
 
 def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
-    """Who opened the pipe would wait for a writer for ever."""
+    """Opening a pipe would wait for a writer for ever, so it is refused."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
@@ -76,7 +77,7 @@ def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
 def test_a_plan_of_a_newer_version_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
-    """A field that this version does not know could mean another experiment: it is an error that names it."""
+    """An unknown field could change the experiment, so it is an error that names it."""
     plan_file.write(tmp_path, [experiment()], [1])
     [fault], [line] = lines(tmp_path, "faults.jsonl"), lines(tmp_path, "experiments.jsonl")
     injection = fault["injections"][0]  # type: ignore[index]

@@ -1,4 +1,4 @@
-"""How fast a stage goes, and how long it will still take."""
+"""The speed of a stage and its remaining time."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from mutator.store.progress import Pace
 
 
 def test_a_stage_is_timed_from_its_own_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps that were done before the stage count as done, but not towards its rate."""
+    """Steps finished before the stage count as progress, but not towards its rate."""
     now = 100.0
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     pace = Pace("proof", 23, done=3)

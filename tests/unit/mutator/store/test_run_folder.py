@@ -1,4 +1,4 @@
-"""The run folder: opened, owned by one."""
+"""Opening and owning the run folder."""
 
 import json
 import os
@@ -46,7 +46,9 @@ def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
 
 
 def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
-    """Version of mutator; digests of target, templates, scenarios; seed and reading; what was driven yet."""
+    """Provenance has the version of mutator; digests of target, templates and scenarios; seed and reading;
+    and the stretches of work.
+    """
     found = folder.provenance
     assert found["mutator"]
     assert found["stretches"] == []
@@ -56,7 +58,7 @@ def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Worksp
 
 
 def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
-    """A run folder of a newer mutator is not touched."""
+    """A run folder of a newer mutator is left unchanged."""
     path = folder.path / "run.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": "run/4"}))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/4' was written by a newer mutator"):
@@ -64,13 +66,13 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 
 
 def test_no_run_folder(tmp_path: Path) -> None:
-    """A folder without run.json is told as such."""
+    """A folder without run.json is reported as no run folder."""
     with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 
 
 def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -> None:
-    """A beginning that fits just one id finds it; one that fits none or several is told."""
+    """A unique beginning finds its id; one without a match, or with several, is an error."""
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         folder.find("zz")
     with pytest.raises(MutatorError, match="24 experiments start with ''"):
@@ -78,7 +80,7 @@ def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -
 
 
 def test_one_owner(folder: RunFolder) -> None:
-    """While a command owns the folder another is refused, told who it is; a dead one's lock is gone."""
+    """While a command owns the folder another is refused with its name; a dead owner's lock is released."""
     process = holder(folder, "owner")
     try:
         for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
@@ -92,7 +94,7 @@ def test_one_owner(folder: RunFolder) -> None:
 
 
 def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
-    """A new command waits for workers that still finish, and is told who they are if they do not."""
+    """A new command waits for workers that still finish, and names them if they do not."""
     process = holder(folder, "worker", "1")
     assert locks.living_workers(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):
@@ -104,7 +106,7 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
 
 @pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
 def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
-    """A folder or a pipe in the place of a lock is named, and so is a link, whose end is not written to."""
+    """A folder, pipe or link in the place of a lock is named, and the link's target is not written to."""
     place = folder.path / name
     place.unlink(missing_ok=True)
     place.parent.mkdir(exist_ok=True)
@@ -124,7 +126,7 @@ def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
 
 
 def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
-    """A run folder whose plan is gone is answered in words."""
+    """A run folder without its plan gets a clear error."""
     (folder.path / "plan" / "experiments.jsonl").unlink()
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read .*damaged"):
         folder.find("00")
@@ -132,6 +134,6 @@ def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
 
 @pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])
 def test_a_place_that_cannot_be_written(toycar: Workspace, place: str) -> None:
-    """A folder that cannot be made is answered in words."""
+    """A folder that cannot be created gets a clear error."""
     with pytest.raises(MutatorError, match="cannot be written"):
         freeze(make_plan(toycar, "toy"), Path(place), toycar)

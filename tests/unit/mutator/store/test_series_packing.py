@@ -1,4 +1,4 @@
-"""Packing of series: the same files whatever came in which order, and no more than the budget."""
+"""Packed series give the same files for any order of arrival, within the budget."""
 
 import random
 from pathlib import Path
@@ -52,7 +52,7 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
-    """Best first, golden runs that are the same once; what workers appended is gone."""
+    """The best series come first, equal golden runs are stored once, and the workers' files are gone."""
     folder = SeriesFolder(packed)
     index = folder.index
     assert index is not None
@@ -72,7 +72,9 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
 def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
     tmp_path: Path, packed: Path, seed: int
 ) -> None:
-    """Packed once or several times, by one or two workers, with one that ran twice: the same bytes."""
+    """Packed once or several times, by one or two workers, with one experiment run twice, the bytes are the
+    same.
+    """
     draw = random.Random(seed)
     order = draw.sample(IDS, len(IDS))
     cuts = sorted(draw.sample(range(1, len(IDS)), 2))
@@ -84,7 +86,7 @@ def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
 
 
 def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) -> None:
-    """What does not fit is left out and counted; packed in two sessions, the same is kept."""
+    """Series above the budget are left out and counted; packing in two sessions keeps the same ones."""
     runs = [tmp_path / "once", tmp_path / "twice"]
     append(runs[0], "0001-main", IDS)
     pack(runs[0], "p", WORTH, 1)
@@ -100,7 +102,7 @@ def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) ->
 
 
 def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) -> None:
-    """Some packed, some not."""
+    """The shards' series may be packed or not."""
     shards = [tmp_path / name for name in "ab"]
     for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
         append(shard, "0001-main", part)
@@ -111,7 +113,7 @@ def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) ->
 
 
 def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
-    """Packed again, an experiment keeps its series, whichever of these golden runs it has."""
+    """After repacking, an experiment keeps its series, whichever of the equal golden runs it has."""
     append(tmp_path, "0001-main", IDS[:2])
     for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
         pack(tmp_path, "p", WORTH, 500)
@@ -124,7 +126,7 @@ def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
 
 
 def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
-    """A kill in the middle of a block."""
+    """A kill in the middle of a block loses only that block."""
     append(tmp_path, "0001-main", IDS[:3])
     [segment] = segments(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])
@@ -135,8 +137,9 @@ def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
 
 
 def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
-    """Its experiments are read again once they were driven again, each from a file of its own; the index
-    likewise."""
+    """Experiments of a damaged chunk can be read again once they were rerun, each from a separate file; so
+    can the index.
+    """
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

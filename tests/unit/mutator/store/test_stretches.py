@@ -1,4 +1,4 @@
-"""Stretches of work: read, compared, told."""
+"""Stretches of work: reading, comparing, printing."""
 
 from dataclasses import asdict
 from typing import Any
@@ -19,12 +19,12 @@ BEFORE = Stretch(
 
 
 def test_they_come_back_as_they_were_written() -> None:
-    """What run.json has of a stretch is all of it."""
+    """run.json keeps everything about a stretch."""
     assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
 
 
 def test_an_old_head_has_what_it_was_planned_with() -> None:
-    """A folder of before has one stretch, with all that it says."""
+    """A folder of an older version has one stretch, with the data that it recorded."""
     planned = {"python": "3.11.2", "machine": "Linux x86_64", "packages": {"numpy": "2.0"}}
     (found,) = read_stretches({"provenance": planned})
     assert (found.python, found.platform, found.packages) == ("3.11.2", "Linux x86_64", {"numpy": "2.0"})
@@ -33,13 +33,13 @@ def test_an_old_head_has_what_it_was_planned_with() -> None:
 
 @pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
 def test_a_damaged_stretch_is_told(stretch: Any) -> None:
-    """Too few keys, too many, or no object at all: an error in words."""
+    """Missing or unknown keys, or a value that is no object, get a clear error."""
     with pytest.raises(MutatorError, match=r"run\.json: no stretch of work"):
         read_stretches({"stretches": [stretch]})
 
 
 def test_every_difference_is_named() -> None:
-    """Another Python, another version, one that is gone, and one that is new."""
+    """Another Python, another version, a missing package and a new one are all named."""
     packages = {"numpy": "2.1.0", "old": None, "new": "3.0"}
     assert differences(BEFORE, "CPython 3.12.1", packages) == (
         "CPython 3.11.7, here CPython 3.12.1",
@@ -51,7 +51,7 @@ def test_every_difference_is_named() -> None:
 
 
 def test_several_stretches_are_told_together() -> None:
-    """Each value once, oldest first; what was accepted is said."""
+    """Each value is listed once, oldest first; accepted differences are marked."""
     after = Stretch(
         python="CPython 3.12.1",
         packages={"numpy": "2.1.0"},

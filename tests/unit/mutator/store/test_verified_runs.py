@@ -1,4 +1,4 @@
-"""Finished runs that were verified on this machine are verified by their bytes."""
+"""Finished runs verified on this machine before are verified by comparing their bytes."""
 
 import json
 from collections.abc import Callable
@@ -38,7 +38,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, Path], tmp_path: Path) -> None:
-    """Each record is the one that the seed alone has, and the run can be proved."""
+    """Each record equals that of a run with the seed alone, and the run can be proved."""
     workspace, run = made
     several = RunFolder.open(run)
     path = workspace.campaign("small")
@@ -55,7 +55,7 @@ def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, P
 def test_a_known_run_is_not_looked_into_again(
     made: tuple[Workspace, Path], cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The second time its bytes are compared, and the summary is the same; an audit looks at all of it."""
+    """The second time only its bytes are compared, with the same summary; an audit checks everything."""
     workspace, run = made
     first = run_campaign(workspace, "small", run)
     assert ended_before(RunFolder.open(run)) is not None
@@ -72,8 +72,9 @@ def test_a_known_run_is_not_looked_into_again(
 
 
 def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A patch that is another one than was run is found, though the folder was verified before; so is any
-    change where all digests were computed anew, as this is another run then."""
+    """A changed patch is found, though the folder was verified before; so is any change with recomputed
+    digests, since that is another run.
+    """
     run = made[1]
     RunFolder.open(run)
     patches = Patches(run)
@@ -90,7 +91,7 @@ def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path)
 
 
 def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache: Path) -> None:
-    """What somebody wrote into the cache by hand is ignored."""
+    """A hand-made cache entry is ignored."""
     run = made[1]
     RunFolder.open(run)
     key = integrity.content_key(run)
@@ -103,7 +104,7 @@ def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache
 
 
 def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Path) -> None:
-    """Nothing of it is known beforehand."""
+    """An unfinished run has no entry."""
     run = made[1]
     ledger = digests.read(run)
     try:
@@ -116,8 +117,7 @@ def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Pa
 def test_room_is_made_for_the_pictures_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run of several seeds asks for it when golden runs were driven, and when a worker goes on to another
-    seed."""
+    """A run of several seeds frees space after the golden runs, and when a worker moves to another seed."""
     asked = []
     monkeypatch.setattr(caches, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")

@@ -22,7 +22,7 @@ def prove(*conditions: str):
     ],
 )
 def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
-    """Tables that cover everything once pass, whatever the form of their comparisons."""
+    """A table that covers everything once passes, whatever the form of its comparisons."""
     found = prove(*conditions)
     assert (found.beyond, found.place) == (None, None)
     assert found.cells > 0
@@ -42,27 +42,27 @@ def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
     ],
 )
 def test_a_wrong_table_is_told_where(conditions: tuple[str, ...], place: str, rows: tuple[str, ...]) -> None:
-    """The first cell that no context or more than one holds in is named, borders included."""
+    """The first cell with no context, or several, is named, including borders."""
     found = prove(*conditions)
     assert (found.place, found.rows) == (place, rows)
 
 
 def test_neighbouring_numbers_leave_no_cell_between() -> None:
-    """Between two floats that are next to each other nothing is looked for."""
+    """No cell is searched between two adjacent floats."""
     found = prove("rs <= 1.0", "rs >= 1.0000000000000002")
     assert found.place is None and found.cells == 4
 
 
 @pytest.mark.parametrize("condition", ["rs < v_ego", "rs + 1 > 0", "abs(rs) < 1", "1 < 2"])
 def test_beyond_a_proof(condition: str) -> None:
-    """A comparison of another kind is said to be beyond it; nothing is claimed then."""
+    """A comparison of another kind is reported as not provable."""
     found = prove(condition, f"not {condition}")
     assert found.beyond is not None and "not a comparison of one variable with a constant" in found.beyond
     assert found.place is None
 
 
 def test_too_many_cells_are_beyond_it_too() -> None:
-    """The time a proof may take is bounded."""
+    """A table with too many cells is not provable either, so the time is bounded."""
     names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
     found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
     assert found.beyond is not None and "531441 cells" in found.beyond

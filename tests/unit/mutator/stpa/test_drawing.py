@@ -1,4 +1,4 @@
-"""The picture of the control structure."""
+"""The diagram of the control structure."""
 
 from itertools import combinations, pairwise
 from pathlib import Path
@@ -31,7 +31,7 @@ def meets(box: Box, start: Point, end: Point) -> bool:
 
 
 def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
-    """No box is on another one, none reaches beyond the picture."""
+    """No box overlaps another or leaves the diagram."""
     for one, other in combinations(layout.boxes.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
     for box in layout.boxes.values():
@@ -50,7 +50,7 @@ def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: 
 
 
 def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
-    """Parts of two arrows that run side by side keep their distance."""
+    """Parallel parts of two arrows keep their distance."""
     for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
         for a, b in pairwise(first.points):
             for c, d in pairwise(second.points):
@@ -63,7 +63,7 @@ def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
 
 
 def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, layout: Layout) -> None:
-    """Two lines of text at each arrow meet no box, no other arrow and no other label."""
+    """Two lines of text at each arrow overlap no box, other arrow or other label."""
     areas = {}
     for name, link in analysis.structure.links.items():
         arrow, width = layout.arrows[name], 7.0 * len(link.label)
@@ -81,7 +81,7 @@ def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, lay
 
 
 def test_places_of_faults_stand_out(analysis: Analysis) -> None:
-    """The picture is well-formed, always the same, and only places with faults have the colour of faults."""
+    """The diagram is well-formed and reproducible, and only places with faults have the fault colour."""
     text = draw(analysis)
     assert text == draw(analysis)
     root = ElementTree.fromstring(text)
@@ -93,11 +93,14 @@ def test_places_of_faults_stand_out(analysis: Analysis) -> None:
 
 
 def test_the_picture_in_the_docs_is_this_one(analysis: Analysis) -> None:
-    """After a change of the analysis: `mutator stpa --svg docs/explanation/hazard-analysis.svg`."""
+    """The docs have the current diagram.
+
+    After a change: `mutator stpa --svg docs/explanation/hazard-analysis.svg`.
+    """
     assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
 
 
 def test_names_in_short() -> None:
-    """Of names that begin alike the first is whole."""
+    """Of names with a common beginning the first is written whole."""
     assert short(["CF9"]) == "CF9"
     assert short(["CF9", "CF10"]) == "CF9, 10"

@@ -1,4 +1,4 @@
-"""Variables that a manifest sets in its target's processes."""
+"""Environment variables that a manifest sets for its target's processes."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ USE = "import os\nassert (os.environ['ROAD'], os.environ['PYTHONHASHSEED']) == (
 
 
 def with_env(workspace: Workspace, env: str) -> Path:
-    """The toy's manifest with `env`, in its third line."""
+    """The toy's manifest with `env` in its third line."""
     path = workspace.library.parent / MANIFEST
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nenv: {env}\n{rest}")
@@ -26,7 +26,7 @@ def with_env(workspace: Workspace, env: str) -> Path:
 
 
 def test_both_engines_set_them(fork: Fork) -> None:
-    """Reference run and fork server have the variable, beside those of the harness."""
+    """Reference runs and the fork server have the variable in addition to the harness's."""
     with_env(fork.toy, "{ROAD: wet, OMP_NUM_THREADS: '1'}")
     (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
     job = fork.job(at_time(2.0))
@@ -37,7 +37,7 @@ def test_both_engines_set_them(fork: Fork) -> None:
 
 
 def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
-    """So has the command that shows a film."""
+    """The command that shows a film has it, too."""
     with_env(toycar, "{ROAD: wet}")
     show = toycar.library.parent / "tree" / "toycar" / "show.py"
     show.write_text("import os, sys; open(sys.argv[4], 'w').write(os.environ['ROAD'])")
@@ -63,7 +63,7 @@ def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_set(toycar: Workspace, env: str, said: str) -> None:
-    """Names are checked, values are texts, and what the harness sets is refused unless it is the same."""
+    """Names are checked, values are texts, and the harness's own variables are refused unless equal."""
     path = with_env(toycar, env)
     with pytest.raises(MutatorError) as caught:
         toycar.manifest("toycar")

@@ -1,4 +1,4 @@
-"""Target manifests: a foreign tree is known by data alone."""
+"""Target manifests describe a foreign tree by data alone."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}
 
 
 def test_a_manifest_is_read(toy: Workspace) -> None:
-    """Root, package, entry, channels and the place of observation come from the file."""
+    """Root, package, entry, channels and the place of observation are read from the file."""
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
     assert manifest.step_s == 0.1
@@ -28,7 +28,7 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
 
 
 def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Workspace) -> None:
-    """A channel without a tolerance has the one of its role; 0 is a tolerance, too."""
+    """A channel without a tolerance gets its role's; 0 is a valid tolerance."""
     path = toy.library / "targets" / "toy.yaml"
     kept = "{unit: m/s, role: actuator, tolerance: 0.5}"
     more = ("pedal: {unit: '-', role: actuator}", "wish: {unit: m}", "gap: {unit: m, tolerance: 0}")
@@ -38,7 +38,7 @@ def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Works
 
 
 def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
-    """What a target does not hold as such is reckoned from names, attributes and items that it holds."""
+    """Values that a target does not store are computed from its names, attributes and items."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
     path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
@@ -48,7 +48,7 @@ def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
 
 
 def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
-    """It observed the same four values for every target; errors name its lines."""
+    """An older manifest observes the same four values for every target; errors name its lines."""
     path = toy.library / "targets" / "toy.yaml"
     before, text = toy.manifest("toy").observation, path.read_text()
     head, _, rest = text.partition("  time: now.time")
@@ -72,7 +72,7 @@ def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
 
 
 def test_arguments(toy: Workspace) -> None:
-    """Placeholders are filled and changes add their arguments; an unknown change is refused."""
+    """Placeholders are filled in and changes add their arguments; an unknown change is refused."""
     manifest = toy.manifest("toy")
     given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
@@ -81,8 +81,9 @@ def test_arguments(toy: Workspace) -> None:
 
 
 def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
-    """Each is filled in once, in arguments of the entry, of changes and of independent runs; other braces
-    stay."""
+    """Each placeholder is filled in once, in arguments of the entry, of changes and of independent runs;
+    other braces stay.
+    """
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
     text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
@@ -94,7 +95,7 @@ def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
 
 
 def test_arguments_may_be_left_out(toy: Workspace) -> None:
-    """An entry without arguments has scenario, seed and output folder as options."""
+    """An entry without arguments gets scenario, seed and output folder as options."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if not line.startswith("  args:")))
@@ -113,7 +114,9 @@ def test_the_harness_names_the_cache(toy: Workspace) -> None:
 
 
 def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
-    """Filming adds arguments with a folder in the run's output; the command's module is checked as any."""
+    """Filming adds arguments with a folder in the run's output; the command's module is checked like any
+    other.
+    """
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
         toy.manifest("toy").filming()
     path = toy.library / "targets" / "toy.yaml"
@@ -144,7 +147,7 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
-    """`shipped:target` is the controller that ships with the harness, wherever the manifest lies."""
+    """`shipped:target` is the controller that ships with the harness, wherever the manifest is."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
     line = next(line for line in text.splitlines() if line.startswith("root:"))
@@ -158,7 +161,7 @@ def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """Bytecode is no part of a tree; an edit shows in a manifest loaded after it, not before."""
+    """A manifest is a snapshot: an edit appears only in one loaded later; bytecode is no part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()
@@ -216,7 +219,7 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """A manifest is as strict as any other file."""
+    """A manifest is read as strictly as any other file."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -236,7 +239,7 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
 def test_packages_and_modules(
     toy: Workspace, packages: str, package: str | None, names: tuple[str, ...]
 ) -> None:
-    """The probe lies in the only package, and in none where there are several or a module in no package."""
+    """The probe is in the only package, or outside any package if there are several or a plain module."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("package: toycar", packages)
     path.write_text(text.replace('"toycar/**/*.py"', '"**/*.py"'))
@@ -252,7 +255,7 @@ def test_packages_and_modules(
 
 
 def test_files_may_be_left_out(toy: Workspace) -> None:
-    """The tree is then all files of the packages, data too, and the modules, and nothing else."""
+    """By default, the tree has exactly all files of the packages, including data, and the modules."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().replace("package: toycar", "packages: [toycar, drive.py]").splitlines()
     path.write_text("\n".join(line for line in lines if not line.startswith("files:")))
@@ -278,7 +281,7 @@ def test_files_may_be_left_out(toy: Workspace) -> None:
     ],
 )
 def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> None:
-    """Names are import names or module files at the root, each once; one of the two keys is given."""
+    """Names must be unique import names or module files at the root; exactly one of the two keys is given."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", packages))
     with pytest.raises(MutatorError) as caught:
@@ -287,7 +290,7 @@ def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> No
 
 
 def test_a_package_that_is_not_there(toy: Workspace) -> None:
-    """A manifest whose files hold nothing of its package is refused when the tree is read."""
+    """A manifest with no file of its package is refused when the tree is read."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", "package: other"))
     with pytest.raises(MutatorError, match="no file of package 'other'"):
@@ -313,8 +316,7 @@ def test_globs(glob: str, hits: set[str]) -> None:
 
 
 def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> None:
-    """A linked file or folder is part of the tree, and a place for a fault like any other; the mutant is a
-    copy of it."""
+    """A linked file or folder is part of the tree and can have faults; the mutant has a copy."""
     outside = tmp_path / "outside"
     outside.mkdir()
     root = toy.manifest("toy").root / "toycar"
@@ -334,7 +336,7 @@ def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> Non
 
 
 def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
-    """It is named with what it should lead to, not taken for a file that is not there."""
+    """A dangling link is named with its target, instead of as a missing file."""
     link = toy.manifest("toy").root / "toycar" / "glue.py"
     link.symlink_to("/nowhere/glue.py")
     with pytest.raises(MutatorError, match=r"toycar/glue.py: a link to /nowhere/glue.py, where nothing is"):
@@ -342,7 +344,7 @@ def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
 
 
 def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:
-    """The same files give the same digest however they were made."""
+    """Equal files give the same digest in any order of creation."""
     for name, order in (("a", ["x.py", "y.py"]), ("b", ["y.py", "x.py"])):
         (tmp_path / name).mkdir()
         for file in order:

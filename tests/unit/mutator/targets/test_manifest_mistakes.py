@@ -1,4 +1,4 @@
-"""Whoever mistypes a manifest is told the file, the line, what is known there, and what to do."""
+"""An error for a mistyped manifest gives the file, the line, the known values, and the remedy."""
 
 import re
 from pathlib import Path
@@ -57,7 +57,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_it_is_well_without_a_mistake(path: Path) -> None:
-    """The manifest that the mistakes are made in is a good one."""
+    """The manifest without the mistakes is valid."""
     path.write_text(WHOLE)
     assert load_manifest(path).hazards == ("HIT", "LATE")
 
@@ -105,7 +105,7 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
     ],
 )
 def test_a_mistake_is_told_with_what_to_do(path: Path, right: str, wrong: str, got: str, known: str) -> None:
-    """More than thirty kinds: each names file and line, the value, what is expected there, and a remedy."""
+    """More than thirty kinds of mistakes are reported with file and line, value, expectation and remedy."""
     assert right in WHOLE
     path.write_text(WHOLE.replace(right, wrong, 1))
     with pytest.raises(MutatorError) as caught:

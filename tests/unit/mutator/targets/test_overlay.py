@@ -1,4 +1,4 @@
-"""Overlays: glue of the library, laid over a foreign tree."""
+"""Overlays: glue of the library on top of a foreign tree."""
 
 import shutil
 from pathlib import Path
@@ -25,7 +25,9 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
-    """All its files are, under their paths in it, with the digest; its modules must come from the tree."""
+    """All its files are in the tree and in the digest, under their paths; its modules must come from the
+    tree.
+    """
     before = pole.manifest("pole")
     assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
     assert before.overlay == (pole.library / "overlays" / "pole").resolve()
@@ -42,7 +44,7 @@ def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
 
 
 def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
-    """A path that is none beside the manifest is looked for in the library."""
+    """A path not found next to the manifest is searched in the library."""
     edit(pole.library / MANIFEST, "../overlays/pole", "overlays/pole")
     assert "drive.py" in pole.manifest("pole").tree.overlaid
     edit(pole.library / MANIFEST, "overlays/pole", "overlays/none")
@@ -51,7 +53,7 @@ def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
 
 
 def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
-    """Entry module and observation lie in the overlay; faults of the foreign modules do what they should."""
+    """Entry module and observation are in the overlay; faults of the foreign modules act."""
     trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
     assert trial.record.outcome is Outcome.HAZARD
     assert trial.record.activation is not None and trial.record.activation.first == 1.0
@@ -60,7 +62,7 @@ def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
 
 
 def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
-    """A place in the overlay is refused at the line of the spec, as glue."""
+    """A place in the overlay is refused at the line of the spec."""
     spec = pole.library / "faults" / "sensor" / "angle.yaml"
     edit(
         spec,
@@ -75,7 +77,7 @@ def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
 
 @pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
 def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
-    """A file of the overlay that the root has, be it part of the tree or not, is refused."""
+    """A file of the overlay that the root also has is refused, whether or not it is part of the tree."""
     (pole.manifest("pole").root / "notes.txt").write_text("mine")
     path = pole.library / "overlays" / "pole" / name
     path.parent.mkdir(exist_ok=True)
@@ -85,14 +87,14 @@ def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
 
 
 def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
-    """An overlay has no module that is called as the probe."""
+    """An overlay module with the probe's name is refused."""
     (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected that name free"):
         build(pole.manifest("pole"), pole.fault_models(), None, always())
 
 
 def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
-    """Glue that is linked into the overlay, as a file, a folder or the overlay itself, drives the same."""
+    """Glue linked into the overlay, as a file, a folder or the overlay itself, works the same."""
     whole = pole.manifest("pole").tree
     overlay, elsewhere = pole.library / "overlays" / "pole", tmp_path / "elsewhere"
     shutil.move(overlay / "glue_parts", elsewhere / "glue_parts")
@@ -107,7 +109,7 @@ def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
 
 
 def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
-    """What is wrong with glue is told at its own path; `doctor` names root and overlay."""
+    """Errors in glue name its own path; `doctor` names root and overlay."""
     overlay = (pole.library / "overlays" / "pole").resolve()
     edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
     with pytest.raises(MutatorError) as caught:

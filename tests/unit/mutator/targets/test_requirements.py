@@ -1,4 +1,4 @@
-"""The packages that a target needs: named where they are missing, noted where they are there."""
+"""The packages that a target needs: reported if missing, recorded if present."""
 
 from importlib import metadata
 from pathlib import Path
@@ -23,7 +23,7 @@ SAID = (
 
 
 def requiring(workspace: Workspace, *requirements: str) -> Workspace:
-    """The toy, whose manifest has these in its third line."""
+    """The toy with these requirements in the third line of its manifest."""
     path = workspace.library / "targets" / "toycar.yaml"
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nrequires: {list(requirements)}\n{rest}")
@@ -37,7 +37,9 @@ def lacking(toycar: Workspace) -> Workspace:
 
 
 def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
-    """A trial and a campaign name each package that is missing or of another version, with the remedy."""
+    """Before anything runs, a trial and a campaign name each missing package or wrong version, with the
+    remedy.
+    """
     with pytest.raises(MutatorError, match=SAID):
         try_fault("sensor/lane", "A", 1.0, workspace=lacking)
     with pytest.raises(MutatorError, match=SAID):
@@ -46,7 +48,7 @@ def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_p
 
 
 def test_check_and_doctor_name_it(lacking: Workspace) -> None:
-    """So do the two commands that look at a library and at the machine."""
+    """Both commands report it as well."""
     problem, *_ = check_library(lacking, "toycar")
     with pytest.raises(MutatorError, match=SAID):
         raise problem
@@ -56,7 +58,7 @@ def test_check_and_doctor_name_it(lacking: Workspace) -> None:
 
 
 def test_what_is_no_requirement(toycar: Workspace) -> None:
-    """A requirement that pip would not take is refused at its line."""
+    """A requirement that pip would reject is refused at its line."""
     requiring(toycar, "numpy >> 2")
     with pytest.raises(
         MutatorError, match=r"toycar.yaml:3: 'numpy >> 2'; expected a requirement as pip takes"
@@ -65,7 +67,7 @@ def test_what_is_no_requirement(toycar: Workspace) -> None:
 
 
 def test_versions_are_noted_with_the_run(toycar: Workspace, tmp_path: Path) -> None:
-    """A stretch of work has the versions of the packages that the target requires, used or not."""
+    """A stretch of work has the versions of the required packages, used or not."""
     requiring(toycar, "HypoThesis>=6")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     begin_stretch(folder, toycar, records="0001-*", accept=False)

@@ -1,4 +1,4 @@
-"""Roots of targets: installed packages are found where pip put them, without being imported."""
+"""Roots of targets: installed packages are found where pip put them, without an import."""
 
 import shutil
 import sys
@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of installed packages; what is in it must not be imported here."""
+    """A folder of installed packages, which must not be imported here."""
     folder = tmp_path / "site"
     (folder / "filters_of_poles").mkdir(parents=True)
     (folder / "filters_of_poles" / "__init__.py").write_text("raise RuntimeError('imported')\n")
@@ -34,7 +34,7 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
 
 
 def test_an_installed_package(pole: Workspace, site: Path) -> None:
-    """Its own files and the overlay are the tree, and no neighbour; nothing is imported."""
+    """The tree has the package's own files and the overlay, without neighbours; nothing is imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
     )
@@ -49,7 +49,7 @@ def test_an_installed_package(pole: Workspace, site: Path) -> None:
 
 
 def test_an_installed_module(pole: Workspace, site: Path) -> None:
-    """A module in no package is found, too."""
+    """A module outside any package is found, too."""
     installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
     manifest = pole.manifest("pole")
     assert manifest.root == site.resolve()
@@ -81,13 +81,13 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
     ],
 )
 def test_what_is_not_installed(pole: Workspace, site: Path, keys: dict[str, str], said: str) -> None:
-    """A package that is missing, or has no source, and a tree that would have its neighbours, are refused."""
+    """A missing package, one without source, and a tree that would include its neighbours are refused."""
     with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
         installed(pole, **keys).manifest("pole")
 
 
 def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
-    """What makes the manifest unreadable is one problem, however many campaigns are for that target."""
+    """An unreadable manifest is one problem, however many campaigns use its target."""
     installed(pole, root="installed:none_of_poles", packages="[none_of_poles]", requires='["poles>=1"]')
     (problem,) = check_library(pole, "pole")
     assert problem.remedy == "pip install 'poles>=1'"
@@ -96,10 +96,10 @@ def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
 def test_an_installed_package_is_driven(
     pole: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The mutant of an installed package runs from its own tree, and the installed one stays as it is."""
+    """The mutant of an installed package runs from its own tree, and the installed one stays unchanged."""
     root, site = pole.manifest("pole").root, tmp_path / "site"
     shutil.move(root / "filters", site / "filters")
-    for name in ("pole.py", "regulator.py"):  # glue may bring what it needs
+    for name in ("pole.py", "regulator.py"):  # glue may bring its own needs
         shutil.move(root / name, pole.library / "overlays" / "pole" / name)
     shutil.rmtree(pole.library / "faults" / "sensor")
     monkeypatch.syspath_prepend(str(site))

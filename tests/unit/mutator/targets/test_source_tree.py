@@ -9,7 +9,7 @@ from mutator.targets.source_tree import read_tree
 
 
 def test_derived_once(tmp_path: Path) -> None:
-    """What is made of a file is made once for each path and maker, from the file as it was read."""
+    """A derived value is computed once for each path and function, from the file as read."""
     (tmp_path / "a.py").write_text("a = 1\n")
     (tmp_path / "b.py").write_text("b = 1\n")
     tree = read_tree(tmp_path, ["*.py"])
@@ -29,7 +29,7 @@ def test_derived_once(tmp_path: Path) -> None:
 
 
 def test_a_file_that_the_target_lacks(tmp_path: Path) -> None:
-    """A path outside the manifest's files is an error that names it, and nothing is made."""
+    """A path outside the manifest's files is an error that names it, and nothing is derived."""
     (tmp_path / "a.txt").write_text("a")
     tree = read_tree(tmp_path, ["*.py"])
     with pytest.raises(MutatorError, match=r"no file 'a\.txt' in the target"):

@@ -32,7 +32,7 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0,
     ],
 )
 def test_one_text_for_one_condition(text: str, canonical: str) -> None:
-    """Spelling and constants are settled, and the canonical text is its own canonical text."""
+    """Spelling and constants are normalized, and the canonical text is a fixed point."""
     assert check_condition(text, {"safe": 3}) == canonical
     assert check_condition(canonical) == canonical
 
@@ -64,14 +64,16 @@ def test_one_text_for_one_condition(text: str, canonical: str) -> None:
     ],
 )
 def test_anything_else_is_refused(text: str, piece: str) -> None:
-    """What is no plain comparison of observed ground truth is an error that shows the culprit."""
+    """Anything except a plain comparison of observed ground truth is an error that shows the
+    offending text.
+    """
     with pytest.raises(MutatorError) as caught:
         check_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
 
 
 def test_what_is_not_known_is_not_a_number() -> None:
-    """A condition over known values is decided; with a value that is missing, no comparison holds."""
+    """A condition over known values is decided; with a missing value, no comparison holds."""
     assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
     assert not evaluate("gap > 1", FOLLOWING) and not evaluate("gap <= 1", FOLLOWING)
 
@@ -89,20 +91,22 @@ def test_what_is_not_known_is_not_a_number() -> None:
     ],
 )
 def test_formulas(text: str, canonical: str, code: str) -> None:
-    """A formula is a number over the variables, has one text, and becomes code that cannot raise."""
+    """A formula is a number over the variables, has one canonical text, and becomes code that
+    cannot raise.
+    """
     assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
     assert to_code(canonical, number=True) == code
 
 
 @pytest.mark.parametrize("text", ["t > 1", "gap", "1 if t else 2", "(1 if t > 0 else 2) + 1", "hypot(t)"])
 def test_what_is_no_formula_is_refused(text: str) -> None:
-    """Truth values, unknown names, and choices inside of sums are none."""
+    """Truth values, unknown names, and choices inside sums are refused."""
     with pytest.raises(MutatorError):
         check_formula(text, FOLLOWING)
 
 
 def test_names_come_in_the_order_of_the_text() -> None:
-    """Functions and words of the language are none."""
+    """Functions and keywords are not listed as names."""
     assert names_in("rs > 0.0 and min(hwt, inf) < abs(rs) or True") == ("rs", "hwt")
 
 

@@ -1,4 +1,4 @@
-"""Kinds of triggers: made by code, and read from what people type."""
+"""Kinds of triggers: built by code, and parsed from user input."""
 
 import math
 
@@ -13,7 +13,7 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
 def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
-    """`always`, a time and a condition are read as what they are; conditions wait until armed."""
+    """`always`, a time and a condition are recognized; conditions wait until armed."""
     assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
     assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
     typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
@@ -22,7 +22,7 @@ def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
 
 @pytest.mark.parametrize("text", ["", "soon", "nan", "hwt", "1 +"])
 def test_anything_else_is_refused(text: str) -> None:
-    """What is no trigger is a mistake of the user's, and never a trigger by chance."""
+    """Any other text is a user's error."""
     with pytest.raises(MutatorError):
         read_trigger(text, 0.0, ("t", "hwt"))
 
@@ -40,7 +40,7 @@ def test_ready_made_triggers() -> None:
 
 
 def test_random_times_are_starts_of_steps() -> None:
-    """A drawn time depends on seed and key alone, lies in its interval, and is the start of a step."""
+    """A drawn time depends only on seed and key, lies in its interval, and is the start of a step."""
     times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)

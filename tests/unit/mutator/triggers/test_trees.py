@@ -21,7 +21,7 @@ DERIVED = {"hwt": "(gap / speed)", "risk": "(1.0 / hwt)"}
     ],
 )
 def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
-    """Operators come first, numbers are floats, and a derived value is replaced by its own formula."""
+    """Operators come first, numbers are floats, and a derived value is replaced by its formula."""
     assert tree(check_formula(text, KNOWN, over_time=True), DERIVED) == made
 
 
@@ -37,5 +37,5 @@ def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
     ],
 )
 def test_a_chain_of_comparisons_is_all_of_them(text: str, made: object) -> None:
-    """`a < b <= c` becomes `a < b and b <= c`; truth values stay what they are."""
+    """`a < b <= c` becomes `a < b and b <= c`; truth values are unchanged."""
     assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made

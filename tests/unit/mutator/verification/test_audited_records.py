@@ -1,4 +1,4 @@
-"""What an audit reads out of records: fields that contradict each other."""
+"""An audit's checks of records: fields that contradict each other."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,8 +37,9 @@ def flaws(record: Record) -> list[str]:
     ],
 )
 def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str) -> None:
-    """Channels are the target's, times within the drive, the first actuator is when it manifested; of runs
-    that recorded no channels none of it is asked."""
+    """Channels belong to the target, times lie within the drive, and the first actuator's time is the
+    manifestation; runs without recorded channels are exempt.
+    """
     head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
     one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
     found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]
@@ -58,7 +59,7 @@ def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str)
     ],
 )
 def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, Any]) -> None:
-    """Whatever a run may come to is no difference."""
+    """No valid result of a run is reported as a difference."""
     assert flaws(record(**FINE | fields)) == []
 
 
@@ -86,6 +87,6 @@ def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, An
 def test_contradictions_are_told_with_their_line(
     record: MakeRecord, fields: dict[str, Any], told: str
 ) -> None:
-    """Each names experiment, file and line, what was found and what would follow."""
+    """Each contradiction names experiment, file and line, the value found and the expected one."""
     found = flaws(record(**FINE | fields))
     assert any(f"r.jsonl:7: {'e' * 16}: {told}" in text for text in found), found

@@ -1,4 +1,4 @@
-"""What driving a target tells: controllers that misbehave, each in its own way, are told so with the line."""
+"""Findings from running a target: each kind of misbehaving controller is reported with the line."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ SCENARIO = ["A"]
 
 @pytest.fixture
 def toy(toycar: Workspace) -> Workspace:
-    """The toy without what is broken on purpose."""
+    """The toy without the deliberately broken parts."""
     for path in [*(toycar.library / "faults" / "hostile").iterdir(), toycar.campaign("hostile")]:
         path.unlink()
     return toycar
@@ -44,7 +44,7 @@ def driven(toy: Workspace) -> dict[str, Finding]:
 
 
 def test_a_sound_target_has_nothing_to_tell(toy: Workspace) -> None:
-    """Everything is looked at and all is well; each campaign's canary once."""
+    """Everything is checked and passes; each campaign's canary runs once."""
     found = driven(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
         ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
@@ -82,7 +82,9 @@ SETS = (
 def test_what_is_not_deterministic_is_told_with_its_line(
     toy: Workspace, edits: list[tuple[str, str]], imports: str, line: str, told: str
 ) -> None:
-    """The runs differ: channel, step, time and both values are told, and the line that is likely to blame."""
+    """If runs differ, channel, step, time and both values are reported, with the line that probably causes
+    it.
+    """
     for old, new in edits:
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
@@ -97,8 +99,9 @@ def test_what_is_not_deterministic_is_told_with_its_line(
 
 @pytest.mark.parametrize("made", ["names()", "held['names']"], ids=["returned", "in a dict"])
 def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made: str) -> None:
-    """What differs by the hash seed alone is told so, with the remedy for hashes and without a line, also
-    where a set of constants has another order in bytecode that was loaded than in fresh one."""
+    """A difference due to the hash seed alone is reported as such, with the remedy for hashes and without a
+    line, even if a set of constants has another order in loaded bytecode than in fresh bytecode.
+    """
     names = "{'x', 'y', 'zed', 'q'}"
     change(toy, "sensing.py", "class Sensor", f"def names():\n    return {names}\n\n\nclass Sensor")
     change(
@@ -118,8 +121,9 @@ def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made:
 def test_a_thread_pool_is_told_with_its_line(
     toy: Workspace, long: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results in order from a pool are deterministic, but its threads prevent forking: name, line, remedy;
-    also where a run takes too long to try it."""
+    """Ordered results from a pool are deterministic, but its threads prevent forking: name, line and remedy
+    are reported, even if a run takes too long to try it.
+    """
     change(
         toy,
         "driver.py",
@@ -149,11 +153,11 @@ def test_a_thread_pool_is_told_with_its_line(
     line = line_of(toy, "self.pool.submit")
     assert str(place).startswith(f"toycar/driver.py:{line} in Driver.drive: starts the thread 'ThreadPool")
     assert "do that work in the step itself" in fast.remedy
-    assert "--drive" not in fast.remedy  # that is what runs
+    assert "--drive" not in fast.remedy  # the timeout under test
 
 
 def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> None:
-    """Reading a clock is no failure where trace and record are the same."""
+    """Reading a clock does not fail the check if trace and record are the same."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(
         toy,
@@ -167,7 +171,7 @@ def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> No
 
 
 def test_lines_are_those_of_the_target(toy: Workspace) -> None:
-    """Lines that the counting adds to a file shift what is noted in it; it is told as the target has it."""
+    """Lines added for counting shift the recorded ones; the report has the target's own numbers."""
     change(toy, "sensing.py", "class Sensor", "import time\n\n\nclass Sensor")
     change(
         toy,
@@ -180,7 +184,9 @@ def test_lines_are_those_of_the_target(toy: Workspace) -> None:
 
 
 def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
-    """An anchor in a branch that no run comes to is told with the line of its spec; the others are not."""
+    """An anchor in a branch that no run executes is reported with the line of its spec; the others
+    are not.
+    """
     change(
         toy,
         "sensing.py",
@@ -202,7 +208,7 @@ def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
 
 
 def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> None:
-    """A statement that runs come to, but not with the change that the fault brings along, is told."""
+    """A statement that runs reach only without the fault's change is reported."""
     change(
         toy,
         "sensing.py",
@@ -220,13 +226,15 @@ def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> No
     ("count", "told"), [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, all are reached")]
 )
 def test_what_was_reached_is_counted(toy: Workspace, count: int, told: str) -> None:
-    """None, one and several are each told in words of their own."""
+    """None, one and several get different wording."""
     finding = Reach(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
     assert (finding.name, finding.found) == ("triggers", told)
 
 
 def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
-    """A context that never comes is told with its line, and a random time after the end of every run."""
+    """A context that never occurs is reported with its line, and so is a random time after the end of every
+    run.
+    """
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
     found = driven(toy)["triggers"]
@@ -240,7 +248,7 @@ def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
 
 
 def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> None:
-    """Each value of the canary is tried, and named."""
+    """Each value of the canary is tried and named."""
     change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
     toy.campaign("toy").unlink()
     found = driven(toy)["canary small"]
@@ -250,14 +258,14 @@ def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> N
 
 
 def test_a_target_that_crashes_or_is_harmful_is_told(toy: Workspace) -> None:
-    """What keeps a golden run from being one is told as the checks before a campaign would."""
+    """Reasons against a golden run are reported as by the checks before a campaign."""
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = driven(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
 
 
 def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
-    """Where golden runs differ, forking is not tried: it would differ, too, for the same reason."""
+    """If golden runs differ, forking is not tried, since it would differ for the same reason."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
     fast = driven(toy)["fast engines"]
@@ -274,6 +282,6 @@ def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
 
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
-    """A scenario that the library does not have is a mistake of the caller's."""
+    """A scenario that the library lacks is the caller's error."""
     with pytest.raises(MutatorError, match="nowhere"):
         check_drive(toy, "toycar", ["nowhere"])

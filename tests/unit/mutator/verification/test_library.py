@@ -1,4 +1,4 @@
-"""The check of library, templates and target; and the library that ships."""
+"""The check of library, templates and target; and the shipped library."""
 
 import ast
 from collections import Counter
@@ -33,7 +33,7 @@ COUNTS = {
 }
 
 
-BEYOND = ("software", "vision_weather")  # modules of faults that are not published ones
+BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 
 @pytest.fixture(scope="module")
@@ -53,17 +53,19 @@ def everything() -> dict[str, tuple[Fault, ...]]:
 
 @pytest.fixture(scope="module")
 def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, ...]]:
-    """Those of the published experiments."""
+    """The faults of the published experiments."""
     return {name: tuple(f for f in found if f.module not in BEYOND) for name, found in everything.items()}
 
 
 def test_the_library_that_ships_has_no_problem(clone: Workspace) -> None:
-    """Every spec expands, every anchor is found once, every shape compiles and un-splices."""
+    """In the shipped library every spec expands, every anchor is found once, every shape compiles and
+    un-splices.
+    """
     assert check_library(clone, "openpilot") == []
 
 
 def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Each fault type has as many values as the experiments it reproduces, in both readings."""
+    """Each fault type has as many values as the experiments that it reproduces, in both readings."""
     assert list(faults) == ["as_described", "as_coded"]
     for found in faults.values():
         assert Counter((f.module, f.fault_type) for f in found) == COUNTS
@@ -100,8 +102,10 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Without lead they aim at H2, at steering, lanes and pictures at H3, else at H1; what
-    stays: lost data as described, bad pictures as coded."""
+    """Faults without lead aim at H2; steering, lane and image faults at H3; the others at H1.
+
+    Lost data latch as described, bad images as coded.
+    """
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
         lateral = seen or fault.fault_type in ("steer", "path_model", "camera_unavailable")
@@ -140,7 +144,7 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Distance errors of radar, camera and both are the same numbers."""
+    """Distance errors of radar, camera and both have the same numbers."""
     values: dict[str, list[object]] = {}
     for fault in faults["as_described"]:
         values.setdefault(fault.spec, []).append(fault.value)
@@ -171,7 +175,7 @@ def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> N
 
 
 def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Each level and each of two effects in one picture is seeded differently, and alike in both readings."""
+    """Each level, and each of two effects in one frame, has a different seed, equal in both readings."""
     seeds = {
         reading: [dict(i.params)["seed"] for f in found for i in f.injections if i.model == "image_effect"]
         for reading, found in everything.items()
@@ -181,7 +185,7 @@ def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ..
 
 
 def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Rain falls in front of a foggy road: the effects of a spec act in its order."""
+    """The effects of a spec act in its order: rain falls in front of a foggy road."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
     made = build(manifest, models, fault, always())
@@ -190,7 +194,7 @@ def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tupl
 
 
 def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
-    """Whatever draws the road or reads frames is closed to faults: runs share what it leaves behind."""
+    """Code that draws the road or reads frames accepts no faults, because runs share its output."""
     manifest = clone.manifest("openpilot")
     todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
     while todo:
@@ -237,7 +241,7 @@ def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
 
 
 def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
-    """Each variant that misses its statement is a problem of its own, at the line of its anchor."""
+    """Each variant that misses its statement is a separate problem, at the line of its anchor."""
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "distance = truth.gap")
     assert len(problems) == 3, "two variants, one of them in two readings"
     assert problems[0].startswith(
@@ -247,13 +251,13 @@ def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
 
 
 def test_a_target_with_a_second_hit(toy: Workspace) -> None:
-    """An anchor that has become ambiguous is a problem with both candidates."""
+    """An ambiguous anchor is a problem with both candidates."""
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "gap = 0\n        gap = truth.gap")
     assert "assignment to 'gap' matches 2 statements in Sensor.measure: lines 14, 15" in problems[0]
 
 
 def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
-    """A broken table does not keep a broken spec from being told."""
+    """A broken table does not hide a broken spec."""
     (toy.library / "stpa" / "contexts" / "pedals.yaml").write_text("schema: context_table/9\n")
     problems = edited(toy, "fault_library/faults/sensor/distance.yaml", "model: scale", "model: skale")
     assert len(problems) == 2
@@ -285,6 +289,6 @@ def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
     ],
 )
 def test_other_problems(toy: Workspace, file: str, old: str, new: str, said: str) -> None:
-    """Unknown hazards, a lost place of observation and a target that does not parse are told."""
+    """Unknown hazards, a missing place of observation and a target that does not parse are reported."""
     problems = edited(toy, file, old, new)
     assert any(said in problem for problem in problems)

@@ -1,4 +1,4 @@
-"""The checks before a campaign: each can fail, and none is repeated without need."""
+"""The checks before a campaign: each can fail, and none is repeated needlessly."""
 
 import re
 import shutil
@@ -33,7 +33,7 @@ def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
 
 
 def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Anchors, golden twice, null mutant, canary: all pass, and are not run again for the same sources."""
+    """Anchors, golden twice, null mutant and canary all pass, and are not run again for the same sources."""
     folder = frozen(toycar, tmp_path)
     told: list[Progress] = []
     results = run_checks(toycar, folder, workers=2, notify=told.append)
@@ -55,7 +55,7 @@ def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: p
 
 
 def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A golden run that is no longer what was checked is run again."""
+    """A golden run that differs from the checked one is run again."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     trace = folder.golden("A") / "log.npz"
@@ -86,7 +86,9 @@ def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -
 def test_an_unsound_target_is_refused(
     toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    """A target that is not deterministic, not harmless, or not as its manifest says starts no campaign."""
+    """A target that is non-deterministic, harmful without a fault, or different from its manifest starts no
+    campaign.
+    """
     change(toycar, old, new)
     folder = frozen(toycar, tmp_path)
     with pytest.raises(CheckFailed, match=re.escape(told)):
@@ -94,7 +96,7 @@ def test_an_unsound_target_is_refused(
 
 
 def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """A probe whose observation statement is never executed proves nothing."""
+    """A probe with an observation statement that never runs proves nothing."""
     change(toycar, "        drive.step()", "        Drive.other(drive)")
     change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
     manifest = toycar.library / "targets" / "toycar.yaml"
@@ -109,8 +111,7 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """A canary that does not reach its hazard, whatever its value, means that hazards would not be seen; all
-    of the values that were tried are told."""
+    """If no value of the canary reaches its hazard, hazards might go unseen; all tried values are listed."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
     folder = frozen(toycar, tmp_path)
@@ -125,7 +126,9 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
 
 
 def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
-    """The largest value need not be the harmful one: the others are tried, and the result names both."""
+    """Another value than the largest may be the harmful one: the others are tried, and the result
+    names both.
+    """
     change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
     change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
     results = run_checks(toycar, frozen(toycar, tmp_path))
@@ -137,7 +140,7 @@ def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_pa
 def test_an_anchor_that_is_gone_is_told_before_anything_runs(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fault whose statement does not exist is told with its spec; no run is wasted on it."""
+    """A fault without its statement is reported with its spec, before any run."""
     change(toycar, "offset = world.offset", "shift = world.offset", "sensing")
     change(toycar, "closing, offset))", "closing, shift))", "sensing")
     folder = frozen(toycar, tmp_path)
@@ -149,7 +152,7 @@ def test_an_anchor_that_is_gone_is_told_before_anything_runs(
 def test_other_golden_runs_than_before_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with records does not go on where golden is another one, and keeps the golden runs it has."""
+    """A run with records does not resume with another golden run, and keeps its own."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(
@@ -176,8 +179,9 @@ def test_other_golden_runs_than_before_are_refused(
 
 
 def test_a_canary_whose_run_was_ended_from_outside_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
-    """What the check says does not depend on a signal that struck one of its runs; a run that never ends well
-    is tried once more and no further."""
+    """The check's result does not depend on a signal to one of its runs; a run that does not end well is
+    repeated only once.
+    """
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])

@@ -1,4 +1,4 @@
-"""Checks are made once for the same sources, whatever the run folder, and not believed when damaged."""
+"""Checks run once for the same sources, in any run folder, and damaged ones are ignored."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ CopyToycar = Callable[[Path], Workspace]
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Workspace, RunFolder]:
-    """A toy with a folder whose checks have passed."""
+    """A toy with a folder of passed checks."""
     root = tmp_path_factory.mktemp("checked")
     toy = copy_toycar(root)
     folder = freeze(make_plan(toy, "small"), root / "run", toy)
@@ -32,7 +32,7 @@ def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -
 
 @pytest.fixture
 def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the cache that these checks left, in use: its only entry."""
+    """A copy of the resulting cache, in use: its only entry."""
     copied = shutil.copytree(checked[1].path.parent / "cache", tmp_path / "cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copied))
     (entry,) = (tmp_path / "cache" / "mutator" / "checks").iterdir()
@@ -40,7 +40,7 @@ def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pyt
 
 
 class Driven(Exception):
-    """A run was driven."""
+    """Raised if anything runs."""
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("cache", "nothing_is_driven")
 def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
-    """A second folder of the same sources has results and golden runs at once, the same bytes."""
+    """A second folder of the same sources has the same bytes of results and golden runs at once."""
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))
@@ -69,7 +69,7 @@ def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp
 def test_a_damaged_entry_is_not_believed(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, damaged: str, content: bytes | None
 ) -> None:
-    """An entry with a file that is empty, other or gone is as none: the checks are made anew."""
+    """An entry with an empty, changed or missing file is ignored: the checks run again."""
     if not damaged:
         shutil.rmtree(cache)
     elif content is None:
@@ -87,7 +87,7 @@ def test_a_damaged_entry_is_not_believed(
 def test_nothing_in_an_entry_may_be_another(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
 ) -> None:
-    """An entry is used as it was written or not at all: its results and golden runs are part of a seal."""
+    """An entry is used unchanged or not at all: its results and golden runs are part of a seal."""
     if how == "another file":
         shutil.copy(cache / "golden" / "A" / "log.npz", cache / "golden" / "A" / "log2.npz")
     elif how == "a pipe":
@@ -112,7 +112,7 @@ def test_other_sources_are_checked(
     monkeypatch: pytest.MonkeyPatch,
     changed: str,
 ) -> None:
-    """Another seed, another target or another machine has no entry."""
+    """Another seed, target or machine has no entry."""
     if changed == "machine":
         monkeypatch.setattr("platform.node", lambda: "elsewhere")
     if changed == "target":
@@ -124,7 +124,7 @@ def test_other_sources_are_checked(
 
 
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
-    """What is kept next stands in the place of what was damaged."""
+    """The next entry replaces the damaged one."""
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
     preflight_cache.store(cache, checked[1].path, "checks.json", checked[1].work)
@@ -133,7 +133,7 @@ def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache
 
 
 def test_no_room_for_a_cache_is_no_error(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
-    """Where the cache cannot be, nothing is kept and nothing is said."""
+    """If the cache cannot be created, nothing is stored and nothing is printed."""
     (tmp_path / "file").write_text("")
     preflight_cache.store(tmp_path / "file" / "entry", checked[1].path, "checks.json", checked[1].work)
     assert (tmp_path / "file").read_text() == ""

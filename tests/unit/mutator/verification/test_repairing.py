@@ -1,4 +1,4 @@
-"""Repair: what is damaged is put aside, what is intact stays, and the folder opens again."""
+"""Repair: damaged parts are moved aside, intact ones stay, and the folder opens again."""
 
 import json
 import shutil
@@ -34,7 +34,7 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def repaired(run: Path) -> tuple[list[str], RunFolder]:
-    """What a repair says, and the folder, which opens then."""
+    """The output of a repair, and the folder, which then opens."""
     said = repair(RunFolder.unverified(run))
     return said, RunFolder.open(run)
 
@@ -48,7 +48,7 @@ RECORDS = "records/0001-a.jsonl"
 NO_FILES = [RECORDS, "timings/0001-a.jsonl", "golden/A/said.json", "plan.csv", digests.FILE]
 LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
     "a changed line": (lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]], 1),
-    "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the one after it cannot tell that it is sound
+    "a dropped line": (lambda x: [*x[:3], *x[4:]], 2),  # the line after it cannot be verified
     "a doubled line": (lambda x: [*x[:4], *x[3:]], 0),
     "a lost end": (lambda x: x[:-2], 2),
     "a torn end": (lambda x: [*x[:-1], x[-1][:30]], 1),
@@ -60,7 +60,7 @@ LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) -> None:
-    """Only what is lost is to be run again; the damaged file is kept elsewhere as it was."""
+    """Only the lost lines must be run again; the damaged file is kept elsewhere unchanged."""
     change, lost = LOSSES[loss]
     edit(run / RECORDS, change)
     damaged = (run / RECORDS).read_bytes()
@@ -73,7 +73,7 @@ def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) ->
 
 
 def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
-    """A file whose checksums all fit is still not the one that was closed: none of its lines is kept."""
+    """A file with valid checksums that is not the closed one loses all its lines."""
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     lines[4]["outcome"] = "sdc"
     values = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
@@ -83,7 +83,7 @@ def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
 
 
 def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
-    """The file that was closed is still in there, and stays."""
+    """The closed file is still inside, and stays."""
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
     (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
@@ -92,14 +92,14 @@ def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
 
 
 def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
-    """Its experiments are run again."""
+    """The experiments of a missing segment are run again."""
     (run / RECORDS).unlink()
     said, folder = repaired(run)
     assert folder.records() == {} and said == [f"{RECORDS} is gone"]
 
 
 def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[..., None]) -> None:
-    """Running the experiment again makes both."""
+    """Running the experiment again restores both."""
     one, other = list(plan_file.ids(run))[:2]
     [file] = Patches(run).files()
     put_patches(run, {one: b"other", other: None})
@@ -112,7 +112,9 @@ def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[
 
 
 def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Path) -> None:
-    """The first of a file is a whole patch, which the others are packed beside: all are run again."""
+    """The first block of a file is a whole patch, and the others are differences from it: all are
+    run again.
+    """
     [file] = Patches(run).files()
     data = file.read_bytes()
     file.write_bytes(data[:60] + bytes([data[60] ^ 1]) + data[61:])
@@ -123,7 +125,7 @@ def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Pa
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
 def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
-    """The run is finished no more, so that it is made again."""
+    """The run becomes unfinished, so that `run` rebuilds the file."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
@@ -144,14 +146,14 @@ def test_the_plan_for_people_is_made_anew(run: Path, made: Path) -> None:
 
 
 def test_strangers_go(run: Path) -> None:
-    """Files that the finished run did not write are put aside."""
+    """Files that the finished run did not write are moved aside."""
     (run / "records" / "0002-a.jsonl").write_bytes(b"anything\n")
     _, folder = repaired(run)
     assert len(folder.records()) == 24 and not (run / "records" / "0002-a.jsonl").exists()
 
 
 def test_damaged_costs_lose_their_line(run: Path) -> None:
-    """Timings are outside the seal; what is left of them is read again."""
+    """Timings are outside the seal; the remaining ones are read again."""
     edit(run / "timings" / "0001-a.jsonl", lambda x: [*x[:3], x[3].replace(b"1.0", b"9.0"), *x[4:]])
     with pytest.raises(MutatorError, match=r"0001-a\.jsonl:4: a damaged line"):
         RunFolder.open(run).timings()
@@ -161,7 +163,7 @@ def test_damaged_costs_lose_their_line(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None) -> None:
-    """Only a seal that was known before can vouch for it, which is said."""
+    """Only a previously known seal can vouch for a rebuilt ledger, and the output says so."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -170,7 +172,7 @@ def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None)
 
 
 def test_what_nobody_can_make_again_stays(run: Path) -> None:
-    """A damaged campaign file, or plan, is left for whoever has a copy of it."""
+    """A damaged campaign file or plan stays, so that a copy can replace it."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
@@ -180,14 +182,14 @@ def test_what_nobody_can_make_again_stays(run: Path) -> None:
 
 
 def test_a_sound_run_is_left_alone(run: Path) -> None:
-    """Nothing is put aside, and nothing is written."""
+    """Nothing is moved aside or written."""
     before = (run / digests.FILE).stat().st_mtime_ns
     assert repair(RunFolder.unverified(run)) == []
     assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
 def test_a_killed_repair_leaves_no_finished_run(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Wherever it is killed after it has put anything aside: the folder opens, and the run goes on."""
+    """Killed at any point after it moved something, the folder opens, and the run resumes."""
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(digests, "close_segments", kill)
@@ -201,7 +203,7 @@ def kill(*_: object, **__: object) -> None:
 
 
 def test_repair_waits_for_nobody(run: Path) -> None:
-    """A folder in use, and one of an earlier schema, are refused."""
+    """A folder in use, or one of an earlier schema, is refused."""
     with owned(run), pytest.raises(MutatorError, match="in use"):
         repair(RunFolder.unverified(run))
     head = run / "run.json"
@@ -213,7 +215,7 @@ def test_repair_waits_for_nobody(run: Path) -> None:
 @pytest.mark.parametrize("name", NO_FILES)
 @pytest.mark.parametrize("is_link", [False, True])
 def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> None:
-    """A folder in the place of a file is moved with what it holds, and so is a link that leads nowhere."""
+    """A folder in the place of a file is moved with its content, and so is a dangling link."""
     (run / name).unlink()
     if is_link:
         (run / name).symlink_to(run / "nowhere")
@@ -226,7 +228,7 @@ def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> No
 
 
 def test_a_file_of_patches_that_is_a_link_is_put_aside(run: Path, put_patches: Callable[..., None]) -> None:
-    """What it leads to is left alone."""
+    """The link's target stays unchanged."""
     name = next(plan_file.ids(run))
     put_patches(run, {name: b"not the patch of the record"})
     [file] = Patches(run).files()

@@ -1,4 +1,4 @@
-"""The seal: one digest of all that counts, and of nothing else."""
+"""The seal: one digest of exactly what counts."""
 
 import json
 import shutil
@@ -39,7 +39,7 @@ def sealed(run: Path) -> str | None:
 
 
 def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, reseal: Reseal) -> None:
-    """Other sessions, workers and orders of records, lost timings, another processor: the same seal."""
+    """Other sessions, workers and record orders, lost timings and another processor give the same seal."""
     path = run / "records" / "0001-a.jsonl"
     head, *lines = path.read_text().splitlines()
     path.write_text("\n".join([head, *lines[12:], ""]))
@@ -56,7 +56,7 @@ def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, rese
 
 
 def test_tries_that_failed_are_not_in_it(made: Path, run: Path) -> None:
-    """A harness error that was tried again has left nothing that counts."""
+    """A retried harness error does not affect the seal."""
     folder = RunFolder.open(run)
     name = next(iter(folder.share()))
     head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -99,14 +99,14 @@ CHANGES: dict[str, Callable[[Path], None]] = {
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change: str) -> None:
-    """Another record, patch, golden run, check, source, choice or version, and the seal is another one."""
+    """Another record, patch, golden run, check, source, choice or version changes the seal."""
     CHANGES[change](run)
     reseal(run)
     assert sealed(run) not in (None, sealed(made))
 
 
 def test_what_is_not_finished_has_none(run: Path) -> None:
-    """A seal stands for a whole run; an old one has nothing to be trusted."""
+    """An unfinished run has no seal, nor has an old one without digests."""
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
@@ -116,8 +116,7 @@ def test_what_is_not_finished_has_none(run: Path) -> None:
 
 
 def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:
-    """The seal is of bytes, not of what a version of mutator makes of them: a field that joins records later
-    changes no seal."""
+    """The seal covers bytes, not their interpretation: a later field of records changes no seal."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
     assert canonical(json.loads(lines[1])) != lines[1]  # the checksum comes first

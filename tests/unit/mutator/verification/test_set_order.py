@@ -1,4 +1,4 @@
-"""Places where the order of a set is used, found by reading."""
+"""Finding the places that use the order of a set, by reading the source."""
 
 import pytest
 
@@ -25,7 +25,7 @@ from mutator.verification.set_order import places
     ],
 )
 def test_a_set_that_is_gone_through_is_found(line: str) -> None:
-    """Loops, comprehensions, lists, sums and `pop` take a set's elements in its order."""
+    """Loops, comprehensions, lists, sums and `pop` use a set's order."""
     assert len(places(line.encode())) == 1
 
 
@@ -44,12 +44,12 @@ def test_a_set_that_is_gone_through_is_found(line: str) -> None:
     ],
 )
 def test_what_needs_no_order_is_not(line: str) -> None:
-    """What is sorted, counted or asked for an element does not depend on the order."""
+    """Sorting, counting and membership tests do not depend on the order."""
     assert places(line.encode()) == []
 
 
 def test_a_place_has_its_line_and_function() -> None:
-    """A place is told as people look for it: line, function, expression."""
+    """A place is reported with line, function and expression."""
     source = (
         b"class A:\n    def f(self):\n        names = {'a', 'b'}\n        for n in names:\n            g(n)\n"
     )

@@ -1,4 +1,4 @@
-"""Triggers that golden runs never come to."""
+"""Triggers that golden runs never reach."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,13 +34,14 @@ SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0
 def test_what_never_holds_is_told(
     toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
 ) -> None:
-    """A time after the last observation, and a condition that holds in none while it is armed, are told with
-    the number of experiments that wait for it."""
+    """A time after the last observation, and a condition that never holds while armed, are reported with the
+    number of affected experiments.
+    """
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
     told = remarks(
         toycar,
         toycar.manifest("toycar"),
-        [*waiting, ("S2", replace(experiment(), trigger=trigger))],  # of S2 nothing is known
+        [*waiting, ("S2", replace(experiment(), trigger=trigger))],  # S2 is unknown
         {"S1": np.array(SEEN)},
     )
     assert len(told) == bool(said)
@@ -49,7 +50,7 @@ def test_what_never_holds_is_told(
 
 
 def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
-    """Observations come back as they were, by the keys of their golden runs; without any there are none."""
+    """Observations are read back unchanged, by the keys of their golden runs; without any there are none."""
     assert read_observed(tmp_path) == {}
     write_observed(tmp_path, "town/A+alone", SEEN)
     assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
@@ -58,8 +59,9 @@ def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
 
 
 def test_triggers_are_told_of_cached_checks_too(toycar: Workspace, tmp_path: Path) -> None:
-    """Of golden runs that were driven for another folder it is known as well what they come to; a run that
-    goes on says nothing a second time."""
+    """Unreached triggers are known for golden runs from the cache, too; a resumed run does not repeat the
+    warning.
+    """
     campaign = toycar.library / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))

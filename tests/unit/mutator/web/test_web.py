@@ -1,4 +1,4 @@
-"""What pages share: assets, and data carried in a page."""
+"""What pages share: assets, and data inside a page."""
 
 import base64
 import gzip
@@ -14,7 +14,7 @@ SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # loaded by address
 
 
 def test_carried_data_come_back_and_are_the_same_each_time() -> None:
-    """JSON, compressed without a time, in base64: nothing in it could end a script element."""
+    """JSON, compressed without a time stamp, in base64, cannot end a script element."""
     value = {"text": "</script> ⟨1⟩", "numbers": [0.1, None, 3]}
     text = web.packed(value)
     assert json.loads(gzip.decompress(base64.b64decode(text))) == value
@@ -25,7 +25,7 @@ def test_carried_data_come_back_and_are_the_same_each_time() -> None:
 
 
 def test_plain_data_cannot_end_their_element() -> None:
-    """JSON that a script can read at once, whatever is in it."""
+    """Plain JSON cannot end its script element, whatever it contains."""
     element = web.plainly_embedded({"text": "</script><!--"}, "here")
     assert element.count("<") == 2
     text = element.removeprefix('<script type="application/json" id="here">').removesuffix("</script>")
@@ -33,7 +33,7 @@ def test_plain_data_cannot_end_their_element() -> None:
 
 
 def test_what_json_does_not_know_is_refused() -> None:
-    """A page could not read it: NaN has to be told as something else."""
+    """A page cannot read NaN, so it must be written as something else."""
     with pytest.raises(ValueError, match="JSON"):
         web.packed([float("nan")])
 
@@ -43,5 +43,5 @@ def test_what_json_does_not_know_is_refused() -> None:
     sorted({*report.STYLES, *report.SCRIPTS, *review.STYLES, *review.SCRIPTS, *SERVED}),
 )
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
-    """`asset` refuses one that would; a script of more than 300 lines is two."""
+    """`asset` refuses a script that could end its element; a script has at most 300 lines."""
     assert len(web.asset(name).splitlines()) <= 300
