@@ -1,4 +1,4 @@
-"""What tests of the controller and its simulator share."""
+"""Fixtures shared by the tests of the controller and its simulator."""
 
 from pathlib import Path
 

@@ -19,7 +19,9 @@ MESSAGES = [(path, name) for path in (CAR_DBC, RADAR_DBC) for name in load(path)
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
 def test_pack_and_decode_agree_with_cantools(path, name, data):
-    """A frame packed here means the same to cantools, and a frame decoded here reads as cantools reads it."""
+    """A frame packed here has the same meaning for cantools, and a frame decoded here reads the same as with
+    cantools.
+    """
     message = load(path)[name]
     reference = load_reference(path).get_message_by_name(name)
     signals = [n for n in message.fields if n not in (COUNTER, CHECKSUM)]
@@ -42,7 +44,7 @@ def test_pack_and_decode_agree_with_cantools(path, name, data):
 
 
 def test_checksum_of_a_known_frame():
-    """The half bytes of address, data and checksum add up to 8 modulo 16, as Honda's units demand."""
+    """The half bytes of address, data and checksum add up to 8 modulo 16, as Honda's units require."""
     frame = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",)).pack((96.56,), 2)
     halves = [int(digit, 16) for digit in f"{frame.address:x}" + frame.data.hex()]
     assert frame.data[:2] == (9656).to_bytes(2, "big")
@@ -62,7 +64,7 @@ def test_checksum_of_a_known_frame():
     ],
 )
 def test_unsigned_values_round_and_stay_in_range(value, raw):
-    """A value beyond the field is held at its end, and one that is no number reads 0."""
+    """A value beyond the field is limited to its end, and NaN reads 0."""
     field = load(CAR_DBC)["WHEEL_SPEEDS"].fields["WHEEL_SPEED_FL"]
     assert encode([field], [value]) == raw << field.shift
 
@@ -71,13 +73,13 @@ def test_unsigned_values_round_and_stay_in_range(value, raw):
     ("value", "raw"), [(-1e9, 0x7FFF), (1e9, 0x8000), (-0.1, 1), (float("-inf"), 0x7FFF), (float("nan"), 0)]
 )
 def test_signed_values_stay_in_range(value, raw):
-    """The steering angle counts -0.1 degrees a bit and is held at both ends of its range."""
+    """The steering angle counts -0.1 degrees a bit and is limited at both ends of its range."""
     field = load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"]
     assert encode([field], [value]) == raw << field.shift
 
 
 def test_a_packer_forgets_its_last_values():
-    """Frames do not depend on what was packed before: the same values and counter, the same bytes."""
+    """Frames do not depend on earlier ones: the same values and counter give the same bytes."""
     used = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",))
     for kph in (50.0, 50.0, 51.0, 50.0):
         for counter in (0, 1, 5, 4):
@@ -87,7 +89,7 @@ def test_a_packer_forgets_its_last_values():
 
 @pytest.mark.parametrize("path", [CAR_DBC, RADAR_DBC], ids=lambda path: path.name)
 def test_layouts_are_those_cantools_reads(path):
-    """Addresses, sizes and the place, sign and scale of every signal are read as cantools reads them."""
+    """Addresses, sizes, and the place, sign and scale of every signal agree with cantools."""
     reference = {message.name: message for message in load_reference(path).messages}
     assert list(load(path)) == list(reference)
     for name, message in load(path).items():

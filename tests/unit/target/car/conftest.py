@@ -1,4 +1,4 @@
-"""A car whose sensors can be told what to measure."""
+"""A car with scripted sensors."""
 
 import pytest
 from selfdrive.sim.sensors import CarSensors
@@ -6,7 +6,7 @@ from selfdrive.sim.truth import GroundTruth
 
 
 class Bench:
-    """Makes the frames a Civic would send, step by step."""
+    """Builds the frames a Civic would send, step by step."""
 
     def __init__(self):
         self.sensors = CarSensors()

@@ -1,4 +1,4 @@
-"""What the Civic's actuators are sent for a demand."""
+"""The commands that the Civic's actuators receive for a demand."""
 
 import cantools
 import pytest
@@ -20,7 +20,7 @@ class Rig:
         self.car = CarState()
 
     def send(self, cycles=2, enabled=True, **demand):
-        """Repeat a demand for some cycles; returns what the actuators take."""
+        """Repeat a demand for some cycles; return the actuators' commands."""
         for _ in range(cycles):
             control = CarControl(enabled=enabled, actuators=Actuators(**demand))
             frames = self.controller.update(control, self.car, self.frame)
@@ -35,10 +35,10 @@ def rig():
 
 
 def test_gas_is_quantised_like_the_original(rig):
-    """Gas goes out as whole pedal counts: the values the original's plant decoded."""
+    """Gas is sent as whole pedal counts: the values that the original's plant decoded."""
     assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
     assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
-    assert rig.send(gas=0.0119).gas == pytest.approx(0.01094, abs=1e-5)  # 11.95 counts, cut off
+    assert rig.send(gas=0.0119).gas == pytest.approx(0.01094, abs=1e-5)  # 11.95 counts, truncated
     assert rig.send(gas=1.5).gas == pytest.approx(0.99611, abs=1e-4)
     assert rig.send(gas=0.0).gas == 0.0
     assert rig.send(gas=-0.5).gas == 0.0
@@ -52,16 +52,16 @@ def test_brake_rises_slowly_and_falls_at_once(rig):
 
 
 def test_brake_is_quantised_and_never_full(rig):
-    """Brakes take 1/256 steps, cut off, and at most 255 of them."""
+    """Brakes have steps of 1/256, truncated, and at most 255 of them."""
     assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
     rig.send(brake=0.0)
     assert rig.send(cycles=60, brake=0.3).brake == 74 / 256  # 0.29 is 74.24 counts
     assert rig.send(cycles=60, brake=0.312).brake == 77 / 256  # 0.302 is 77.3 counts
-    assert rig.send(cycles=60, brake=0.3255).brake == 80 / 256  # 0.3155 is 80.8 counts, cut off
+    assert rig.send(cycles=60, brake=0.3255).brake == 80 / 256  # 0.3155 is 80.8 counts, truncated
 
 
 def test_brake_hysteresis():
-    """On from 0.02, off below 0.005, and changes within 0.01 are not passed on."""
+    """The brake is on from 0.02, off below 0.005, and changes within 0.01 are ignored."""
     hysteresis = BrakeHysteresis()
     assert hysteresis.update(0.019) == 0.0
     assert hysteresis.update(0.021) == pytest.approx(0.011)
@@ -77,18 +77,18 @@ def test_brake_hysteresis():
     ("steer", "taken"), [(1.0, 4096), (-1.0, -4096), (2.5, 4096), (0.1, 409), (-0.1, -409)]
 )
 def test_steering_torque(rig, steer, taken):
-    """Torque is limited to the whole of the range, cut off to counts, and keeps its side: left positive."""
+    """Torque is limited to its range, truncated to counts, and keeps its sign: left is positive."""
     assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
 
 
 def test_no_torque_while_the_eps_refuses(rig):
-    """The EPS is not asked for torque it does not allow."""
+    """The EPS gets no torque request while it does not allow torque."""
     rig.car = CarState(steer_not_allowed=True)
     assert rig.send(steer=0.5).steer == 0.0
 
 
 def test_disabled_means_zero(rig):
-    """Without engagement nothing reaches the actuators, whatever is demanded."""
+    """Without engagement nothing reaches the actuators, whatever the demand."""
     rig.send(cycles=30, gas=0.3, brake=0.3, steer=0.3)
     taken = rig.send(enabled=False, gas=0.3, brake=0.3, steer=0.3)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
@@ -96,14 +96,16 @@ def test_disabled_means_zero(rig):
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
 def test_a_demand_that_is_no_number_is_zero(rig, bad):
-    """Not-a-number from a controller that broke becomes no command at all, and later demands work."""
+    """A NaN from a broken controller becomes no command, and later demands work."""
     taken = rig.send(gas=bad, brake=bad, steer=bad)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
     assert rig.send(cycles=20, brake=0.1).brake > 0.0
 
 
 def test_what_is_sent_when(rig):
-    """Steering every cycle, gas and brake every second, the dashboard every tenth; all frames valid."""
+    """Steering is sent every cycle, gas and brake every second, the dashboard every tenth; all frames are
+    valid.
+    """
     addresses = []
     for frame in range(20):
         frames = rig.controller.update(CarControl(enabled=True), rig.car, frame)
@@ -130,7 +132,7 @@ def test_what_is_sent_when(rig):
     ],
 )
 def test_what_the_driver_is_shown(rig, control, shown):
-    """Set speed, lead, lanes and warnings reach the dashboard, as cantools reads it."""
+    """Set speed, lead, lanes and warnings reach the dashboard, as decoded by cantools."""
     values = {}
     for frame in rig.controller.update(CarControl(**control), rig.car, 0):
         values |= DBC.decode_message(frame.address, frame.data, decode_choices=False)
@@ -138,7 +140,7 @@ def test_what_the_driver_is_shown(rig, control, shown):
 
 
 def test_every_command_frame_is_accepted(rig):
-    """The receiving side, which checks counter and checksum, takes every frame of a long run."""
+    """The receiving side, which checks counter and checksum, accepts every frame of a long run."""
     parser = rig.receiver._parser
     for cycle in range(40):
         rig.send(cycles=1, steer=0.01 * cycle, gas=0.01 * cycle)

@@ -1,4 +1,4 @@
-"""What the Civic's frames are read as."""
+"""Decoding the Civic's frames."""
 
 from math import radians
 
@@ -25,7 +25,7 @@ def pack(name, counter, **signals):
 
 
 def test_an_ordinary_car(reader, bench):
-    """A driving car reads as that car: in drive, belted, closed, main switch on, nothing pressed."""
+    """An ordinary car is in drive, belted, closed, with the main switch on and nothing pressed."""
     state = read(reader, bench, v_ego=20.0, steer_angle=radians(12.3), steer_rate=radians(-7.0))
     assert state.can_valid and state.cruise_available and state.gear == "drive"
     assert state.v_ego_raw == pytest.approx(20.0, abs=0.002)
@@ -47,7 +47,7 @@ def test_an_ordinary_car(reader, bench):
 
 
 def test_nothing_received_is_unsafe(reader):
-    """Before any frame the car is taken to be unfit for engaging."""
+    """Before any frame, the car counts as unfit for engaging."""
     state = reader.update([], 0.0)
     assert not state.can_valid
     assert state.door_open and state.seatbelt_unlatched and state.esp_disabled and state.steer_error
@@ -55,9 +55,9 @@ def test_nothing_received_is_unsafe(reader):
 
 
 def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
-    """Started at 0, the filter passes 26.8 m/s after 0.2 s, is 27.1 m/s after 1.03 s, and settles later.
+    """Started at 0, the filter passes 26.8 m/s after 0.2 s, reaches 27.1 m/s after 1.03 s, and settles later.
 
-    The original, whose first reading comes at 0.12 s, shows 27.108 at 1.15 s with a coasting car.
+    The original, with its first reading at 0.12 s, shows 27.108 at 1.15 s with a coasting car.
     """
     estimates = [read(reader, bench, v_ego=26.8224 - 0.00176 * (k + 12)).v_ego for k in range(600)]
     assert estimates[2] == pytest.approx(8.9335, abs=0.01)
@@ -100,7 +100,7 @@ def test_button_events(reader, bench):
 
 
 def test_setting_button(reader):
-    """The setting switch is reported apart from the cruise buttons."""
+    """The setting switch is reported separately from the cruise buttons."""
     state = reader.update([pack("SCM_BUTTONS", 0, CRUISE_SETTING=1)], 0.0)
     assert state.buttons == (ButtonEvent("setting", True),)
 
@@ -125,13 +125,13 @@ def test_setting_button(reader):
     ],
 )
 def test_single_signals(reader, bench, name, signals, field):
-    """Each switch and fault bit sets its own field, and nothing sets it without."""
+    """Each switch and fault bit alone sets its own field."""
     assert not getattr(read(reader, bench), field)
     assert getattr(reader.update([pack(name, 1, **signals)], 0.01), field)
 
 
 def test_brake_switch_needs_two_frames(reader, bench):
-    """A brake switch that flickers for one frame is no foot on the brake; two in a row are."""
+    """A brake switch that flickers for one frame is ignored; two frames in a row count."""
     read(reader, bench)
     assert not reader.update([pack("POWERTRAIN_DATA", 1, BRAKE_SWITCH=1)], 0.01).brake_pressed
     assert reader.update([pack("POWERTRAIN_DATA", 2, BRAKE_SWITCH=1)], 0.02).brake_pressed

@@ -1,4 +1,4 @@
-"""Events the car raises."""
+"""Events that the car raises."""
 
 import pytest
 from selfdrive.can.dbc import load
@@ -26,12 +26,14 @@ def kinds(state):
 
 
 def test_no_events_without_cause(car, bench):
-    """A sound car in drive raises nothing."""
+    """A car without faults in drive raises no event."""
     assert update(car, bench, v_ego=20.0).events == ()
 
 
 def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
-    """CAN lost after 0.10 s: invalid from 0.21 s, an error in the fifth cycle, 0.25 s, until it is back."""
+    """If CAN is lost after 0.10 s, it is invalid from 0.21 s, and an error from the fifth cycle, 0.25 s,
+    until it is back.
+    """
     for _ in range(11):
         update(car, bench)
     first = next(step for step in range(11, 60) if "can_error" in kinds(car.update([], step / 100)))
@@ -43,7 +45,7 @@ def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
 
 @pytest.mark.parametrize("button", [CruiseButton.DECEL_SET, CruiseButton.RES_ACCEL])
 def test_engaging_happens_on_release(car, bench, button):
-    """Pressing set or resume asks for nothing yet; letting go asks to engage."""
+    """Pressing set or resume does nothing yet; releasing it engages."""
     update(car, bench)
     assert update(car, bench, button=button).events == ()
     assert kinds(update(car, bench)) == {"button_enable": {"enable"}}
@@ -57,7 +59,7 @@ def test_cancel_happens_on_press(car, bench):
 
 
 def test_gas_pedal(car, bench):
-    """Treading on the gas takes over once; holding it only postpones engaging."""
+    """Pressing the gas disengages once; holding it only delays engaging."""
     update(car, bench)
     first = car.update([pack("POWERTRAIN_DATA", 1, PEDAL_GAS=9)], 0.01)
     assert [e.kinds for e in first.events] == [("no_entry", "user_disable"), ("pre_enable",)]
@@ -66,7 +68,7 @@ def test_gas_pedal(car, bench):
 
 
 def test_brake_pedal(car, bench):
-    """The brake pedal takes over as long as the car moves."""
+    """The brake pedal disengages while the car moves."""
     update(car, bench, v_ego=20.0)
     for counter in (1, 2):
         state = car.update([pack("POWERTRAIN_DATA", counter, BRAKE_PRESSED=1)], 0.01 * counter)

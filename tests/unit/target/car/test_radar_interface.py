@@ -35,7 +35,7 @@ def test_no_cycle_no_data(radar):
 
 
 def test_track_ends_at_255_m(radar):
-    """A distance of 255 m and more ends the track; what comes nearer again is a new one."""
+    """A distance of 255 m or more ends the track; a nearer one afterwards starts a new track."""
     (first,) = radar.update(frames(d_rel=254.9), 0.0).points
     (same,) = radar.update(frames(d_rel=254.0), 0.05).points
     assert radar.update(frames(d_rel=255.0), 0.1).points == ()
@@ -44,7 +44,7 @@ def test_track_ends_at_255_m(radar):
 
 
 def test_fault_state(radar):
-    """Any state but the good one is an error."""
+    """Any radar state except the good one is an error."""
     state, track = frames()
     broken = state._replace(data=b"\x78" + state.data[1:])
     assert radar.update([broken, track], 0.0).errors == ("fault",)
@@ -52,7 +52,7 @@ def test_fault_state(radar):
 
 
 def test_missing_state_frames(radar):
-    """Tracks without the state frame are an error of communication after ten cycles."""
+    """Tracks without the state frame are a communication error after ten cycles."""
     state, track = frames()
     radar.update([state, track], 0.0)
     errors = [radar.update([track], 0.05 * cycle).errors for cycle in range(1, 13)]
@@ -60,5 +60,5 @@ def test_missing_state_frames(radar):
 
 
 def test_car_frames_are_not_the_radars(radar):
-    """The same addresses on the car's bus mean nothing here."""
+    """The radar ignores the same addresses on the car's bus."""
     assert radar.update([frame._replace(bus=0) for frame in frames()], 0.0) is None

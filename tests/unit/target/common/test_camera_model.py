@@ -1,4 +1,4 @@
-"""The camera's geometry: one pinhole, whatever is asked of it."""
+"""The camera's geometry: one pinhole model for everything."""
 
 from dataclasses import replace
 from math import radians, tan
@@ -15,7 +15,7 @@ ahead, sideways, turned = st.floats(3.0, 300.0), st.floats(-20.0, 20.0), st.floa
 
 
 def test_the_default_is_the_published_calibration():
-    """The horizon of the Caltech frames lies at row 170.7, and lines 3.7 m apart part by 1.48 px a row."""
+    """The horizon of the Caltech frames lies at row 170.7, and lines 3.7 m apart diverge by 1.48 px a row."""
     assert pytest.approx(170.7, abs=0.05) == CALTECH.horizon
     assert CALTECH.spread() == pytest.approx(1.48, abs=0.005)
     assert CALTECH.pitch == pytest.approx(radians(14.0))
@@ -24,14 +24,14 @@ def test_the_default_is_the_published_calibration():
 @CAMERAS
 @given(x=ahead, y=sideways)
 def test_a_point_on_the_road_is_projected_where_its_row_and_column_are(model, x, y):
-    """The picture of (x, y, 0) lies in the row of x and the column of (x, y)."""
+    """The image of (x, y, 0) lies in the row of x and the column of (x, y)."""
     assert model.project(x, y, 0.0) == pytest.approx((model.column(x, y), model.row(x)), abs=1e-6)
 
 
 @CAMERAS
 @given(x=ahead)
 def test_row_and_distance_are_inverse(model, x):
-    """The road in the row of x metres is x metres away, and as wide as its depth says."""
+    """The road in the row of x metres is x metres away, with the scale of its depth."""
     row = model.row(x)
     assert model.distance(row) == pytest.approx(x, rel=1e-6, abs=1e-6)
     assert model.metres_per_pixel(row) * (model.cx - model.column(x, 1.0)) == pytest.approx(1.0)
@@ -40,7 +40,7 @@ def test_row_and_distance_are_inverse(model, x):
 @CAMERAS
 @given(y=sideways, slope=turned)
 def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
-    """All points of a line on the road are seen on its line in the picture, from which it can be had back."""
+    """All points of a road line lie on its line in the image, from which it can be recovered."""
     a, b = model.line_in_picture(y, slope)
     for x in (4.0, 20.0, 100.0):
         assert a * model.row(x) + b == pytest.approx(model.column(x, y + slope * x), abs=1e-6)
@@ -49,14 +49,14 @@ def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
 
 @CAMERAS
 def test_what_is_as_high_as_the_camera_is_seen_at_the_horizon_row_far_away(model):
-    """Height moves a point up in the picture; at the camera's own height it stays at the horizon."""
+    """Height moves a point up in the image; at the camera's own height it stays at the horizon."""
     far = 1e7
     assert model.project(far, 0.0, model.height)[1] == pytest.approx(model.horizon, abs=1e-3)
     assert model.project(20.0, 0.0, 1.0)[1] < model.project(20.0, 0.0, 0.0)[1]
 
 
 def test_a_camera_from_its_view_has_that_horizon():
-    """`from_view` puts the horizon where it was asked for, with square pixels and the axis in the middle."""
+    """`from_view` puts the horizon at the requested row, with square pixels and the axis in the middle."""
     assert pytest.approx(200.0) == SQUARE.horizon
     assert (SQUARE.fx, SQUARE.fy, SQUARE.cx, SQUARE.cy) == (600.0, 600.0, 319.5, 239.5)
     assert tan(SQUARE.pitch) == pytest.approx((239.5 - 200.0) / 600.0)

@@ -14,16 +14,16 @@ def test_interp_between_and_beyond_breakpoints() -> None:
 
 
 def test_interp_takes_the_last_of_equal_breakpoints() -> None:
-    """Where a breakpoint repeats, its last value counts, also at the table's beginning."""
+    """If a breakpoint repeats, its last value counts, also at the table's beginning."""
     assert interp(0.0, (0.0, 0.0, 1.0), (5.0, 7.0, 8.0)) == 7.0
 
 
 def test_no_number_has_a_defined_place() -> None:
-    """What is no number gives the first value of a table, and the upper limit of a range."""
+    """NaN gives the first value of a table, and the upper limit of a range."""
     assert interp(nan, XP, FP) == 1.0
     assert clip(nan, -1.0, 1.0) == 1.0
 
 
 def test_clip_limits_both_ways() -> None:
-    """A value is kept inside its range and left alone within."""
+    """A value outside its range is limited, and one inside is unchanged."""
     assert [clip(x, -1.0, 2.0) for x in (-3.0, -1.0, 0.5, 2.0, 3.0)] == [-1.0, -1.0, 0.5, 2.0, 2.0]

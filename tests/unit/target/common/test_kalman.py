@@ -1,4 +1,4 @@
-"""Filters against numbers measured on the original."""
+"""Filters agree with numbers measured on the original."""
 
 import pytest
 from selfdrive.car.honda.carstate import SPEED_GAINS
@@ -17,7 +17,7 @@ def test_speed_estimate_starts_as_the_original() -> None:
 
 
 def test_distance_filter_learns_the_rate() -> None:
-    """A distance that shrinks by 10 m/s is followed with that rate after a few seconds."""
+    """The filter learns the rate of a distance that shrinks by 10 m/s within a few seconds."""
     lead = DistanceFilter(variance=1e2, q_distance=0.5, q_rate=1.0)
     lead.restart(80.0, 0.01, 1e2)
     for k in range(100):

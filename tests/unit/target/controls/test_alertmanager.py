@@ -16,7 +16,7 @@ from selfdrive.controls.lib.events import (
 
 
 def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
-    """As measured: the start-up text shows for 15 s, but not during the 0.2 s of engaging at 1.31."""
+    """As measured, the start-up text shows for 15 s, except during the 0.2 s of engaging at 1.31."""
     alerts = AlertManager()
     alerts.add("startup", 0.12)
     shown = {}
@@ -55,7 +55,7 @@ def test_the_newer_of_equals_is_shown() -> None:
 
 
 def test_sound_picture_and_text_end_one_after_the_other() -> None:
-    """Steer saturated: sound for 1 s, picture for 2 s, text for 3 s."""
+    """Steering saturation has sound for 1 s, picture for 2 s, text for 3 s."""
     alerts = AlertManager()
     alerts.add("steer_saturated", 0.0)
     alerts.process(0.5)
@@ -69,7 +69,7 @@ def test_sound_picture_and_text_end_one_after_the_other() -> None:
 
 
 def test_raising_again_prolongs() -> None:
-    """An alert that is raised every cycle lasts its duration from the last time."""
+    """An alert raised every cycle lasts its duration from the last time."""
     alerts = AlertManager()
     for k in range(100):
         alerts.add("steer_saturated", k * 0.01)
@@ -104,13 +104,13 @@ SUFFIX = {
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.name)
 def test_every_event_has_its_alerts(event: Event) -> None:
-    """What an event of the car, the planner or the controls asks to be shown can be shown."""
+    """Every event of the car, the planner or the controls has alerts that can be shown."""
     asked = {event.name + SUFFIX[kind] for kind in event.kinds if kind in SUFFIX}
     assert asked <= set(ALERTS)
 
 
 def test_every_alert_can_be_raised() -> None:
-    """No alert is without an event, or a place in the loop, that raises it."""
+    """Every alert has an event, or a place in the loop, that raises it."""
     asked = {event.name + SUFFIX[kind] for event in EVENTS for kind in event.kinds if kind in SUFFIX}
     in_the_loop = {"startup", "enable", "disable", "fcw", "steer_saturated"}
     assert set(ALERTS) - asked - in_the_loop == {"pre_driver_distracted", "driver_distracted"}
@@ -149,5 +149,5 @@ def test_priority_and_duration(name: str, priority: int, duration: float) -> Non
     ],
 )
 def test_ends_of_sound_picture_and_text(name: str, ends: tuple[float, float, float]) -> None:
-    """An alert's sound, picture and text end one by one."""
+    """An alert's sound, picture and text end independently."""
     assert ALERTS[name].ends == ends

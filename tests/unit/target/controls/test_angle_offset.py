@@ -15,7 +15,7 @@ def learn(
 
 
 def test_one_degree_in_two_minutes() -> None:
-    """At 30 m/s and half a metre off, one degree is learnt in about two minutes."""
+    """At 30 m/s and half a metre off, the filter learns one degree in about two minutes."""
     assert learn(120.0) == pytest.approx(0.967, abs=0.01)
     assert learn(120.0, center=-0.5) == pytest.approx(-0.967, abs=0.01)
 

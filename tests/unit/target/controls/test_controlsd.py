@@ -30,7 +30,7 @@ RELEASE = (ButtonEvent("decel", False),)
 
 
 class FakeCar:
-    """Gives the CarState it is told to and keeps what it is asked for."""
+    """Returns the given CarState and records the demands."""
 
     def __init__(self) -> None:
         self.state = CarState()
@@ -60,7 +60,7 @@ class FreeMpc:
 
 
 class Drive:
-    """controlsd at 20 m/s in the middle of a straight lane, radar and camera alive."""
+    """controlsd at 20 m/s in the middle of a straight lane, with radar and camera alive."""
 
     def __init__(self, params: CarParams) -> None:
         self.car = FakeCar()
@@ -102,7 +102,7 @@ def drive(params: CarParams) -> Drive:
 
 
 def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
-    """The cycle that engages controls already, with the speed of now as set speed."""
+    """The engaging cycle already controls, with the current speed as set speed."""
     drive.engage()
     assert (drive.state.state, drive.state.enabled, drive.state.active) == ("enabled", True, True)
     assert drive.state.long_state == "pid"
@@ -111,7 +111,7 @@ def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
 
 
 def test_not_engaged_nothing_is_asked_of_the_car(drive: Drive) -> None:
-    """Without engaging all actuators are zero and the set speed is the one that means none."""
+    """Without engaging, all actuators are zero and the set speed is the "none" value."""
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
     assert not drive.asked.enabled and drive.asked.cancel_cruise
@@ -119,14 +119,16 @@ def test_not_engaged_nothing_is_asked_of_the_car(drive: Drive) -> None:
 
 
 def test_control_reaches_the_car(drive: Drive) -> None:
-    """Engaged, the wanted angle gives torque and a speed below the set one gives gas."""
+    """Engaged, a steering angle error gives torque and a speed below the set one gives gas."""
     drive.engage().run(30, v_ego=19.0)
     assert drive.asked.actuators.steer == 1.0
     assert drive.asked.actuators.gas > 0.05
 
 
 def test_a_fault_takes_everything_away_in_its_cycle(drive: Drive) -> None:
-    """With an immediate reason the actuators are zero at once and stay so; the reason is told."""
+    """An immediate fault sets the actuators to zero in the same cycle and keeps them there; the reason is
+    shown.
+    """
     drive.engage().run(30, v_ego=19.0).run(1, CAN, v_ego=19.0)
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
@@ -137,7 +139,7 @@ def test_a_fault_takes_everything_away_in_its_cycle(drive: Drive) -> None:
 
 
 def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
-    """Engaged with the foot on the gas, nothing is controlled until it is lifted."""
+    """Engaged with the foot on the gas, nothing is controlled until the pedal is released."""
     drive.run(1, ENGAGE, GAS, buttons=RELEASE)
     assert (drive.state.state, drive.state.active, drive.state.long_state) == ("pre_enabled", False, "off")
     drive.run(1)
@@ -145,7 +147,7 @@ def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
 
 
 def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
-    """The release that engages does not change the speed, later ones do."""
+    """The release that engages keeps the set speed; later ones change it."""
     drive.engage()
     assert drive.state.v_cruise == pytest.approx(72 * KPH_TO_MS)
     drive.run(1, buttons=(ButtonEvent("accel", True),)).run(1, ENGAGE, buttons=(ButtonEvent("accel", False),))
@@ -165,13 +167,13 @@ def test_lost_messages_disengage(drive: Drive) -> None:
 
 
 def test_foot_brake_with_nothing_to_stop_for_disengages(drive: Drive) -> None:
-    """Braking by foot while the plan would drive on ends control."""
+    """Braking by foot while the plan would accelerate ends control."""
     drive.engage().run(1, brake_pressed=True)
     assert not drive.state.enabled and drive.state.alerts[0] == "no_target"
 
 
 def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
-    """A wanted angle out of reach is told after 0.8 s and changes nothing else."""
+    """An unreachable steering angle raises an alert after 0.8 s and changes nothing else."""
     drive.engage().run(78)
     assert "steer_saturated" not in drive.state.alerts
     drive.run(5)
@@ -179,7 +181,7 @@ def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
 
 
 def test_a_car_may_do_without_the_steering_alert(params: CarParams) -> None:
-    """Where the car's parameters say so, saturated steering is not told."""
+    """If the car's parameters say so, saturated steering raises no alert."""
     drive = Drive(replace(params, steer_limit_alert=False)).engage().run(100)
     assert drive.state.steer_saturated and "steer_saturated" not in drive.state.alerts
 
@@ -191,7 +193,7 @@ def test_buttons_without_engaging_set_no_speed(drive: Drive) -> None:
 
 
 def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
-    """Once the driver has been away for too long, the plan slows the car by 0.2 m/s^2."""
+    """When the driver has been inactive for too long, the plan slows the car by 0.2 m/s^2."""
     drive.engage()
     drive.controlsd._awareness.status = -0.01
     drive.run(300)
@@ -200,7 +202,7 @@ def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
 
 
 def test_warnings_and_permanent_alerts(drive: Drive) -> None:
-    """A warning shows only while engaged; a lasting fault shows also while disengaged."""
+    """A warning shows only while engaged; a permanent fault shows also while disengaged."""
     drive.run(1, BUSY)
     assert "steer_temp_unavailable" not in drive.state.alerts
     drive.run(1, BROKEN)
@@ -210,7 +212,7 @@ def test_warnings_and_permanent_alerts(drive: Drive) -> None:
 
 
 def test_collision_warning_works_disengaged(drive: Drive) -> None:
-    """The planner's warning is told, engaged or not, and asks the car for picture and sound."""
+    """The planner's warning is shown, engaged or not, with picture and sound in the car."""
     drive.controlsd._planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: None)
     drive.run(5)
     assert drive.state.alerts[0] == "fcw" and not drive.state.enabled
@@ -218,7 +220,7 @@ def test_collision_warning_works_disengaged(drive: Drive) -> None:
 
 
 def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
-    """The time without the driver runs while engaged and starts anew with wheel or buttons."""
+    """The timer without the driver runs while engaged and restarts with wheel or buttons."""
     drive.engage().run(100)
     awareness = drive.controlsd._awareness
     assert awareness.status < 1.0
@@ -231,7 +233,7 @@ def test_driver_actions_keep_the_car_awake(drive: Drive) -> None:
 
 
 def test_the_driver_is_shown_whether_there_is_a_lead(drive: Drive) -> None:
-    """The car is asked to show a lead while the first plan is for one."""
+    """The car shows a lead while the first plan is for one."""
     drive.engage()
     assert not drive.asked.lead_visible
     drive.controlsd._planner.mpc1.prev_lead_status = True
@@ -239,7 +241,7 @@ def test_the_driver_is_shown_whether_there_is_a_lead(drive: Drive) -> None:
 
 
 def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
-    """Driving off the middle of the lane is learnt every fifth cycle, not while the driver steers."""
+    """An offset from the middle of the lane is learnt every fifth cycle, but not while the driver steers."""
     offset = drive.controlsd._angle_offset
     drive.run(20)
     assert offset.value == 0.0
@@ -253,7 +255,7 @@ def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
 
 
 def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
-    """The lateral plan is told the offset learnt."""
+    """The lateral plan receives the learnt offset."""
     told = []
     drive.controlsd._lateral.mpc.update = lambda *arguments: told.append(arguments[3]) or 0.1
     drive.controlsd._angle_offset.value = 0.02
@@ -262,13 +264,13 @@ def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
 
 
 def test_frames_are_counted_and_passed_on(drive: Drive) -> None:
-    """The car is asked once each cycle, with the cycle's number, and its frames are returned."""
+    """The car is called once each cycle, with the cycle's number, and its frames are returned."""
     assert drive.car.frames == [0, 1, 2, 3, 4]
     assert drive.sent == [4]
 
 
 def test_startup_is_told(drive: Drive) -> None:
-    """The first 15 s show the start-up text."""
+    """The start-up text shows for the first 15 s."""
     assert drive.state.alerts == ("startup",) and drive.state.alert_text1 != ""
     drive.run(1490)
     assert drive.state.alerts == ("startup",)

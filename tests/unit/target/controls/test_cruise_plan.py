@@ -1,4 +1,4 @@
-"""Limits of cruising."""
+"""Limits of cruise control."""
 
 import pytest
 from selfdrive.controls.lib import cruise_plan
@@ -32,7 +32,7 @@ def test_jerk_is_never_limited_to_less_than_a_tenth(monkeypatch: pytest.MonkeyPa
 
 
 def test_turns_leave_less_to_speed_up() -> None:
-    """At 20 m/s 1.9 m/s^2 are shared between sideways and lengthwise; jerk limits stay."""
+    """At 20 m/s lateral and longitudinal acceleration share 1.9 m/s^2; jerk limits stay."""
     limits = cruise_limits(20.0, False, 1.88, slow_down=False)
     assert limits.a_max == pytest.approx((1.9**2 - 1.88**2) ** 0.5)
     assert limits.j_max == pytest.approx(0.5)
@@ -40,7 +40,7 @@ def test_turns_leave_less_to_speed_up() -> None:
 
 
 def test_absent_driver_slows_the_car() -> None:
-    """Without a driver no more than -0.2 m/s^2 is allowed."""
+    """Without a driver, acceleration is limited to -0.2 m/s^2."""
     assert cruise_limits(20.0, True, 0.0, slow_down=True)[:2] == (-0.5, -0.2)
 
 
@@ -58,5 +58,5 @@ LEAD = {"status": True, "d_rel": 40.0, "v_lead_k": 21.0, "a_lead_k": 0.1}
     ],
 )
 def test_following(change: dict, expected: bool) -> None:
-    """Following is a lead nearer than 45 m that is faster and gains speed."""
+    """Following means a lead nearer than 45 m that is faster and accelerates."""
     assert is_following(20.0, LeadData(**(LEAD | change))) is expected

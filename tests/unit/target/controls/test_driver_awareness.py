@@ -1,4 +1,4 @@
-"""Six minutes without a sign of the driver."""
+"""Six minutes without a driver's action."""
 
 from selfdrive.controls.lib.driver_awareness import DriverAwareness
 
@@ -18,7 +18,7 @@ def test_first_alert_20_s_before_slowing_down_for_4_s() -> None:
 
 
 def test_slows_down_only_then() -> None:
-    """The car slows down once the time has run out, until the driver acts."""
+    """The car slows down when the time has run out, until the driver acts."""
     awareness, _ = run(35990)
     assert not awareness.absent
     for _ in range(20):

@@ -6,12 +6,12 @@ EVENTS = (Event("door_open", (NO_ENTRY, SOFT_DISABLE)), Event("busy", (NO_ENTRY,
 
 
 def test_has_kind() -> None:
-    """A kind is found in any event, and not where none asks for it."""
+    """A kind is found in any event that has it, and not otherwise."""
     assert has_kind(EVENTS, WARNING)
     assert not has_kind(EVENTS[:1], WARNING)
 
 
 def test_names_of_kind_keep_their_order() -> None:
-    """Names come in order of occurrence, those of other kinds do not."""
+    """Names of that kind keep their order of occurrence; others are left out."""
     assert names_of_kind(EVENTS, NO_ENTRY) == ["door_open", "busy"]
     assert names_of_kind(EVENTS, SOFT_DISABLE) == ["door_open"]

@@ -26,7 +26,7 @@ def test_time_to_collision() -> None:
 
 
 def test_braking_of_a_slow_lead_counts_little() -> None:
-    """No lead is taken to stop in less than 2 s: at 1 m/s its braking counts 0.5 m/s^2 at the most."""
+    """A lead is assumed to take at least 2 s to stop: at 1 m/s its braking counts at most 0.5 m/s^2."""
     slow = replace(LEAD, v_lead=1.0)
     assert time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-9.0)) == pytest.approx(
         time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-0.5))
@@ -38,7 +38,7 @@ def test_warns_when_all_counters_are_full() -> None:
     assert warnings() == [pytest.approx(3.0)]
 
 
-# A situation in which one condition alone is missing, and the smallest change that brings it back.
+# A situation with exactly one condition missing, and the smallest change that satisfies it.
 BARELY = [
     ({"v_ego": 5.0}, {"v_lead": 3.0, "d_rel": 4.0}, {"v_ego": 5.01}, {}),
     ({"v_ego": 18.0}, {}, {"v_ego": 18.01}, {}),  # 2.5 s to collision
@@ -56,7 +56,7 @@ BARELY = [
 def test_each_condition_prevents_the_warning(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """Every single condition is needed, and no more than its limit."""
+    """Every single condition is needed, exactly up to its limit."""
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == []
     car, lead = car | car_change, lead | lead_change
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == [pytest.approx(3.0, abs=0.06)]
@@ -66,7 +66,7 @@ def test_each_condition_prevents_the_warning(
 def test_a_condition_must_have_held_for_ten_cycles(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """With all else in place, ten cycles of the condition that was missing bring the warning."""
+    """With all else satisfied, ten cycles of the missing condition bring the warning."""
     checker = FcwChecker()
     car, lead = replace(CAR, **car), replace(LEAD, **lead)
     for k in range(80):
@@ -81,19 +81,19 @@ def test_a_condition_must_have_held_for_ten_cycles(
     [
         ((-2.0,) * 21, 0.0, 0),  # the threshold at 10 m/s is -2.67
         ((-2.7,) * 21, 0.0, 1),
-        ((-2.7,) * 21, -0.5, 0),  # what the car does already does not count
+        ((-2.7,) * 21, -0.5, 0),  # the car's current braking does not count
         ((0.0,) * 8 + (-2.7,) * 13, 0.0, 1),  # at 2.8 s
         ((0.0,) * 9 + (-2.9,) * 12, 0.0, 0),  # late
         ((0.0,) * 9 + (-3.1,) * 12, 0.0, 1),  # late but hard
     ],
 )
 def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int) -> None:
-    """The plan must brake hard, or much harder than the car does now within 2.8 s."""
+    """The plan must brake hard, or much harder than the car's current braking, within 2.8 s."""
     assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
 
 
 def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
-    """With the blinkers long off, the lead itself counts a third a cycle."""
+    """With the blinkers long off, the lead itself counts a third per cycle."""
     checker = FcwChecker()
     checker._no_blinker = 10.0
     warned = [checker.update(k * 0.05, CAR, LEAD, BRAKING) for k in range(31)]
@@ -101,7 +101,7 @@ def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
 
 
 def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
-    """The fastest speed counts from the radar's first sight on; the other counters wait for the camera."""
+    """The highest speed counts from the radar's first sight; the other counters wait for the camera."""
     checker = FcwChecker()
     checker.update(0.0, CAR, replace(LEAD, v_lead=9.0, fcw=False), BRAKING)
     standing = replace(LEAD, v_lead=0.0, d_rel=30.0)

@@ -1,4 +1,4 @@
-"""Gas and brake around all states of longitudinal control."""
+"""Gas and brake in all states of longitudinal control."""
 
 import pytest
 from selfdrive.car.params import CarParams
@@ -21,7 +21,7 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
 
 
 def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
-    """Not in control there is no gas and no brake, and the target is the car's speed, 0.3 at the least."""
+    """Out of control there is no gas or brake, and the target is the car's speed, at least 0.3."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
     assert (control.state, control.v_pid) == (OFF, 20.0)
@@ -59,7 +59,7 @@ def stopped(params: CarParams) -> LongControl:
 
 
 def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
-    """Open-loop braking begins below 0.5 m/s with target and planned end below 0.31, not before."""
+    """Open-loop braking begins below 0.5 m/s if target and planned end are below 0.31."""
     for car, p in ((at(0.6), plan(0.2)), (at(0.4), plan(0.4)), (at(0.4), plan(0.2, future=0.4))):
         control = LongControl(params)
         follow(control, car, p, 2)
@@ -70,14 +70,14 @@ def test_stopping_needs_low_speed_target_and_future(params: CarParams) -> None:
 
 
 def test_foot_on_the_brake_stops_too(params: CarParams) -> None:
-    """Below 0.5 m/s the driver's brake makes the control brake along."""
+    """Below 0.5 m/s the driver's brake makes the control brake, too."""
     control = LongControl(params)
     follow(control, at(0.4, brake_pressed=True), plan(5.0), 2)
     assert control.state == STOPPING
 
 
 def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
-    """At rest the brake rises by 0.2 a second to 0.5 and stays; while rolling it goes on rising."""
+    """At rest the brake rises by 0.2 a second to 0.5 and stays; while the car rolls it continues to rise."""
     control = LongControl(params)
     follow(control, at(0.3), plan(0.2))
     start = control.output
@@ -122,7 +122,7 @@ def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
 
 
 def test_stopping_does_not_wind_up(params: CarParams) -> None:
-    """However long the car rolls, the stopping brake ends at its limit, and is released from there."""
+    """The stopping brake ends at its limit, however long the car rolls, and is released from there."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.0), 1000)
     assert control.state == STOPPING

@@ -23,7 +23,7 @@ def planned(*models: ModelData, v_ego: float = 20.0) -> PathPlanner:
 
 
 def test_middle_of_a_lane_is_followed() -> None:
-    """In a lane of usual width the path is its middle, both lines trusted."""
+    """In a lane of usual width the path is its middle, with both lines trusted."""
     planner = planned(model(2.05, -1.65, 0.2))
     assert planner.d_poly == pytest.approx((0.0, 0.0, 0.0, 0.2), abs=1e-9)
     assert (planner.lanes.left_prob, planner.lanes.right_prob) == (1.0, 1.0)
@@ -36,14 +36,14 @@ def test_lane_and_path_count_alike() -> None:
 
 
 def test_without_lines_the_model_path_is_followed() -> None:
-    """Lines of no probability count nothing."""
+    """Lines with zero probability have no weight."""
     planner = planned(model(path=0.6, probs=(0.0, 0.0)))
     assert planner.d_poly[3] == pytest.approx(0.6)
     assert planner.c_prob == 0.0
 
 
 def test_unsure_lines_count_together() -> None:
-    """Two lines of 50 % make the middle 75 % sure, which is weighed against the model's path."""
+    """Two lines of 50 % make the middle 75 % certain, which is weighed against the model's path."""
     planner = planned(model(path=0.7, probs=(0.5, 0.5)))
     assert planner.c_prob == pytest.approx(0.75)
     assert planner.d_poly[3] == pytest.approx(0.7 / 1.75)
@@ -57,7 +57,7 @@ def test_one_line_is_enough() -> None:
 
 @pytest.mark.parametrize(("width", "prob"), [(3.7, 1.0), (3.9, 1.0), (4.35, 0.504), (4.8, 0.0), (2.6, 0.0)])
 def test_right_line_is_doubted_when_the_width_is_off(width: float, prob: float) -> None:
-    """The right line's probability falls from 1 to 0 as the width is off by 0.3 to 1 m."""
+    """The right line's probability falls from 1 to 0 as the width error grows from 0.3 to 1 m."""
     assert planned(model(right=1.85 - width)).lanes.right_prob == pytest.approx(prob, abs=0.005)
 
 
@@ -70,7 +70,7 @@ def test_width_is_learnt_slowly() -> None:
 
 
 def test_width_unseen_is_that_of_usual_roads() -> None:
-    """Without lines the certainty falls by 5 % a message and the width goes to the speed's usual one."""
+    """Without lines the certainty falls by 5 % a message and the width approaches the speed's usual one."""
     blind = [model(probs=(0.0, 0.0)) for _ in range(200)]
     assert planned(*blind[:10], v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
     assert planned(*blind, v_ego=31.0).lane_width == pytest.approx(3.8, abs=1e-3)
@@ -78,13 +78,13 @@ def test_width_unseen_is_that_of_usual_roads() -> None:
 
 
 def test_one_line_alone_tells_no_width() -> None:
-    """The width is certain only as far as both lines are seen."""
+    """The width is only as certain as both lines together."""
     one = [model(probs=(1.0, 0.0)) for _ in range(10)]
     assert planned(*one, v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
 
 
 def test_fit_answers_anew_for_each_message() -> None:
-    """The kept fit is only for the message it was made of."""
+    """A stored fit is used only for its own message."""
     fit = ModelFit()
     assert fit.polys(model(path=0.1))[2][3] == pytest.approx(0.1)
     assert fit.polys(model(path=0.2))[2][3] == pytest.approx(0.2)

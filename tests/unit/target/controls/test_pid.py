@@ -21,7 +21,7 @@ def test_gains_follow_speed() -> None:
 
 
 def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
-    """Against a limit nothing is integrated; an error the other way is, from the first cycle."""
+    """At a limit the integral stops; an error in the other direction counts from the first cycle."""
     pid = make()
     for _ in range(500):
         pid.update(3.0, 0.0, speed=0.0)
@@ -32,7 +32,7 @@ def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_integrator_may_return_from_beyond(side: int) -> None:
-    """An integral of the other sign is worked off even while control is beyond the limit."""
+    """An integral of the other sign is reduced even while control is beyond the limit."""
     pid = make()
     pid.i = -0.5 * side
     pid.update(3.0 * side, 0.0, speed=0.0)
@@ -40,7 +40,7 @@ def test_integrator_may_return_from_beyond(side: int) -> None:
 
 
 def test_limits_apply_after_conversion() -> None:
-    """The converted control is limited, and anti-windup looks at the converted one."""
+    """The converted control is limited, and anti-windup uses the converted one."""
     pid = make(convert=lambda control, speed: control / 10.0)
     assert pid.update(5.0, 0.0, speed=0.0) == pytest.approx(0.505)
     assert pid.i > 0.0
@@ -66,7 +66,7 @@ def saturate(cycles: int, error: float = 2.0, **options) -> PIController:
 
 
 def test_saturation_is_told_after_more_than_800_ms() -> None:
-    """Eighty cycles beyond a limit are borne, the eighty-first is told."""
+    """Eighty cycles beyond a limit are tolerated, the eighty-first is reported."""
     assert not saturate(79).saturated
     assert saturate(82).saturated
 
@@ -80,7 +80,7 @@ def test_saturation_needs_error_hands_off_and_check() -> None:
 
 
 def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
-    """The count, at most 1 s, runs down within limits at the rate it ran up."""
+    """The count, at most 1 s, falls within limits at the rate at which it rose."""
     pid = saturate(300)
     for _ in range(10):
         pid.update(0.0, 0.0, speed=0.0)
@@ -91,7 +91,7 @@ def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
 
 
 def test_reset_forgets() -> None:
-    """After a reset neither integral nor saturation is left."""
+    """A reset clears integral and saturation."""
     pid = saturate(200)
     pid.i = 1.0
     pid.reset()

@@ -15,7 +15,7 @@ CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
 
 def test_fit_finds_the_cubic() -> None:
-    """Points on a cubic give its coefficients back."""
+    """A fit to points on a cubic returns its coefficients."""
     assert CubicFit()([value(CURVE, x) for x in range(50)]) == pytest.approx(CURVE, rel=1e-9)
 
 
@@ -31,7 +31,7 @@ def test_fit_is_least_squares() -> None:
 
 @pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
-    """Of any points, also where there are too few or too many of them, or infinite ones, or whole numbers."""
+    """The bits agree for any points, also for too few or too many, infinite ones, or whole numbers."""
     compiled.use(all_compiled)
     fast = build_fit()
     compiled.use(None)
@@ -58,7 +58,7 @@ def test_slope() -> None:
 
 
 def test_shift_and_blend() -> None:
-    """A curve is moved sideways; a blend is the weighted mean, and zero without weight."""
+    """A curve is shifted sideways; a blend is the weighted mean, and zero without weight."""
     assert value(shifted(CURVE, 0.5), 30.0) == pytest.approx(value(CURVE, 30.0) + 0.5)
     assert value(blend(CURVE, 3.0, ZERO, 1.0), 10.0) == pytest.approx(0.75 * value(CURVE, 10.0))
     assert blend(CURVE, 0.0, CURVE, 0.0) == ZERO

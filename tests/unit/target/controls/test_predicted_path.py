@@ -1,4 +1,4 @@
-"""Distance of an object from the way the car will go."""
+"""Distance of an object from the car's predicted path."""
 
 from math import cos, hypot, pi, sin
 
@@ -15,14 +15,14 @@ def test_straight_on() -> None:
 
 
 def test_slanting_line() -> None:
-    """Beside a slanting line it is the shortest way that counts."""
+    """Next to a slanting line the shortest distance counts."""
     assert distance_to(model_curve((0.0, 0.0, 1.0, 0.0)), 20.0, 0.0) == pytest.approx(-20.0 / 2**0.5)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.3])
 @pytest.mark.parametrize("offset", [-1.0, 0.5])
 def test_steering_circle(angle: float, offset: float) -> None:
-    """Beside the circle that the wheel describes, the distance is that from the circle."""
+    """Next to the steering circle, the distance is that from the circle."""
     radius = 200.0
     x, y = (radius - offset) * sin(angle), radius - (radius - offset) * cos(angle)
     assert distance_to(steering_curve(1.0 / radius), x, y) == pytest.approx(offset, abs=1e-3)
@@ -30,7 +30,7 @@ def test_steering_circle(angle: float, offset: float) -> None:
 
 
 def test_model_curve_agrees_with_a_search() -> None:
-    """The nearest point of a bent path is found as by trying all of them."""
+    """The nearest point of a bent path equals that of an exhaustive search."""
     poly = (1e-5, -5e-4, 0.02, 0.3)
     curve = model_curve(poly)
     best = min(hypot(x / 100.0 - 40.0, curve(x / 100.0)[0] - 3.0) for x in range(14000))

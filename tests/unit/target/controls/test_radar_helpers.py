@@ -23,26 +23,26 @@ def step(
 def test_stationary_is_slower_than_4_while_the_car_is_faster(
     v_rel: float, v_ego: float, stationary: bool
 ) -> None:
-    """An object slower than 4 m/s stands, if the car itself is faster than 4 m/s."""
+    """An object slower than 4 m/s is stationary if the car itself is faster than 4 m/s."""
     assert track(v_rel=v_rel, v_ego=v_ego).stationary is stationary
 
 
 def test_what_has_moved_is_never_stationary_again() -> None:
-    """A vehicle that was seen moving is not taken for standing when it stops."""
+    """A vehicle seen moving is not stationary when it stops."""
     t = track(v_rel=0.0)
     step(t, -20.0)
     assert not t.stationary
 
 
 def test_a_standing_object_may_start() -> None:
-    """A standing object that moves off is stationary no more."""
+    """A stationary object that moves off is no longer stationary."""
     t = track(v_rel=-20.0)
     step(t, -15.0)
     assert not t.stationary
 
 
 def test_oncoming_may_change() -> None:
-    """Oncoming is faster than 3.9 m/s towards the car, now."""
+    """Oncoming means currently faster than 3.9 m/s towards the car."""
     t = track(v_rel=-24.0)
     assert t.oncoming
     step(t, -23.0)
@@ -50,7 +50,7 @@ def test_oncoming_may_change() -> None:
 
 
 def test_camera_clears_stationary_after_three_fusions() -> None:
-    """Two fusions with the camera are not trusted, three are."""
+    """Three fusions with the camera are trusted, two are not."""
     t = track(v_rel=-20.0)
     t.fuse()
     t.fuse()
@@ -60,7 +60,7 @@ def test_camera_clears_stationary_after_three_fusions() -> None:
 
 
 def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
-    """A lead that brakes with 2 m/s^2 is seen doing so."""
+    """A lead that brakes with 2 m/s^2 is measured as such."""
     t = track(v_rel=0.0)
     for k in range(1, 61):
         step(t, -0.1 * k)
@@ -70,7 +70,7 @@ def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
 
 
 def test_relative_acceleration_is_limited() -> None:
-    """A jump of the speed counts 10 m/s^2 at the most, low-passed."""
+    """A jump of the speed counts at most 10 m/s^2, low-passed."""
     t = track(v_rel=0.0)
     step(t, -5.0)
     assert t.a_rel == pytest.approx(-10.0 * 0.1358, abs=0.01)
@@ -102,24 +102,26 @@ def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: fl
         (lead(d_rel=10.0, d_path=2.0, v_lat=-0.6), True),  # cuts in
         (lead(d_rel=57.0, d_path=2.0, v_lat=-99.0), False),  # too far for lateral speed to count
         (lead(d_rel=56.0, d_path=2.0, v_lat=-99.0), True),
-        (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # no more than 1 m is corrected
-        (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # leaving does not count
+        (lead(d_rel=10.0, d_path=2.6, v_lat=-5.0), False),  # at most 1 m is corrected
+        (lead(d_rel=10.0, d_path=1.4, v_lat=5.0), True),  # a lead that leaves does not count
     ],
 )
 def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> None:
-    """A lead is within 1.5 m of the path, with its lateral speed, and neither stands nor comes on."""
+    """A lead is within 1.5 m of the path, including its lateral speed, and is neither stationary nor
+    oncoming.
+    """
     assert cluster.is_lead(20.0) is expected
 
 
 @pytest.mark.parametrize("v_rel", [-20.0, -30.0])
 def test_one_moving_track_makes_the_vehicle_a_lead(v_rel: float) -> None:
-    """A vehicle stands, or comes on, only if all of its tracks do."""
+    """A vehicle is stationary or oncoming only if all of its tracks are."""
     assert not Cluster([track(v_rel=v_rel), track(v_rel=v_rel)]).is_lead(20.0)
     assert Cluster([track(v_rel=v_rel), track()]).is_lead(20.0)
 
 
 def test_second_lead_is_apart() -> None:
-    """Another vehicle is more than 8 m further, or more than 1 m/s different."""
+    """A second lead is more than 8 m further, or more than 1 m/s different."""
     first = lead(d_rel=40.0)
     assert not lead(d_rel=48.0).is_apart(first)
     assert lead(d_rel=48.1).is_apart(first)
@@ -127,7 +129,7 @@ def test_second_lead_is_apart() -> None:
 
 
 def test_clusters_are_what_lies_within_two_and_a_half() -> None:
-    """Tracks near each other are one vehicle; sideways counts double, speed counts as distance."""
+    """Tracks near each other are one vehicle; lateral distance counts double, speed counts as distance."""
     tracks = [
         track(d_rel=40.0),
         track(d_rel=42.0),
@@ -145,7 +147,7 @@ def test_clusters_reach_two_and_a_half(gap: float, vehicles: int) -> None:
 
 
 def test_centroids_keep_a_chain_apart() -> None:
-    """A long chain is not one vehicle: distances are to the middle of what is already merged."""
+    """A long chain is not one vehicle: distances are to the centre of the merged tracks."""
     clusters = cluster_tracks([track(d_rel=d) for d in (40.0, 42.0, 44.0, 46.0)])
     assert sorted(c.d_rel for c in clusters) == [41.0, 45.0]
 
@@ -156,7 +158,7 @@ def test_nothing_gives_no_clusters() -> None:
 
 
 def test_message_has_means_from_the_bumper_and_the_best_fusion() -> None:
-    """The lead's message holds the means of its tracks, its distance is less the radar's place."""
+    """The lead's message has the means of its tracks; its distance is reduced by the radar's position."""
     near, far = track(d_rel=40.0, v_rel=-1.0), track(d_rel=42.0, v_rel=-2.0)
     for _ in range(20):
         far.fuse()

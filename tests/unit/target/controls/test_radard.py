@@ -1,4 +1,4 @@
-"""radard against numbers measured on the original, and its choice of leads."""
+"""radard agrees with numbers measured on the original, and selects leads."""
 
 import pytest
 from selfdrive.car.params import CarParams
@@ -33,7 +33,7 @@ def point(track_id: int = 1, d_rel: float = 50.0, y_rel: float = 0.0, v_rel: flo
 
 
 class Drive:
-    """Radard on a straight road at 20 m/s."""
+    """radard on a straight road at 20 m/s."""
 
     def __init__(self, params: CarParams, **controls) -> None:
         self.radard = Radard(params, ModelFit())
@@ -46,7 +46,9 @@ class Drive:
 
 
 def test_lead_speed_starts_as_the_original(params: CarParams) -> None:
-    """No lead while the speeds of 0.1 s ago are unknown, then the filtered speeds of the original."""
+    """There is no lead while the speeds of 0.1 s ago are unknown; then come the original's filtered
+    speeds.
+    """
     radard = Radard(params, ModelFit())
     leads = []
     for v_ego, v_rel in zip(V_EGO, V_REL, strict=True):
@@ -60,12 +62,12 @@ def test_lead_speed_starts_as_the_original(params: CarParams) -> None:
 
 
 def test_distance_is_from_the_bumper(params: CarParams) -> None:
-    """What the radar measures is what is published, whatever the place of the camera."""
+    """The published distance is the radar's, whatever the camera's position."""
     assert Drive(params).see(point(d_rel=42.5)).lead_one.d_rel == pytest.approx(42.5)
 
 
 def test_closest_lead_and_the_next(params: CarParams) -> None:
-    """The closest vehicle on the path is first, the closest other one second; beside the path is nobody."""
+    """The closest vehicle on the path is first, the next one second; vehicles off the path do not count."""
     drive = Drive(params)
     state = drive.see(point(1, 70.0), point(2, 40.0), point(3, 43.0), point(4, 20.0, y_rel=3.0), cycles=3)
     assert state.lead_one.d_rel == pytest.approx(40.0)
@@ -73,14 +75,14 @@ def test_closest_lead_and_the_next(params: CarParams) -> None:
 
 
 def test_path_moved_away_loses_the_lead(params: CarParams) -> None:
-    """A path more than 1.5 m beside the lead makes it nobody's lead."""
+    """A path more than 1.5 m from the vehicle loses the lead."""
     drive = Drive(params)
     assert drive.see(point(), cycles=3).lead_one.status
     assert not drive.see(point(), vision=model(path=2.0), cycles=3).lead_one.status
 
 
 def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None:
-    """While not in control, or while the driver steers, objects are placed beside the wheel's circle."""
+    """Out of control, or while the driver steers, objects are compared with the steering circle."""
     straight = {"steering_angle": 0.5}
     assert Drive(params, **straight).see(point(), cycles=3).lead_one.status
     assert not Drive(params, active=False, **straight).see(point(), cycles=3).lead_one.status
@@ -89,7 +91,7 @@ def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None
 
 @pytest.mark.parametrize("steered", [False, True])
 def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, steered: bool) -> None:
-    """A lead that moves to the side has a lateral speed, unless the driver steers."""
+    """A lead that moves sideways has a lateral speed, unless the driver steers."""
     drive = Drive(params, steer_override=steered)
     for k in range(20):
         lead = drive.see(point(y_rel=0.05 * k)).lead_one
@@ -97,7 +99,7 @@ def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, 
 
 
 def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
-    """A standing object counts once the camera has seen it three times at the same place."""
+    """A stationary object counts once the camera has seen it three times at the same place."""
     drive = Drive(params)
     drive.see(point(9, 90.0), cycles=4)  # the speed history fills
     standing = point(v_rel=-20.0)
@@ -118,7 +120,7 @@ def test_twenty_fusions_make_a_lead_good_for_warnings(params: CarParams) -> None
 
 
 def test_a_lost_track_is_forgotten(params: CarParams) -> None:
-    """A track that is missing for a cycle starts anew."""
+    """A track that is missing for a cycle starts again."""
     drive = Drive(params)
     drive.see(point(), cycles=30)
     assert not drive.see().lead_one.status

@@ -1,8 +1,8 @@
 """What a step of the radar's relative speed does to the lead's history and to the collision warning.
 
-In the original a distance that jumps by more than 2.5 m, or a lead that was gone, begins everything anew. A
-relative speed that jumps begins nothing anew, unless the plan cannot follow it. These rules were measured on
-openpilot v0.4.2; how many cycles they take here follows from them and from this controller.
+In the original, a distance jump of more than 2.5 m, or a lost lead, resets everything. A jump of the relative
+speed resets nothing, unless the plan cannot follow it. These rules were measured on openpilot v0.4.2; the
+numbers of cycles here follow from them and from this controller.
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ STRAIGHT = [PathData((y,) * 50, 1.0, 1.0) for y in (0.0, 1.85, -1.85)]
 
 
 class Cycle(NamedTuple):
-    """What was found in one cycle of the radar."""
+    """The findings of one radar cycle."""
 
     state: RadarState
     fusions: int
@@ -38,9 +38,9 @@ class Cycle(NamedTuple):
 
 
 def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float = 0.0) -> list[Cycle]:
-    """Radard and planner, not engaged, behind a lead that the radar reports at these relative speeds.
+    """radard and planner, not engaged, behind a lead with these relative speeds from the radar.
 
-    `jump` is added to its distance from the first cycle on in which the speed is another.
+    `jump` is added to its distance from the first cycle with another speed.
     """
     radard, planner = Radard(params, ModelFit()), Planner(params, ModelFit())
     car, controls = CarState(v_ego=V_EGO), ControlsState(v_ego=V_EGO, active=True)
@@ -59,7 +59,7 @@ def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float 
 
 
 def test_nothing_begins_anew(params: CarParams) -> None:
-    """The track goes on, its filter follows in its own time, and the plan's lead is the same one."""
+    """The track continues, its filter converges, and the plan keeps its lead."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert not any(cycle.new_lead for cycle in found[10:])
     before, after, settled = (found[k].state.lead_one for k in (59, 60, 99))
@@ -69,7 +69,7 @@ def test_nothing_begins_anew(params: CarParams) -> None:
 
 
 def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
-    """With more than 10 m/s between camera and radar nothing is fused; what was counted stays counted."""
+    """A difference of more than 10 m/s between camera and radar stops fusion; counted fusions stay."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert found[59].fusions >= 20 and found[59].state.lead_one.fcw
     assert found[99].fusions == found[59].fusions and found[99].state.lead_one.fcw
@@ -77,22 +77,25 @@ def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
 
 
 def test_a_warning_needs_half_a_second_after_the_step(params: CarParams) -> None:
-    """A short time to collision must last ten cycles from the step on, and the other counts go on."""
+    """A short time to collision must last ten cycles after the step, and the other counts continue."""
     found = drive(params, [-2.0] * 80 + [-10.0] * 40, gap=30.0)
     assert not any(cycle.new_lead for cycle in found[10:])
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [89]
 
 
 def test_a_step_that_the_plan_cannot_follow_begins_anew(params: CarParams) -> None:
-    """A solution that goes 50 m through the lead is thrown away, the next lead is a new one, and what takes
-    longest to count, 3 s without blinker, is counted from there."""
+    """A solution that goes 50 m through the lead is discarded, the next lead is a new one, and the longest
+    count, 3 s without blinker, restarts there.
+    """
     found = drive(params, [-2.0] * 80 + [-20.0] * 80, gap=50.0)
     assert [k for k, cycle in enumerate(found) if cycle.new_lead and k >= 80] == [81]
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [81 + 60]
 
 
 def test_a_jump_of_the_distance_begins_anew(params: CarParams) -> None:
-    """More than 2.5 m at once: another lead, whose 30 cycles in sight and 3 s without blinker count anew."""
+    """A jump of more than 2.5 m means another lead, and its 30 cycles in sight and 3 s without blinker
+    restart.
+    """
     found = drive(params, [-2.0] * 80 + [-18.0] * 40, jump=-3.0)
     assert found[80].new_lead
     assert not any(cycle.fcw for cycle in found[: 80 + 30])

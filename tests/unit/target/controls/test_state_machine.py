@@ -1,4 +1,4 @@
-"""Control states and the events that move them."""
+"""Control states and the events that change them."""
 
 import pytest
 from selfdrive.controls.lib import events as ev
@@ -54,7 +54,7 @@ def test_engaging(events: tuple[Event, ...], state: str) -> None:
 
 
 def test_refusal_says_why() -> None:
-    """Each reason that refuses entry is told."""
+    """Each reason that refuses entry is shown."""
     assert Drive((ENGAGE, DOOR, CAN)).alerts.active == ("door_open_no_entry", "can_error_no_entry")
 
 
@@ -70,14 +70,14 @@ def test_refusal_says_why() -> None:
     ],
 )
 def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
-    """Driver and faults disengage at once, soft reasons with notice; the reason is told."""
+    """Driver and faults disengage at once, soft reasons after a notice; the reason is shown."""
     drive = Drive(first, (event,))
     assert drive.state == state
     assert alert in drive.alerts.active
 
 
 def test_pre_enabled_ends_with_the_gas_pedal() -> None:
-    """Actuators are taken over only once the gas pedal is released."""
+    """Actuators are controlled only once the gas pedal is released."""
     drive = Drive((ENGAGE, GAS), (GAS,))
     assert drive.machine.enabled and not drive.machine.active
     drive.step()
@@ -85,12 +85,12 @@ def test_pre_enabled_ends_with_the_gas_pedal() -> None:
 
 
 def test_driver_beats_fault() -> None:
-    """When the driver takes over in the cycle of a fault, it is the driver's doing."""
+    """If the driver disengages in the cycle of a fault, it counts as the driver's action."""
     assert Drive((ENGAGE,), (CAN, BRAKE)).alerts.active[0] == "disable"
 
 
 def test_soft_disabling_is_active_for_300_cycles() -> None:
-    """The car is still controlled for 3 s, then no more."""
+    """The car is controlled for another 3 s and then no more."""
     drive = Drive((ENGAGE,), (DOOR,))
     active = []
     for _ in range(310):
@@ -100,7 +100,7 @@ def test_soft_disabling_is_active_for_300_cycles() -> None:
 
 
 def test_soft_disabling_ends_with_its_reason() -> None:
-    """Once the reason is gone the car is controlled on, and a next time has its full 3 s."""
+    """Once the reason is gone the car stays controlled, and the next soft disabling has its full 3 s."""
     drive = Drive((ENGAGE,), (DOOR,), (DOOR,), ())
     assert drive.state == "enabled"
     for _ in range(300):

@@ -6,7 +6,7 @@ from selfdrive.controls.lib.vehicle_model import VehicleModel
 
 
 def test_standing_it_is_geometry(params: CarParams) -> None:
-    """Near standstill curvature is road-wheel angle over wheelbase."""
+    """Near standstill, curvature is road-wheel angle over wheelbase."""
     assert VehicleModel(params).curvature(1.3, 0.0) == pytest.approx(0.1 / 2.7)
 
 
@@ -18,6 +18,6 @@ def test_understeer_needs_more_angle_when_fast(params: CarParams) -> None:
 
 
 def test_there_and_back(params: CarParams) -> None:
-    """Angle to curvature and back gives the angle."""
+    """Converting an angle to curvature and back returns the angle."""
     model = VehicleModel(params)
     assert model.steering_angle(model.curvature(0.3, 25.0), 25.0) == pytest.approx(0.3)

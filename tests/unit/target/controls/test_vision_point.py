@@ -1,4 +1,4 @@
-"""The camera's lead against radar tracks."""
+"""Matching the camera's lead with radar tracks."""
 
 import numpy as np
 import pytest
@@ -36,13 +36,13 @@ def test_match_needs_place_and_speed(other: Track, matches: bool) -> None:
 
 
 def test_the_best_of_several() -> None:
-    """The closest in place and speed together is the camera's lead."""
+    """The track closest in place and speed together is the camera's lead."""
     tracks = [track(d_rel=52.0), track(d_rel=51.0), track(d_rel=50.0, v_rel=3.0)]
     assert seen().best_match(tracks, ZERO) is tracks[1]
 
 
 def test_it_is_taken_to_be_on_the_path() -> None:
-    """In a bend the camera's lead is looked for on the path."""
+    """In a bend, the camera's lead is searched on the path."""
     bend = (0.0, 0.001, 0.0, 0.0)
     off, on = track(y_rel=0.0), track(y_rel=2.5)
     assert seen().best_match([off, on], bend) is on
@@ -69,7 +69,7 @@ def test_an_unsure_lead_matches_nothing() -> None:
 
 
 def test_becoming_sure_starts_at_the_seen_distance() -> None:
-    """The first sure distance is taken as it is, with no speed from before."""
+    """The first certain distance is used directly, without an earlier speed."""
     point = seen(d_rel=80.0)
     point.update(LeadVision(30.0, 0.5, 0.1))
     point.update(LeadVision(30.0, 0.9, 0.1))

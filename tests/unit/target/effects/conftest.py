@@ -1,4 +1,4 @@
-"""A camera, moments of a drive, and a plain road to put effects on."""
+"""A camera, moments of a drive, and a plain road as input for effects."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from selfdrive.common.camera_model import CameraModel
 
 
 class Moment(NamedTuple):
-    """What effects know of the world."""
+    """What effects know about the world."""
 
     t: float
     position: float
@@ -33,7 +33,7 @@ def moment():
 
 @pytest.fixture(scope="session")
 def road(camera):
-    """Grey asphalt with two white marks under a bright sky, read-only as frames of a library are."""
+    """Grey asphalt with two white marks under a bright sky, read-only like frames of a library."""
     picture = np.full((camera.rows, camera.width), 95, dtype=np.uint8)
     horizon = round(camera.horizon)
     picture[:horizon] = 205

@@ -1,4 +1,4 @@
-"""Fog after Koschmieder, with the camera's depth."""
+"""Fog by Koschmieder's law, with the camera's depth."""
 
 import numpy as np
 import pytest
@@ -16,14 +16,14 @@ def test_way_of_light_is_the_distance_to_the_road(model):
     for x in (5.0, 20.0, 60.0):
         row, column = model.row(x), model.column(x, 0.0)
         above, share = int(row), row - int(row)
-        # Below the horizon 1 / way is linear in the row, nearly.
+        # Below the horizon 1 / distance is almost linear in the row.
         inverse = (1.0 - share) / way[above, round(column)] + share / way[above + 1, round(column)]
         assert 1.0 / inverse == pytest.approx(np.hypot(x, model.height), rel=2e-3)
 
 
 @pytest.mark.parametrize("visibility", [20.0, 40.0])
 def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
-    """Of a mark's contrast 5 % is left at the visibility, and its root at half of it."""
+    """At the visibility, 5 % of a mark's contrast is left; at half of it, the root of 5 %."""
     dark = np.full((camera.rows, camera.width), 50, np.uint8)
     dark[:170] = 200
     bright = dark.copy()
@@ -39,7 +39,7 @@ def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
 
 
 def test_fog_follows_the_law_in_every_row(camera, moment, road):
-    """Every pixel is its light, thinned, and airlight; above the horizon, at last, there is only airlight."""
+    """Every pixel is its attenuated light plus airlight; high above the horizon only airlight remains."""
     visibility = 60.0
     seen = Fog(visibility, 0, camera).apply(road, moment()).astype(float)
     kept = 0.05 ** (ways(camera) / visibility)

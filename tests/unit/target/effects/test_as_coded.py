@@ -1,4 +1,4 @@
-"""Rain, fog, snow and occlusion as coded: how much of what is drawn where, and anew each time."""
+"""Rain, fog, snow and occlusion as coded: how much they draw, where, and that each frame is drawn again."""
 
 import cv2
 import numpy as np
@@ -16,27 +16,31 @@ def black(camera):
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_each_picture_is_drawn_anew(effect, camera, moment, road):
-    """The same picture number gives the same picture in another run, another one nothing of it."""
+    """Equal frame numbers give the same image in another run; other numbers give unrelated ones."""
     one, other = effect(7, 3, camera), effect(7, 3, camera)
     later = other.apply(road, moment(5))
     assert np.array_equal(one.apply(road, moment(5)), later)
     change = [np.abs(one.apply(road, moment(k)).astype(int) - road) for k in (5, 6)]
     together = np.corrcoef(change[0].ravel(), change[1].ravel())[0, 1]
-    assert together < 0.97  # what haze has in common is that all contrast is less
+    assert together < 0.97  # haze lowers all contrast alike
 
 
 @pytest.mark.parametrize("level", [2, 10])
 def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, level):
-    """1,000 streaks of 32 pixels for each level on four times the picture, brighter with each pass."""
+    """There are 1,000 streaks of 32 pixels for each level on four times the image area, brighter with each
+    overlap.
+    """
     rain = CodedRain(level, 3, camera).apply(black, moment())
     assert rain[rain > 0].min() == round(255 * 0.11)
-    expected = 1000 * level * 31 / (4 * black.size)  # along a streak each row has a pixel
+    expected = 1000 * level * 31 / (4 * black.size)  # a streak has one pixel in each row
     assert -np.log(1.0 - (rain > 0).mean()) == pytest.approx(expected, rel=0.05)
 
 
 @pytest.mark.parametrize("level", [3, 10])
 def test_fog_is_white_pixels_blurred(camera, moment, black, level):
-    """15,000 for each level, some in the same place; the road's share of the light is 0.9 - 0.05 t."""
+    """There are 15,000 for each level, some at the same place; the road's share of the light is 0.9
+    - 0.05 t.
+    """
     fog = CodedFog(level, 3, camera).apply(black, moment())
     covered = 1.0 - np.exp(-15_000 * level / black.size)
     assert fog.mean() == pytest.approx(255 * covered, rel=0.02)
@@ -46,14 +50,14 @@ def test_fog_is_white_pixels_blurred(camera, moment, black, level):
 
 @pytest.mark.parametrize("level", [1, 10])
 def test_snow_is_fog_and_blocks(camera, moment, black, level):
-    """250 blocks of 2 x 2 for each level; blurring keeps their light."""
+    """There are 250 blocks of 2 x 2 for each level; blurring preserves their light."""
     snow, fog = (effect(level, 3, camera).apply(black, moment()) for effect in (CodedSnow, CodedFog))
     blocks = (snow.mean() - fog.mean()) * black.size / (4 * 255)
     assert blocks == pytest.approx(250 * level, rel=0.15)
 
 
 def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
-    """Black blobs in the lower half, gray up to 150 where they end, the road untouched beyond."""
+    """Black blobs lie in the lower half, with a rim of up to grey 150, and the road beyond is unchanged."""
     seen = CodedOcclusion(10, 3, camera).apply(road, moment())
     changed = seen != road
     assert changed.any() and not changed[: camera.rows // 2 - 60].any()
@@ -61,7 +65,7 @@ def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
 
 
 def test_a_flake_is_a_blurred_block():
-    """The same levels as in the middle of a large picture, at any layer's blur."""
+    """A flake has the same levels as a blurred block in a large image, for any layer's blur."""
     block = np.zeros((40, 40), np.uint8)
     block[19:21, 19:21] = 255
     for layer in range(1, 11):
@@ -72,7 +76,7 @@ def test_a_flake_is_a_blurred_block():
 
 
 def test_gaussians_end_at_two_sigma():
-    """Beyond there is nothing of a point's light."""
+    """A point's light ends at two sigma."""
     point = np.zeros((41, 41), np.float32)
     point[20, 20] = 255.0
     for sigma, reach in ((0.6, 2), (1.5, 3), (7.0, 14)):

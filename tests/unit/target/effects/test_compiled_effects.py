@@ -1,4 +1,4 @@
-"""Effects in C: the bits of the Python code, at any level, of any size, whole and in part."""
+"""Effects in C have the Python code's bits, at any level and size, whole and in part."""
 
 import shutil
 import subprocess
@@ -60,7 +60,7 @@ def folder(tmp_path_factory):
 
 
 def compile_effects(folder, *options):
-    """Compile what draws effects into a folder."""
+    """Compile the effects' drawing code into a folder."""
     for source in C_SOURCES:
         made = folder / compiled.file_name(source)
         words = [*compile_helpers.compiler(), *options, source, "-o", made, *compile_helpers.OPTIONS]
@@ -71,7 +71,7 @@ def compile_effects(folder, *options):
 
 @pytest.fixture
 def both(folder):
-    """An effect in Python and in C. The latter is skipped where OpenCV calculates in another way."""
+    """An effect in Python and in C. The latter is skipped if OpenCV computes differently."""
 
     def made(kind, amount, seed, camera):
         compiled.use(None)
@@ -87,7 +87,7 @@ def both(folder):
 
 
 def pictures(random, shape):
-    """Noise, something smooth, and black, white and grey."""
+    """Noise, a smooth image, and black, white and grey."""
     noise = random.integers(0, 256, shape, np.uint8)
     return [
         noise,
@@ -99,7 +99,9 @@ def pictures(random, shape):
 @pytest.mark.parametrize("size", CAMERAS)
 @pytest.mark.parametrize("kind", COMPILED)
 def test_compiled_effects_have_the_same_bits(both, kind, size):
-    """The whole picture and any region of it, mild and strong, with any seed, early, late, slow and fast."""
+    """The bits agree for the whole image and any region, mild and strong, with any seed, early, late, slow
+    and fast.
+    """
     camera, random = CAMERAS[size], np.random.default_rng(7)
     amounts = LEVELS[kind]
     for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
@@ -119,7 +121,7 @@ def test_compiled_effects_have_the_same_bits(both, kind, size):
 
 @pytest.mark.parametrize("kind", [effects.CodedOcclusion, effects.PaperRain, effects.Rain])
 def test_processors_without_wide_vectors_draw_the_same(folder, tmp_path, camera, moment, kind):
-    """The bits do not depend on the instructions that a processor has."""
+    """The bits do not depend on the processor's instruction set."""
     drawn = []
     noise = np.random.default_rng(2).integers(0, 256, (camera.rows, camera.width), np.uint8)
     for libraries in (folder, compile_effects(tmp_path, "-DIS_FAST=0")):
@@ -134,7 +136,7 @@ def test_processors_without_wide_vectors_draw_the_same(folder, tmp_path, camera,
 
 @pytest.mark.parametrize("speed", [np.float64(20.0), np.nan, np.inf, -5.0, 1e30])
 def test_impossible_speeds_are_drawn_alike(both, camera, speed):
-    """Also what is no number, as a fault may have it."""
+    """Impossible speeds give the same drawing, including NaN, which a fault may cause."""
     plain, fast = both(effects.Snow, 10, 1, camera)
     picture = np.full((camera.rows, camera.width), 90, np.uint8)
     scene = Moment(3.0, 77.0, speed)
@@ -144,7 +146,7 @@ def test_impossible_speeds_are_drawn_alike(both, camera, speed):
 
 @pytest.mark.parametrize(("sigma", "size"), [(0.5, 0), (1.2, 0), (5.0, 0), (7.0, 29), (0.0, 3), (0.0, 31)])
 def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
-    """Of pictures of any size, as small as the kernel and smaller, and of cut and turned ones."""
+    """The bits agree for images of any size, even smaller than the kernel, and for cut and flipped ones."""
     compiled.use(folder)
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
     compiled.use(None)
@@ -157,7 +159,9 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
 
 
 def test_droplets_are_numpys_whatever_was_drawn_before(folder):
-    """Numbers are drawn from a new generator, and from one with half a number left; few and many."""
+    """The drawn numbers are numpy's, from a new generator and from one with half a number left; few
+    and many.
+    """
     compiled.use(folder)
     fast, by = compiled_scattered.build_scattered()
     compiled.use(None)
@@ -173,7 +177,7 @@ def test_droplets_are_numpys_whatever_was_drawn_before(folder):
 
 @pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
 def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, source):
-    """Where any file that the C stands for has a fault there is no library."""
+    """If any Python file that the C code replaces has a fault, the library is not used."""
     compiled.use(folder)
     assert compiled.library(source) is not None
     named = compiled.stands_for(source.read_bytes())
@@ -189,7 +193,7 @@ def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, sour
 
 
 def test_another_opencv_is_left_alone(folder, monkeypatch):
-    """Where it has other bits than the compiled code, Python calls it, and no library is named."""
+    """If OpenCV has other bits than the compiled code, Python calls OpenCV, and no library is named."""
     compiled.use(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
@@ -209,7 +213,7 @@ def test_another_opencv_is_left_alone(folder, monkeypatch):
 
 
 def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
-    """With these NumPy calculates in double precision."""
+    """With numpy's numbers in the camera, numpy computes in double precision."""
     compiled.use(folder)
     camera = replace(CameraModel(), cx=np.float64(317.9))
     assert precipitation.build_parts(camera)[1] == ""
@@ -226,12 +230,12 @@ def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
 def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    """Likewise, seen by the detector as coded."""
+    """The same holds for the detector as coded."""
     same_runs(folder, tmp_path, monkeypatch, kind, AS_CODED)
 
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
-    """Drive twice through weather of middle strength."""
+    """Run twice through weather of medium strength."""
     look, scenario = PictureCamera.look, load_scenario(SCENARIO)
     amount = LEVELS[kind][4]
 

@@ -1,4 +1,4 @@
-"""What all effects have in common: pure, seeded, within grey levels, and clear about wrong input."""
+"""Properties of all effects: pure, seeded, within grey levels, and strict about input."""
 
 from dataclasses import replace
 from functools import cache
@@ -33,21 +33,21 @@ every = pytest.mark.parametrize("effect", ALL)
 
 
 def fresh(effect, camera, seed=3):
-    """The effect at its highest level, made anew."""
+    """A new instance of the effect at its highest level."""
     return effect(LEVELS[effect][-1], seed, camera)
 
 
-strongest = cache(fresh)  # for tests that may share one, as the pictures of a run do
+strongest = cache(fresh)  # for tests that may share one, like the frames of a run
 
 
 def test_levels_name_every_exported_effect():
-    """Pages and benchmarks, which go by levels, leave no effect out."""
+    """Pages and benchmarks use levels, so every exported effect has them."""
     assert {effect.__name__ for effect in LEVELS} == set(effects.__all__)
 
 
 @every
 def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
-    """A picture depends on its moment, not on the pictures before it."""
+    """An image depends on its moment, not on earlier images."""
     one, other = strongest(effect, camera), fresh(effect, camera)
     forwards = [one.apply(road, moment(number)) for number in range(4)]
     backwards = [other.apply(road, moment(number)) for number in reversed(range(4))][::-1]
@@ -57,7 +57,7 @@ def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
 
 @every
 def test_input_stays_and_output_is_new(effect, camera, moment, road):
-    """A read-only picture is left as it is; the result is a picture of its own, of the same type and size."""
+    """A read-only image stays unchanged; the result is a new image of the same type and size."""
     before = road.copy()
     after = strongest(effect, camera).apply(road, moment())
     assert after.dtype == np.uint8 and after.shape == road.shape
@@ -67,7 +67,7 @@ def test_input_stays_and_output_is_new(effect, camera, moment, road):
 
 @every
 def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
-    """A result once handed out is never drawn over."""
+    """A returned result is never overwritten."""
     made = strongest(effect, camera)
     first = made.apply(road, moment())
     kept = first.copy()
@@ -83,7 +83,7 @@ CAMERAS = [
 
 
 def regions(shape, random):
-    """Any rows and columns, single pixels and the four corners among them."""
+    """Any rows and columns, including single pixels and the four corners."""
     for _ in range(6):
         top, left = (int(random.integers(size)) for size in shape)
         bottom, right = random.integers((top + 1, left + 1), (shape[0] + 1, shape[1] + 1)).tolist()
@@ -96,8 +96,7 @@ def regions(shape, random):
 @pytest.mark.parametrize("model", CAMERAS, ids=["640x480", "352x264", "333x251"])
 @every
 def test_a_part_is_that_of_the_whole(effect, model, moment):
-    """What is cut out of a changed picture, anywhere, has the bits that all of it has there; also where two
-    effects follow each other."""
+    """Any region of a changed image has the same bits as in the whole, even after two effects."""
     random = np.random.default_rng(7)
     noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
     for amount in (LEVELS[effect][0], LEVELS[effect][-1]):
@@ -115,21 +114,21 @@ def test_a_part_is_that_of_the_whole(effect, model, moment):
 
 @pytest.mark.parametrize("effect", RANDOM)
 def test_seed_decides_what_is_random(effect, camera, moment, road):
-    """Another seed gives another picture, also where two differ only beyond 32 bits."""
+    """Another seed gives another image, even if two seeds differ only beyond 32 bits."""
     one, other = (fresh(effect, camera, seed).apply(road, moment()) for seed in (1, 1 + 2**32))
     assert not np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("effect", STILL)
 def test_still_effects_do_not_move(effect, camera, moment, road):
-    """What is fixed to the lens, or to nothing, is the same at any moment and speed."""
+    """Effects fixed to the lens, or without motion, are the same at any moment and speed."""
     made = strongest(effect, camera)
     assert np.array_equal(made.apply(road, moment()), made.apply(road, moment(17, speed=5.0)))
 
 
 @pytest.mark.parametrize("effect", MOVING)
 def test_moving_effects_move(effect, camera, moment, road):
-    """The next picture is another one."""
+    """The next image differs."""
     made = strongest(effect, camera)
     assert not np.array_equal(made.apply(road, moment()), made.apply(road, moment(1)))
 
@@ -137,7 +136,7 @@ def test_moving_effects_move(effect, camera, moment, road):
 @every
 @pytest.mark.parametrize("level", [0, 255])
 def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, level):
-    """Levels are limited, never carried over: where black turns bright, white does not turn dark."""
+    """Levels are limited and do not wrap: where black turns bright, white does not turn dark."""
     flat = np.full((camera.rows, camera.width), level, dtype=np.uint8)
     after = strongest(effect, camera).apply(flat, moment()).astype(int)
     grey = strongest(effect, camera).apply(np.full_like(flat, 128), moment()).astype(int)
@@ -147,7 +146,7 @@ def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, leve
 
 @every
 def test_bigger_frames_work(effect, moment):
-    """An effect fits the camera it is made for."""
+    """An effect works for the size of its camera."""
     picture = np.full((HD.rows, HD.width), 95, dtype=np.uint8)
     assert strongest(effect, HD).apply(picture, moment()).shape == picture.shape
 
@@ -162,7 +161,7 @@ def test_odd_sizes_work(effect, camera, moment):
 
 @every
 def test_wrong_amounts_are_refused(effect, camera):
-    """Beyond the limits, or no number: an error that names effect, amount and limits."""
+    """An amount beyond the limits, or NaN, is an error that names effect, amount and limits."""
     for amount in (effect.LEAST - 1.0, 2.0 * effect.MOST + 1.0, nan, inf):
         with pytest.raises(ConfigError, match=f"{effect.__name__}: amount .*, expected .*{effect.MOST:g}"):
             effect(amount, 0, camera)
@@ -170,7 +169,7 @@ def test_wrong_amounts_are_refused(effect, camera):
 
 @pytest.mark.parametrize("effect", [effects.PaperOcclusion, effects.AveragingBlur])
 def test_counted_amounts_are_whole(effect, camera):
-    """There is no half blob and no half pixel."""
+    """A number of blobs or pixels must be whole."""
     with pytest.raises(ConfigError, match=r"amount 2\.5, expected a whole number"):
         effect(2.5, 0, camera)
 
@@ -199,7 +198,7 @@ def test_wrong_seeds_are_refused(effect, camera, seed):
     ],
 )
 def test_pictures_of_another_camera_are_refused(camera, moment, picture):
-    """Type and size must be those of the camera's grey pictures; the error says both."""
+    """Type and size must be those of the camera's grey frames; the error gives both."""
     with pytest.raises(
         ConfigError, match=r"Brightness: a picture of .* expected uint8 and shape \(480, 640\)"
     ):
@@ -208,7 +207,7 @@ def test_pictures_of_another_camera_are_refused(camera, moment, picture):
 
 @every
 def test_severity_grows_with_the_level(effect, camera, moment, road):
-    """A picture of a stronger level is further from the clean one."""
+    """An image of a stronger level is further from the clean one."""
     amounts = LEVELS[effect]
     chosen = sorted({0, len(amounts) // 2, len(amounts) - 1})
     errors = []

@@ -1,4 +1,4 @@
-"""Effects stay out of runs that have no fault."""
+"""Runs without a fault do not import effects."""
 
 import subprocess
 import sys
@@ -14,7 +14,7 @@ print([name for name in sys.modules if "sim.effects" in name])
 
 
 def test_pristine_runs_do_not_import_effects():
-    """Neither the simulator nor cameras nor detectors load the package."""
+    """The simulator, cameras and detectors do not import the package."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], cwd=TARGET, capture_output=True, text=True, check=True
     )

@@ -7,7 +7,7 @@ from selfdrive.sim.effects import LensMud
 
 @pytest.mark.parametrize("coverage", [0.0, 0.1, 0.5])
 def test_mud_covers_its_share(coverage, camera, moment):
-    """The share of light that is lost, but for mud's own level, is the amount."""
+    """The share of light lost, apart from the mud's own level, is the amount."""
     mud = LensMud(coverage, 0, camera)
     flat = np.full((camera.rows, camera.width), 255, np.uint8)
     dark = np.zeros_like(flat)
@@ -16,6 +16,6 @@ def test_mud_covers_its_share(coverage, camera, moment):
 
 
 def test_more_mud_holds_all_of_less(camera, moment):
-    """Levels of one seed grow out of the same clods."""
+    """A higher level of the same seed contains the mud of the lower ones."""
     less, more = (LensMud(coverage, 0, camera).ready()._open.astype(int) for coverage in (0.1, 0.4))
     assert (more <= less).all()

@@ -7,7 +7,7 @@ from selfdrive.sim.effects.light import level_rays
 
 
 def test_rays_meet_the_horizon(camera):
-    """Rays of the horizon's row are level, those of a road's row fall by height over distance."""
+    """Rays of the horizon's row are level; those of a road's row fall by height over distance."""
     rays = level_rays(camera)
     fall = rays[:, round(camera.cx), 1] / rays[:, round(camera.cx), 2]
     assert np.interp(camera.horizon, np.arange(camera.rows), fall) == pytest.approx(0.0, abs=1e-4)
@@ -33,7 +33,7 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
 
 
 def test_noise_is_that_of_electrons(camera, moment):
-    """Mean and spread follow from electrons and reading noise, and shrink where light is plenty."""
+    """Mean and spread follow from electrons and read noise, and shrink in bright light."""
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     for lux in (100000.0, 100.0, 20.0):
         seen = LowLight(lux, 0, camera).apply(flat, moment()).astype(float)
@@ -45,14 +45,14 @@ def test_noise_is_that_of_electrons(camera, moment):
 
 
 def test_darkness_comes_where_gain_ends(camera, moment, road):
-    """Down to the largest gain the picture keeps its brightness; below, it fades with the light."""
+    """Down to the largest gain the image keeps its brightness; below, it fades with the light."""
     means = [LowLight(lux, 0, camera).apply(road, moment()).mean() for lux in (300.0, 15.0, 5.0, 0.5)]
     assert means[0] == pytest.approx(road.mean(), abs=1.0) and means[1] == pytest.approx(road.mean(), abs=3.0)
     assert means[2] < 0.6 * means[1] and means[3] < 0.2 * means[1]
 
 
 def test_noise_is_new_in_every_picture(camera, moment):
-    """Noise of two moments has nothing in common."""
+    """The noise of two moments is independent."""
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     low = LowLight(20.0, 0, camera)
     first, second = (low.apply(flat, moment(number)).astype(float).ravel() for number in (0, 1))

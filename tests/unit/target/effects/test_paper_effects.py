@@ -14,14 +14,14 @@ def black(camera):
 @pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
 @pytest.mark.parametrize(("effect", "each"), [(PaperRain, 1000), (PaperSnow, 100)])
 def test_thickness_counts(effect, each, thickness, camera):
-    """1,000 streaks, 100 blocks for each thickness, whatever the layers: 10,000 streaks at 10."""
+    """There are 1,000 streaks and 100 blocks for each thickness, over any layers: 10,000 streaks at 10."""
     made = effect(thickness, 0, camera)
     assert {PaperRain: STREAKS, PaperSnow: BLOCKS}[effect] == each
     assert sum(made._count(each, layer, 5) for layer in range(5)) == each * thickness
 
 
 def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
-    """As many separate streaks are seen as were asked for, but for those that touch."""
+    """The number of separate streaks is the requested one, except for those that touch."""
     cv2 = pytest.importorskip("cv2")
     monkeypatch.setattr("selfdrive.sim.effects.paper_weather.STREAKS", 100)
     picture = PaperRain(1, 0, camera).apply(black(camera), moment())
@@ -31,7 +31,7 @@ def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_falling_keeps_what_falls(effect, camera, moment):
-    """Who leaves the screen enters it again: a layer's levels are always the same ones."""
+    """A drop that leaves the image enters it again, so a layer's levels stay the same."""
     made = effect(3, 0, camera).ready()
     everything = whole((camera.rows, camera.width))
     for tile in made._tiles:
@@ -41,7 +41,7 @@ def test_falling_keeps_what_falls(effect, camera, moment):
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_drops_fall(effect, camera, moment):
-    """From picture to picture every layer moves down, near ones faster, by less than half the screen."""
+    """From frame to frame every layer moves down, near ones faster, by less than half the image."""
     made = effect(1, 0, camera).ready()
     ways = []
     for tile in made._tiles:
@@ -59,13 +59,13 @@ def test_drops_fall(effect, camera, moment):
 
 
 def test_more_rain_holds_all_of_less(camera, moment):
-    """Levels of one seed differ by what is added, not by all."""
+    """A higher level of one seed only adds drops."""
     less, more = (PaperSnow(level, 0, camera)._blocks(np.random.default_rng(1), 0) for level in (2, 6))
     assert (more >= less).all() and more.sum() > 2 * less.sum()
 
 
 def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
-    """Where no streak is, contrast is 0.75 of the picture's at thickness 1, and 0.65 at 10."""
+    """Without a streak, contrast is 0.75 of the frame's at thickness 1, and 0.65 at 10."""
     for thickness, alpha in ((1, 0.75), (10, 0.65)):
         made = PaperRain(thickness, 0, camera)
         flat = np.full_like(road, 100)
@@ -73,7 +73,7 @@ def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
 
 
 def test_fog_reduces_contrast_evenly(camera, moment):
-    """Two levels 100 apart are 90 apart at thickness 1 and 40 at 10: the noise is the same for both."""
+    """Two levels 100 apart are 90 apart at thickness 1 and 40 at 10, with the same noise for both."""
     for thickness, alpha in ((1, 0.9), (10, 0.4)):
         made = PaperFog(thickness, 0, camera)
         dark, bright = (
@@ -84,7 +84,7 @@ def test_fog_reduces_contrast_evenly(camera, moment):
 
 
 def test_fog_noise_is_uniform_and_blurred(camera, moment):
-    """All pixels of fog 10 carry noise of 0 to 255, whose mean remains and whose grain is blurred away."""
+    """All pixels of fog 10 have noise of 0 to 255; its mean remains and its grain is blurred."""
     fog = PaperFog(10, 0, camera).apply(black(camera), moment()).astype(float)
     assert abs(fog.mean() - 127.5) < 1.0
     # 73.6 / (2 * sqrt(pi) * sigma) for sigma = 7
@@ -93,7 +93,9 @@ def test_fog_noise_is_uniform_and_blurred(camera, moment):
 
 @pytest.mark.parametrize("blobs", [1, 4, 10])
 def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
-    """No more dark blobs than asked for, of 5 to 50 pixels' radius, and all of fewer are among more."""
+    """There are at most as many dark blobs as requested, of 5 to 50 pixels' radius, and more blobs include
+    the fewer.
+    """
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     share = 1.0 - PaperOcclusion(blobs, 4, camera).apply(white, moment()).astype(float) / 200.0
     area = share.sum() / 0.9
@@ -103,7 +105,7 @@ def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
 
 
 def test_blobs_lie_on_the_road(camera, moment):
-    """No blob's middle is above the horizon: what it hides counts."""
+    """No blob's middle is above the horizon, so each hides part of the road."""
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     for seed in range(20):
         seen = PaperOcclusion(10, seed, camera).apply(white, moment())

@@ -1,4 +1,4 @@
-"""Rain and snow in space: numbers, sizes and speeds, and where single particles go."""
+"""Rain and snow in space: numbers, sizes and speeds, and the motion of single particles."""
 
 from dataclasses import replace
 
@@ -16,7 +16,7 @@ def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
 
 
 def test_rain_has_marshall_and_palmers_spectrum(camera):
-    """There are as many drops in a box as 8000 * exp(-slope * D) says, and small ones are more."""
+    """The number of drops in a box follows 8000 * exp(-slope * D), with more small ones."""
     rain = Rain(25.0, 0, camera).ready()
     slope = 4.1 * 25.0**-0.21
     sizes_of_all = 1000.0 * rain._particles._size
@@ -37,13 +37,13 @@ def test_drops_fall_at_their_terminal_speed(camera):
 
 
 def test_flakes_are_slow_and_large(camera):
-    """A flake of 1 mm of water falls at about 0.8 m/s and is seen 2 to 3 mm wide."""
+    """A flake of 1 mm of water falls at about 0.8 m/s and appears 2 to 3 mm wide."""
     sizes, speeds = Snow(1.0, 0, camera).flown(np.array([1.0]))
     assert 0.7 < speeds[0] < 1.1 and 0.002 < sizes[0] < 0.003
 
 
 def test_the_same_particles_come_nearer(camera, moment):
-    """What is ahead grows out of the point the car drives to, and moves as its distance asks."""
+    """Particles ahead grow out of the focus of expansion and move according to their distance."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight)
     before = particles.streaks(moment()._replace(position=0.0), 0.0)
@@ -60,7 +60,7 @@ def test_the_same_particles_come_nearer(camera, moment):
 
 
 def test_falling_particles_sink(camera, moment):
-    """Without driving, a drop at depth z sinks by focal length * speed * time / z."""
+    """At rest, a drop at depth z sinks by focal length * speed * time / z."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight, speed=6.0)
     before, after = (particles.streaks(moment()._replace(position=0.0, t=t), 0.0) for t in (1.0, 1.01))
@@ -74,7 +74,7 @@ def test_falling_particles_sink(camera, moment):
 
 
 def test_streaks_are_the_way_in_the_exposure(camera, moment):
-    """A streak ends where the particle is when the shutter closes, and is longer at speed."""
+    """A streak ends at the particle's position when the shutter closes, and is longer at speed."""
     particles = alone(camera, speed=5.0)
     now = moment()
     closed = now._replace(t=now.t + 0.002, position=now.position + 0.002 * now.v_ego)
@@ -90,7 +90,7 @@ def test_streaks_are_the_way_in_the_exposure(camera, moment):
 
 
 def test_boxes_repeat_without_gaps(camera, moment):
-    """At any time and place about as many particles are in view."""
+    """About equally many particles are in view at any time and place."""
     particles = alone(camera, speed=7.0, number=3000)
     counts = [particles.streaks(moment(number), 0.001).width.size for number in range(0, 600, 40)]
     assert min(counts) > 0.7 * max(counts)
@@ -98,7 +98,7 @@ def test_boxes_repeat_without_gaps(camera, moment):
 
 @pytest.mark.parametrize("width", [0.4, 1.2, 2.0, 5.0])
 def test_streaks_take_the_light_of_their_area(width, camera):
-    """However it is spread, a particle takes pi / 4 * width^2 pixels of light, on any of the grids."""
+    """A particle always covers pi / 4 * width^2 pixels of light, on any of the grids."""
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
     taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0
@@ -109,7 +109,7 @@ def test_streaks_take_the_light_of_their_area(width, camera):
 
 
 def test_particles_show_the_sky(camera, moment):
-    """Against the sky's own level nothing is seen; against dark road, flakes brighten it."""
+    """A flake is invisible against the sky's own level and bright against the dark road."""
     flat = np.full((camera.rows, camera.width), 200, np.uint8)
     snow = Snow(4.0, 0, camera)
     assert np.abs(snow.apply(flat, moment()).astype(int) - 200).max() <= 1
@@ -119,7 +119,7 @@ def test_particles_show_the_sky(camera, moment):
 
 
 def test_standing_car_sees_longer_lived_drops(camera, moment, road):
-    """At rest, snow hardly moves between pictures; at speed it does."""
+    """At rest, snow hardly moves between frames; at speed it does."""
     snow = Snow(4.0, 0, camera)
 
     def change(speed):

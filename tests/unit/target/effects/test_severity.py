@@ -1,4 +1,4 @@
-"""Measures of severity, on pictures whose values are known, and the page made of them."""
+"""Measures of severity on images with known values, and the page based on them."""
 
 import re
 from math import inf
@@ -15,17 +15,17 @@ REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
 @pytest.fixture
 def gauge(camera):
-    """Measures the plain road."""
+    """Measure the plain road."""
     return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
 
 
 def test_clean_pictures_lack_nothing(gauge, road):
-    """No error, the contrast that was painted, no edges between the lines."""
+    """A clean image has no error, the painted contrast, and no edges between the lines."""
     assert gauge.measure(road, road) == pytest.approx((inf, 120.0, 0.0))
 
 
 def test_contrast_and_psnr_follow_the_levels(gauge, road):
-    """Half the levels: half the contrast, and PSNR of that error."""
+    """Half the levels give half the contrast, and the PSNR of that error."""
     psnr, contrast, _ = gauge.measure(road, road // 2)
     error = (road.astype(float) - road // 2) ** 2
     assert contrast == pytest.approx(60.0, abs=1.0)
@@ -33,7 +33,7 @@ def test_contrast_and_psnr_follow_the_levels(gauge, road):
 
 
 def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
-    """Bright columns in the lane's inside are false edges; outside the lane they are not counted."""
+    """Bright columns inside the lane are false edges; outside the lane they are not counted."""
     inside, outside = road.copy(), road.copy()
     inside[:, 310:330:8] = 215
     outside[:, :40:8] = 215
@@ -42,7 +42,9 @@ def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
 
 
 def test_weak_edges_count_where_marks_are_weak(gauge, road):
-    """Between lines of a third of the contrast, edges of a third count; beside strong lines they do not."""
+    """Between lines with a third of the contrast, edges of a third count; next to strong lines they
+    do not.
+    """
     weak = (road // 3).copy()
     strong = road.copy()
     weak[:, 310:330:8] = 60
@@ -52,7 +54,7 @@ def test_weak_edges_count_where_marks_are_weak(gauge, road):
 
 
 def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
-    """By 8 levels or more; haze that is the same everywhere covers nothing."""
+    """A pixel is covered if an even grey changes by 8 levels or more; uniform haze covers nothing."""
     grey = np.full_like(road, 100)
     assert gauge.covered(grey // 2) == 0.0
     half = grey.copy()
@@ -63,7 +65,7 @@ def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
 
 
 def test_page_has_every_effect_and_level():
-    """The committed page has a picture and a table with all levels for every effect."""
+    """The committed page has an image and a table with all levels for every effect."""
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
     for effect, amounts in LEVELS.items():
         part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)
@@ -74,7 +76,10 @@ def test_page_has_every_effect_and_level():
 
 @pytest.mark.slow
 def test_page_is_what_the_command_writes(tmp_path):
-    """After a change of effects or detectors `python -m selfdrive.sim.effects.page` makes it anew."""
+    """The committed page is current.
+
+    After a change of effects or detectors: `python -m selfdrive.sim.effects.page`.
+    """
     page.write(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))
     assert made.read_text(encoding="utf-8") == kept.read_text(encoding="utf-8")

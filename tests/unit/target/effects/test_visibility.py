@@ -1,4 +1,4 @@
-"""What a level of the paper's effects stands for."""
+"""The physical meaning of the paper's effect levels."""
 
 from itertools import pairwise
 
@@ -10,7 +10,10 @@ from selfdrive.sim.effects.visibility import BLOCK, DROP, REACH, fog, rain, snow
 
 
 def test_so_many_drops_are_near_the_camera(camera):
-    """10,000 of 1 mm and more within reach at level 10: Marshall's and Palmer's number in what it sees."""
+    """At level 10 there are 10,000 drops of 1 mm and more within range:
+
+    Marshall's and Palmer's number in the view.
+    """
     weather = rain(10, camera)
     fall = Rain(weather.rate, 0, camera)
     pyramid = REACH**3 / 3 * camera.width / camera.fx * camera.rows / camera.fy
@@ -19,7 +22,7 @@ def test_so_many_drops_are_near_the_camera(camera):
 
 
 def test_so_many_flakes_look_as_large_as_a_block(camera):
-    """All of a size are seen so large up to one distance, and there are 1,000 of them at level 10."""
+    """Flakes appear as large as a block up to one distance, and there are 1,000 of them at level 10."""
     weather = snow(10, camera)
     fall = Snow(weather.rate, 0, camera)
     count, step = 0.0, 0.01
@@ -32,19 +35,19 @@ def test_so_many_flakes_look_as_large_as_a_block(camera):
 
 
 def test_worse_weather_is_seen_less_far(camera):
-    """From level to level it rains and snows more, and the range is less."""
+    """From level to level it rains and snows more, and the range falls."""
     for kind in (rain, snow):
         weather = [kind(level, camera) for level in range(1, 11)]
         assert all(a.rate < b.rate and a.range > b.range for a, b in pairwise(weather))
 
 
 def test_fog_of_a_contrast():
-    """At the meteorological range 5 % is left, in the middle of the measured road that many."""
+    """At the meteorological range 5 % is left; the middle of the measured road has the given contrast."""
     assert fog(0.05).range == pytest.approx(17.5)
     assert fog(0.9).range > fog(0.4).range > 50.0
 
 
 def test_a_rate_out_of_reach_is_the_nearest():
-    """A camera that sees the whole world around has more flakes before it than any snowfall lacks."""
+    """For a camera that sees everything around it, the rate is limited to the least one."""
     wide = CameraModel(fx=30.0, fy=30.0)
     assert snow(0.0001, wide).rate == pytest.approx(Snow.LEAST)

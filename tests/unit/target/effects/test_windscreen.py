@@ -1,4 +1,4 @@
-"""Drops on the windscreen: where they land they stay, until they are wiped away."""
+"""Drops on the windscreen stay where they land until they are wiped away."""
 
 import numpy as np
 import pytest
@@ -14,13 +14,13 @@ def glass(camera):
 
 
 def wet(glass, picture, moment, share, wipe=3):
-    """Which pixels show drops at this share of the time between two wipes."""
+    """The pixels that show drops at this fraction of the time between two wipes."""
     start = wipe * WIPE - glass._start
     return glass.seen(picture, whole(picture.shape), moment._replace(t=start + share * WIPE)) != picture
 
 
 def test_drops_gather_until_the_wipe(glass, road, moment):
-    """Drops stay and others join them; the wiper takes them all; the next ones land elsewhere."""
+    """Drops stay and others join them; the wiper removes all; the next ones land elsewhere."""
     early, late = (wet(glass, road, moment(), share) for share in (0.3, 0.9))
     assert 0 < early.sum() < 0.6 * late.sum()
     assert (late | ~early).mean() > 0.999
@@ -30,7 +30,7 @@ def test_drops_gather_until_the_wipe(glass, road, moment):
 
 
 def test_a_faster_car_meets_more_drops(glass, road, moment):
-    """Drops are met by the speed at which air comes at the glass, that of the rain's fall included."""
+    """The number of drops grows with the air's speed at the glass, including the rain's fall."""
     slow, fast = (wet(glass, road, moment(speed=speed), 0.9).sum() for speed in (0.0, 26.8))
     assert 2.0 < fast / slow < 5.0
     assert wet(glass, road, moment(speed=90.0), 0.99).any()

@@ -1,4 +1,4 @@
-"""Films to look at: of short runs with ideal vision and with pictures, and frames made up."""
+"""Films of short runs with ideal vision and with frames, and made-up frames."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ spacing_m: 1.342
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory):
-    """Runs the first half second of S1 into a new folder, which it returns; the film is in film/."""
+    """Run the first half second of S1 into a new folder and return it; the film is in film/."""
 
     def go(*arguments, film=True):
         folder = tmp_path_factory.mktemp("run")
@@ -42,7 +42,7 @@ def drive(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def seeing(tmp_path_factory):
-    """Arguments of a run that looks at four pictures of a road."""
+    """Arguments of a run that uses four frames of a road."""
     folder = tmp_path_factory.mktemp("frames")
     (folder / "camera.yaml").write_text(CALIBRATION)
     road = RoadRenderer(CameraModel(), "solid", 0)
@@ -53,7 +53,7 @@ def seeing(tmp_path_factory):
 
 @pytest.fixture
 def frame():
-    """Makes a frame in mid-lane that shows a lead 30 m ahead, but for what is given."""
+    """Build a frame in mid-lane with a lead 30 m ahead, with the given changes."""
     y = {"left": 1.85, "right": -1.85}
     usual = {
         "t": 0.0,
@@ -78,7 +78,7 @@ def frame():
 
 @pytest.fixture
 def reel(frame):
-    """Makes a film of frames 50 ms apart, by what is given of each."""
+    """Build a film of frames 50 ms apart, from the given values of each."""
 
     def make(*given):
         frames = tuple(frame(**{"t": 0.05 * i} | values) for i, values in enumerate(given))

@@ -1,4 +1,4 @@
-"""What a film keeps of a run, and that the run does not notice."""
+"""A film's content, and its absence of effect on the run."""
 
 from pathlib import Path
 
@@ -18,17 +18,17 @@ def outputs(folder):
 
 
 def test_a_run_is_the_same_with_a_film(drive):
-    """With ideal vision, trace and record have the same bytes whether a film is taken or not."""
+    """With ideal vision, trace and record have the same bytes with and without a film."""
     assert outputs(drive()) == outputs(drive(film=False))
 
 
 def test_a_run_with_pictures_is_the_same_with_a_film(drive, seeing):
-    """With pictures, trace and record have the same bytes whether a film is taken or not."""
+    """With frames, trace and record have the same bytes with and without a film."""
     assert outputs(drive(*seeing)) == outputs(drive(*seeing, film=False))
 
 
 def test_one_frame_for_each_look_of_the_camera(drive):
-    """Twenty frames a second, at the times of the trace, with its speeds and distances."""
+    """The film has twenty frames a second, at the trace's times, with its speeds and distances."""
     folder = drive()
     reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
     assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
@@ -46,7 +46,7 @@ def test_what_was_seen_is_kept(drive):
 
 
 def test_pictures_are_kept_as_the_detector_had_them(drive, seeing):
-    """The kept picture is the camera's own, but for what JPEG loses."""
+    """The stored frame is the camera's own, apart from JPEG losses."""
     frame = read_reel(drive(*seeing) / "film").frames[0]
     own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
     assert np.abs(frame.image().astype(int) - own).mean() < 1.0
@@ -58,7 +58,7 @@ def test_a_free_road_has_no_lead(drive):
 
 
 def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
-    """Where visiond publishes nothing the film has no lines, not those of the message before."""
+    """If visiond publishes nothing, the film has no lines, instead of the previous message's."""
     publish = Visiond.publish
     monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
     frames = read_reel(drive() / "film").frames
@@ -67,7 +67,7 @@ def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
 
 
 def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
-    """A crash of the controller loses none of the pictures before it."""
+    """A crash of the controller loses no earlier frame."""
     publish = Visiond.publish
 
     def crash(own, model):
@@ -82,7 +82,7 @@ def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
 
 
 def test_a_film_that_cannot_be_written(tmp_path, capsys):
-    """A folder that cannot be made is told, with its name, and nothing is run."""
+    """A folder that cannot be created is reported by name, and nothing runs."""
     (tmp_path / "file").touch()
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
@@ -91,7 +91,7 @@ def test_a_film_that_cannot_be_written(tmp_path, capsys):
 
 
 def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
-    """A disk that is full when the second picture comes ends the run with the folder's name."""
+    """If the disk is full at the second frame, the run ends with the folder's name."""
     (tmp_path / "film").mkdir()
     (tmp_path / "film" / "00001.jpg").symlink_to("/dev/full")
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out"), *seeing]
@@ -101,7 +101,7 @@ def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
 
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
 def test_what_is_no_film_is_told(tmp_path, text):
-    """An index that is missing parts is refused by its name."""
+    """An index with missing parts is refused by its name."""
     (tmp_path / "film.jsonl").write_text(text)
     with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
         read_reel(tmp_path)

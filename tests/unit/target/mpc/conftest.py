@@ -1,4 +1,4 @@
-"""Leads, lanes and solvers the tests of the model-predictive controllers share."""
+"""Leads, lanes and solvers for the tests of the model-predictive controllers."""
 
 import pytest
 from selfdrive.car.honda.interface import get_params
@@ -15,7 +15,7 @@ def long_solver():
 
 @pytest.fixture
 def make_long(long_solver):
-    """A longitudinal MPC as after construction."""
+    """Build a longitudinal MPC in its initial state."""
     return lambda: LongitudinalMpc(1, long_solver)
 
 
@@ -38,7 +38,7 @@ def lateral_mpc(_lateral_mpc):
 
 @pytest.fixture
 def lead():
-    """Makes a lead vehicle."""
+    """Build a lead vehicle."""
 
     def make(d_rel, v_lead, a_lead=0.0):
         return LeadData(status=True, d_rel=d_rel, v_lead=v_lead, a_lead_k=a_lead)
@@ -48,7 +48,7 @@ def lead():
 
 @pytest.fixture
 def lanes():
-    """Makes straight lanes of 3.7 m, their middle `offset` m to the left, turned by `slope`."""
+    """Build straight lanes of 3.7 m, their middle `offset` m to the left, turned by `slope`."""
 
     def make(offset=0.0, slope=0.0, left_prob=1.0, right_prob=1.0):
         lines = [(0.0, 0.0, slope, offset + y) for y in (1.85, -1.85, 0.0)]

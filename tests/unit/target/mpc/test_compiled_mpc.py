@@ -1,4 +1,4 @@
-"""The compiled solvers: the bits of CasADi's, and CasADi's wherever they may not be."""
+"""The compiled solvers have the bits of CasADi's, which replace them wherever they might not."""
 
 import ctypes
 import math
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 
 @pytest.fixture
 def use(all_compiled: Path) -> Iterator[None]:
-    """While a test runs, compiled code is to be used."""
+    """Enable compiled code during a test."""
     compiled.use(all_compiled)
     yield
     compiled.use(None)
@@ -48,7 +48,7 @@ def references() -> dict[str, Solver]:
 
 
 def number(draw: random.Random, scale: float) -> float:
-    """Nothing, or a number of about that size."""
+    """None, or a number of about that size."""
     return draw.choice((0.0, draw.uniform(-scale, scale), draw.gauss(0.0, scale)))
 
 
@@ -67,7 +67,7 @@ def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], l
 
 
 def spoil(values: list[float], draw: random.Random) -> None:
-    """Now and then one of them is no sensible number."""
+    """Sometimes replace one of them by an implausible number."""
     if draw.random() < 0.03:
         values[draw.randrange(len(values))] = draw.choice(NO_NUMBERS)
 
@@ -78,8 +78,9 @@ def spoil(values: list[float], draw: random.Random) -> None:
 def test_iterations_have_the_bits_of_the_reference(
     name: str, seed: int, references: dict[str, Solver]
 ) -> None:
-    """Trajectory, next guess and flags of 15 iterations are the same bytes, also of impossible problems and
-    of numbers that are none; of what is not finite only that it is not."""
+    """Trajectory, next guess and flags of 15 iterations have the same bytes, also for impossible problems and
+    for NaN; of non-finite results, only that they are not finite.
+    """
     draw = random.Random(seed)
     wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
     solver = COMPILED[name]()
@@ -112,7 +113,7 @@ def test_iterations_have_the_bits_of_the_reference(
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", COMPILED)
 def test_a_solver_has_no_memory(name: str) -> None:
-    """After impossible problems, and in another solver, the same problem gives the same bytes."""
+    """After impossible problems, or in another solver, the same problem gives the same bytes."""
     draw = random.Random(1)
     start, parameters = problem(name, draw, 1.0)
     solver = COMPILED[name]()
@@ -132,7 +133,7 @@ def test_a_solver_has_no_memory(name: str) -> None:
 
 
 def test_the_c_file_has_what_casadi_derives() -> None:
-    """Its generated part is that of this CasADi, and its weights are those of the problems."""
+    """The C file's generated part is that of this CasADi, and its weights are those of the problems."""
     assert casadi.__version__ == compiled_mpc.CASADI
     text = C_SOURCE.read_text()
     assert mpc_parts.with_parts(text) == text
@@ -143,7 +144,9 @@ def test_the_c_file_has_what_casadi_derives() -> None:
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("other", ["version", "function", "conduct"])
 def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of another CasADi, without the function that is called, or with another answer to a known problem."""
+    """With another CasADi, without the called function, or with another answer to a known problem, it is not
+    used.
+    """
     compiled_mpc._daqp.cache_clear()
     if other == "version":
         monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")
@@ -162,7 +165,7 @@ def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -
 def test_an_edited_problem_is_solved_as_it_is_written(
     all_compiled: Path, tmp_path: Path, edited: str
 ) -> None:
-    """Where one of the files that the C code stands for is another, CasADi's solver is built."""
+    """If a file that the C code stands for differs, CasADi's solver is built."""
     target = tmp_path / "target"
     shutil.copytree(
         mpc_parts.C_FILE.parents[3] / "selfdrive",
@@ -187,7 +190,7 @@ def test_an_edited_problem_is_solved_as_it_is_written(
 
 
 def test_a_run_without_pictures_needs_no_casadi(all_compiled: Path) -> None:
-    """What takes long to import is not imported where compiled code stands for it."""
+    """With compiled code, a run does not import CasADi, which is slow to import."""
     code = (
         "import sys; from selfdrive.sim.run import open_run; "
         "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "

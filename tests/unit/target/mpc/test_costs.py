@@ -1,4 +1,4 @@
-"""Both MPCs minimise the costs they are meant to: written down once more, in plain formulas."""
+"""Both MPCs minimise their intended costs, written again in plain formulas."""
 
 import math
 from itertools import pairwise
@@ -12,7 +12,7 @@ FACTORS = np.array([1.0] * 5 + [3.0] * 15 + [1.0])  # long intervals weigh three
 
 
 def flattest(cost, controls, scale):
-    """The cost's slope by each control (central differences), relative to that of a plan a bit beside."""
+    """The cost's slope by each control (central differences), relative to that of a plan slightly off."""
     bases = np.eye(len(controls)) * scale
 
     def slope(u):
@@ -22,7 +22,7 @@ def flattest(cost, controls, scale):
 
 
 def long_cost(jerks, v, a, x_lead, v_lead):
-    """The longitudinal cost of a plan, behind a lead of steady speed."""
+    """The longitudinal cost of a plan behind a lead of constant speed."""
     steps = [0.2] * 5 + [0.6] * 15
     x, xs = 0.0, []
     for k in range(21):
@@ -106,10 +106,10 @@ def rk4(z, rate):
 
 def test_lateral_plan_minimises_its_cost(lateral_mpc):
     """Weights 1, 1, 1, 1 and 0.5 and the residuals of path, both lanes, heading and steering rate."""
-    for _ in range(60):  # from its own solution each time, not from one moved on
+    for _ in range(60):  # from its own solution each time, not from a shifted one
         lateral_mpc._delta = 0.002
         lateral_mpc._iteration.guess[:] = lateral_mpc._iteration.solution
         lateral_mpc.update(ROAD, SPEED, 0.0, 0.0, FACTOR)
     rates = np.array(lateral_mpc._iteration.solution[4 * 21 :])
-    assert np.abs(rates).max() < 0.1  # no limit reached: the slope must vanish
+    assert np.abs(rates).max() < 0.1  # no limit is reached, so the slope must vanish
     assert flattest(lambda u: lateral_cost(u, 0.002), rates, 1e-6) < 1e-3

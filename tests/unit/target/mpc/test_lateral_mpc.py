@@ -1,4 +1,4 @@
-"""Lateral MPC: the plan it makes, its limits, and what happens when there is none."""
+"""Lateral MPC: its plan, its limits, and the case without a solution."""
 
 import math
 import random
@@ -19,14 +19,14 @@ def drive(mpc, lanes, times=1, v=V, angle=0.0, offset=0.0):
 
 
 def settle(mpc, lanes, times=60):
-    """Update until the plan no longer changes, always from the straight-ahead wheel."""
+    """Update until the plan no longer changes, always from a straight wheel."""
     for _ in range(times):
         mpc._delta = 0.0
         drive(mpc, lanes)
 
 
 def results(mpc):
-    """All that others read, to the last bit."""
+    """All public results, to the last bit."""
     scalars = (mpc.angle_desired, mpc.delta_desired, mpc.nans)
     return [repr(value) for value in scalars] + [mpc.delta_plan.tobytes()]
 
@@ -39,7 +39,7 @@ def test_middle_of_a_straight_lane_needs_no_steering(lateral_mpc, lanes):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_steers_towards_the_path(lateral_mpc, lanes, side):
-    """A path to the left (positive) is followed by steering left, and the same mirrored."""
+    """A path to the left (positive) is followed by steering left, and the mirrored case to the right."""
     settle(lateral_mpc, lanes(0.5))
     left = list(lateral_mpc.delta_plan)
     assert left[1] > 1e-4
@@ -78,7 +78,7 @@ def test_one_line_gives_the_lane_by_its_width(lateral_mpc, lanes):
 
 
 def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
-    """A car that hardly turns is steered to 25 degrees at 0.1 rad/s at the road wheels, never beyond."""
+    """A car that hardly turns is steered to 25 degrees at 0.1 rad/s at the road wheels, and never beyond."""
     for _ in range(120):
         lateral_mpc.update(lanes(8.0), V, 0.0, 0.0, 0.02)
         plan = lateral_mpc.delta_plan
@@ -91,7 +91,7 @@ def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
 
 
 def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
-    """The plan starts where the car will be, and point, when a command acts."""
+    """The plan starts at the car's position and heading when a command acts."""
     drive(lateral_mpc, lanes(), angle=0.26)
     delay = get_params().steer_actuator_delay
     x, y, heading, delta = lateral_mpc._iteration.solution[:4]
@@ -100,7 +100,7 @@ def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
 
 
 def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
-    """The wheel angle measured does not enter the plan's own; the offset is added to the result."""
+    """The measured wheel angle does not enter the plan's own; the offset is added to the result."""
     drive(lateral_mpc, lanes(1.0), offset=0.01)
     wanted = lateral_mpc.delta_desired
     assert lateral_mpc.angle_desired == pytest.approx(wanted * RATIO + 0.01)
@@ -109,14 +109,14 @@ def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
 
 
 def test_low_speed_is_planned_as_5_mps(lateral_mpc, lanes):
-    """Under 5 m/s the plan is that for 5 m/s, but for the way driven until a command acts."""
+    """Below 5 m/s the plan is that for 5 m/s, except the distance until a command acts."""
     drive(lateral_mpc, lanes(0.3), v=0.0)
     assert lateral_mpc._iteration.solution[4] == pytest.approx(5.0 * 0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("where", ["lane", "speed", "angle", "lanes too far"])
 def test_no_number_resets(lateral_mpc, lanes, where):
-    """Without a finite solution the angle is NaN once, and the next plan starts at the angle measured."""
+    """Without a finite solution the angle is NaN once, and the next plan starts at the measured angle."""
     drive(lateral_mpc, lanes(0.5), times=3)
     broken = lanes(400.0) if where == "lanes too far" else lanes()
     if where == "lane":
@@ -133,7 +133,7 @@ def test_no_number_resets(lateral_mpc, lanes, where):
 
 
 def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
-    """A plan thrown away leaves nothing behind: two pasts, the same bytes afterwards."""
+    """A discarded plan has no effect later: two pasts give the same bytes afterwards."""
     outcomes = []
     for past in (lanes(1.0), lanes(-3.0)):
         lateral_mpc.reset()
@@ -145,7 +145,9 @@ def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
 
 
 def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
-    """A heading beyond 90 degrees has no solution: the plan goes on as it was, and is counted."""
+    """A heading beyond 90 degrees has no solution: the plan continues unchanged, and the failure is
+    counted.
+    """
     drive(lateral_mpc, lanes(2.0), times=3)
     planned = list(lateral_mpc._iteration.guess[84:])
     delta = lateral_mpc.delta_desired
@@ -156,7 +158,7 @@ def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
 
 
 def test_reset_forgets_everything(lateral_mpc, lanes):
-    """After a reset, also from an unsolvable problem, an instance computes the bytes of a new one."""
+    """After a reset, even from an unsolvable problem, an instance computes the bytes of a new one."""
     fresh = LateralMpc(get_params())
     drive(lateral_mpc, lanes(-3.0), times=5, angle=60.0)
     drive(lateral_mpc, lanes(math.nan))
@@ -169,7 +171,7 @@ def test_reset_forgets_everything(lateral_mpc, lanes):
 
 
 def test_any_input_is_answered(lateral_mpc, lanes):
-    """Wild but finite input never raises."""
+    """Extreme but finite input never raises."""
     rng = random.Random(2)
     for _ in range(300):
         road = lanes(rng.gauss(0, 30), rng.gauss(0, 1), rng.random(), rng.random())

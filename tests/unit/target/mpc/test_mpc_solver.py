@@ -1,4 +1,4 @@
-"""The solvers against the same problems written out in full and given to other solvers."""
+"""The solvers agree with the same problems written in full and given to other solvers."""
 
 import math
 from array import array
@@ -23,7 +23,7 @@ CASES = {
 
 
 def full_problem(ocp, start, param):
-    """Trajectory, residuals with their weights, defects of the dynamics and bounds, nothing eliminated."""
+    """Trajectory, residuals with their weights, defects of the dynamics and bounds, without elimination."""
     n, nx = ocp.n_control, ocp.n_state
     w, p = ca.SX.sym("w", ocp.n_trajectory), ca.DM(param)
     z, u, q = ca.SX.sym("z", nx), ca.SX.sym("u"), ca.SX.sym("q", ocp.n_param)
@@ -50,14 +50,14 @@ def full_problem(ocp, start, param):
 
 
 def first_guess(ocp, start, control):
-    """All nodes at the start, moved a little so that the dynamics are violated."""
+    """All nodes at the start, shifted slightly to violate the dynamics."""
     nodes = [x + 0.01 * k for k in range(ocp.n_control + 1) for x in start]
     return array("d", nodes + [control] * ocp.n_control)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_one_iteration_is_the_full_gauss_newton_step(case):
-    """Condensing loses nothing: the step is that of the whole quadratic program in another solver."""
+    """Condensing is exact: the step is that of the whole quadratic program in another solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     guess = first_guess(ocp, start, control)
@@ -82,7 +82,7 @@ def test_one_iteration_is_the_full_gauss_newton_step(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_iterations_converge_to_the_optimum(case):
-    """Repeated at the same state, the iterations end where a nonlinear solver finds the optimum."""
+    """Repeated at the same state, the iterations converge to a nonlinear solver's optimum."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     nlp = {"x": w, "f": ca.sumsqr(residuals) / 2, "g": defects}
@@ -101,7 +101,9 @@ def test_iterations_converge_to_the_optimum(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_equal_input_gives_equal_bytes(case):
-    """A solver has no memory: after other problems, also impossible ones, and in a second build."""
+    """A solver has no memory: the bytes are the same after other problems, even impossible ones, and in a
+    second build.
+    """
     ocp, start, param, control = CASES[case]
     guess = first_guess(ocp, start, control)
     solver = build_solver(ocp)
@@ -123,7 +125,7 @@ def test_equal_input_gives_equal_bytes(case):
 
 
 def test_infeasible_program_keeps_the_controls():
-    """Bounds that cannot be met leave the controls as they were, and are counted."""
+    """Infeasible bounds keep the previous controls, and are counted."""
     ocp, _, param, _ = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     beyond = (0.0, 0.0, 0.0, math.radians(60.0))
@@ -135,7 +137,7 @@ def test_infeasible_program_keeps_the_controls():
 
 
 def test_shift_moves_the_guess_by_one_interval():
-    """The next guess is the solution moved on; its last interval holds the last control."""
+    """The next guess is the shifted solution; its last interval repeats the last control."""
     ocp, start, param, control = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     iteration.restart(control=control)

@@ -1,4 +1,4 @@
-"""Scenarios and truths to try parts of the simulator on."""
+"""Scenarios and truths for tests of parts of the simulator."""
 
 from functools import cache
 from pathlib import Path
@@ -18,13 +18,13 @@ def scenarios():
 
 @pytest.fixture(scope="session")
 def fault_free():
-    """Runs a scenario of the library without a fault, once; returns its result."""
+    """Run a scenario of the library without a fault, once; return its result."""
     return cache(lambda name: simulate(load_scenario(SCENARIOS / f"{name}.yaml"), 0))
 
 
 @pytest.fixture
 def truth():
-    """Makes a ground truth: a car at rest in the middle of the lane, but for what is given."""
+    """Build a ground truth: a car at rest in the middle of the lane, with the given changes."""
 
     def make(**values):
         return GroundTruth(**(dict.fromkeys(GroundTruth._fields, 0.0) | {"free_road": False} | values))

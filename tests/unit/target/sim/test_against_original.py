@@ -1,12 +1,12 @@
-"""The closed loop against what was measured on openpilot v0.4.2 in the same traffic."""
+"""The closed loop agrees with measurements on openpilot v0.4.2 in the same traffic."""
 
 import numpy as np
 import pytest
 from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import PLANTS, load_scenario, on_plant
 
-# HWT of 2 s first at, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s. In S5 what
-# comes below 6 m/s is left out: there the original's simulator sent its speed in the wrong unit.
+# HWT of 2 s first at, min HWT, min distance, max brake, max gas, speeds (m/s) at 5, 10, ... s. S5 omits
+# values below 6 m/s, where the original's simulator sent its speed in the wrong unit.
 MEASURED = {
     "S1": (6.94, 1.614, 29.22, 0.293, 0.088, (24.92, 20.27, 18.04, 17.43, 17.41, 17.56)),
     "S3": (6.94, 1.820, 37.95, 0.355, 0.092, (24.92, 20.68, 23.01, 24.30, 19.97, 19.01)),
@@ -16,7 +16,7 @@ MEASURED = {
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_longitudinal_control_is_the_original(fault_free, name):
-    """Headway, distance, pedals and speeds lie where the original's do."""
+    """Headway, distance, pedals and speeds agree with the original's."""
     close_at, headway, distance, brake, gas, speeds = MEASURED[name]
     trace = fault_free(name).trace
     assert trace["t"][np.argmax(trace["hwt"] <= 2.0)] == pytest.approx(close_at, abs=0.011)
@@ -32,7 +32,7 @@ def test_longitudinal_control_is_the_original(fault_free, name):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", ["O17", "O18", "O19", "O20"])
 def test_warning_two_seconds_before_contact(scenarios, name, plant):
-    """A driver who is about to run into the lead is warned about two seconds before, as by the original."""
+    """A driver about to hit the lead is warned about two seconds before, as by the original."""
     result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
     contact = result.record["hazards"]["H1"]
     warned = [alert["t"] for alert in result.record["alerts"] if alert["name"] == "fcw"]

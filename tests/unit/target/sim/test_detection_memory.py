@@ -1,4 +1,4 @@
-"""The table of detections that runs share."""
+"""The table of detections shared by runs."""
 
 import errno
 import os
@@ -20,7 +20,9 @@ def key(number: int, bucket: int = 7) -> bytes:
 
 
 def test_what_is_kept_is_recalled(tmp_path):
-    """To the bit, none or MOST numbers, by whoever opens the same cache; other keys have nothing."""
+    """Any process with the same cache recalls the entry to the bit, with none up to MOST numbers; other keys
+    have none.
+    """
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     memory.keep(key(2), ())
@@ -32,7 +34,7 @@ def test_what_is_kept_is_recalled(tmp_path):
 
 
 def test_the_table_never_grows(tmp_path):
-    """Its size is fixed, its empty part takes no place on disk, and a full bucket gives up an old entry."""
+    """Its size is fixed, its empty part takes no disk space, and a full bucket drops an old entry."""
     memory = DetectionMemory(tmp_path)
     for number in range(1, 4 * WAYS):
         memory.keep(key(number), (float(number),))
@@ -45,7 +47,7 @@ def test_the_table_never_grows(tmp_path):
 
 @pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY - 1])
 def test_a_damaged_entry_is_not_recalled(tmp_path, at):
-    """One wrong byte, wherever it is, and the entry is as if it were not there; it can be kept again."""
+    """An entry with one wrong byte counts as missing and can be stored again."""
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     with (tmp_path / FILE).open("r+b") as file:
@@ -59,7 +61,7 @@ def test_a_damaged_entry_is_not_recalled(tmp_path, at):
 
 
 def test_a_short_or_strange_file_is_taken_over(tmp_path):
-    """Whatever lies where the table should be is no entry, and does not keep others from being kept."""
+    """Any other content in place of the table is no entry, and does not prevent storing."""
     (tmp_path / FILE).write_bytes(b"no table" * 5000)
     memory = DetectionMemory(tmp_path)
     assert memory.recall(key(1, 2)) is None
@@ -68,7 +70,7 @@ def test_a_short_or_strange_file_is_taken_over(tmp_path):
 
 
 def test_without_a_file_nothing_is_remembered(tmp_path):
-    """Where the table cannot be had, all is as if it were empty."""
+    """If the table cannot be created, it acts as if empty."""
     (tmp_path / FILE).mkdir()
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
@@ -76,7 +78,7 @@ def test_without_a_file_nothing_is_remembered(tmp_path):
 
 
 def test_a_full_disk_ends_remembering_and_no_more(tmp_path, monkeypatch):
-    """What cannot be written is not remembered, and no error reaches the run."""
+    """A value that cannot be written is not remembered, and no error reaches the run."""
     memory = DetectionMemory(tmp_path)
 
     def full(*_):
@@ -101,7 +103,7 @@ for turn in range(30):
 
 
 def test_processes_share_it_at_once(tmp_path):
-    """Two that write many entries into few places never recall anything but what belongs to the key."""
+    """Two processes that write many entries into few places recall only values of the right key."""
     root = str(Path(selfdrive.__path__[0]).parent)
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     both = [subprocess.Popen(command, env={"PYTHONPATH": root}) for _ in range(2)]
@@ -109,7 +111,7 @@ def test_processes_share_it_at_once(tmp_path):
 
 
 def test_a_forked_child_shares_it(tmp_path):
-    """What a child keeps in the table its parent has opened, the parent recalls."""
+    """The parent recalls what a child stores in the table that the parent opened."""
     code = (
         "import os, sys; from pathlib import Path\n"
         "from selfdrive.sim.detection_memory import DetectionMemory\n"

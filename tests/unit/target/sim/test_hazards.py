@@ -1,4 +1,4 @@
-"""The hazard definitions, at their edges."""
+"""The hazard definitions at their limits."""
 
 import pytest
 from selfdrive.sim.hazards import HazardMonitor
@@ -21,7 +21,7 @@ def test_none_in_ordinary_driving(truth):
     [(0.0, 0.0, True), (0.01, 0.0, False), (-3.0, 2.75, True), (-3.0, -2.76, False)],
 )
 def test_h1(truth, d_rel, offset, hit):
-    """A collision needs no distance left and an overlap of the two cars, 2.75 m to either side."""
+    """A collision needs zero distance and an overlap of the two cars, 2.75 m to either side."""
     assert (first(truth, {"d_rel": d_rel, "lateral_offset": offset})["H1"] == 0.0) is hit
 
 
@@ -35,13 +35,13 @@ def test_h1(truth, d_rel, offset, hit):
     ],
 )
 def test_h2(truth, v_ego, d_rel, free_road, hit):
-    """Standing counts below 0.3 m/s with 100 m and more of free road ahead."""
+    """Standing below 0.3 m/s counts with 100 m or more of free road ahead."""
     stopped = {"v_ego": v_ego, "d_rel": d_rel, "free_road": free_road}
     assert (first(truth, {}, stopped)["H2"] == 1.0) is hit
 
 
 def test_h2_needs_a_car_that_has_moved(truth):
-    """A car that has not set off yet does not block the road; once it has moved, its next stop counts."""
+    """A car that has not started does not block the road; once it has moved, its next stop counts."""
     rest = {"v_ego": 0.0, "d_rel": 150.0}
     assert first(truth, rest, rest)["H2"] is None
     assert first(truth, rest, {"v_ego": 0.3}, rest)["H2"] == 2.0

@@ -53,14 +53,14 @@ def folder(tmp_path):
 
 
 def test_frames_are_read_in_the_order_of_their_numbers(folder):
-    """Frame 2 comes before frame 10, grey, at the size of the calibration's camera."""
+    """Frame 2 precedes frame 10; both are grey, at the size of the calibration's camera."""
     frames = list(ImageFolder(folder).read())
     assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
     assert {frame.shape for frame in frames} == {(48, 64)}
 
 
 def test_a_folder_becomes_a_library(folder, tmp_path):
-    """The frames of a folder follow the run's time at their rate, under the folder's name and camera."""
+    """A folder's frames follow the run's time at their rate, under the folder's name and camera."""
     library = open_library(Pictures(frames=folder, cache=tmp_path / "cache"), 0)
     assert library.name == "test drive"
     assert (library.fps, library.spacing) == (20.0, None)
@@ -69,7 +69,7 @@ def test_a_folder_becomes_a_library(folder, tmp_path):
 
 
 def test_the_digest_follows_every_byte(folder, tmp_path):
-    """Another pixel in a frame, or another number in the calibration, is another library."""
+    """Another pixel in a frame, or another number in the calibration, makes another library."""
     digests = {ImageFolder(folder).digest}
     cv2.imwrite(str(folder / "7.png"), np.full((48, 64), 71, np.uint8))
     digests.add(ImageFolder(folder).digest)
@@ -97,7 +97,7 @@ def test_frames_are_made_smaller_with_their_camera(folder):
 
 
 def error(folder):
-    """What is said of a folder that cannot be used."""
+    """The error for an unusable folder."""
     with pytest.raises(ConfigError) as caught:
         list(ImageFolder(folder).read())
     return str(caught.value)
@@ -111,13 +111,13 @@ def test_a_frame_of_another_size_is_named(folder):
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n truncated"])
 def test_an_unreadable_frame_is_named(folder, content):
-    """A file that is no picture gives its name and what to do."""
+    """A file that is no image is named with a remedy."""
     (folder / "7.png").write_bytes(content)
     assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
 
 
 def test_a_frame_that_is_cut_off_is_named(folder):
-    """Half a JPEG or PNG file is not taken for a picture, although its header and first rows are there."""
+    """Half a JPEG or PNG file is refused, although its header and first rows are intact."""
     picture = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
     for kind in (".png", ".jpg"):
         whole = cv2.imencode(kind, picture)[1].tobytes()
@@ -128,7 +128,7 @@ def test_a_frame_that_is_cut_off_is_named(folder):
 
 
 def test_a_frame_too_large_to_be_read_is_named(folder):
-    """A header that promises billions of pixels ends with a message, too."""
+    """A header that claims billions of pixels is refused with a message, too."""
     header = b"IHDR" + struct.pack(">II5B", 60000, 60000, 8, 0, 0, 0, 0)
     png = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
     (folder / "7.png").write_bytes(
@@ -138,7 +138,9 @@ def test_a_frame_too_large_to_be_read_is_named(folder):
 
 
 def test_colour_depth_and_transparency_do_not_matter(folder):
-    """Grey, colour with and without alpha, and 16 bits a channel are all read as 8 bit grey; one will do."""
+    """Grey, colour with and without alpha, and 16 bits a channel are all read as 8 bit grey; one frame is
+    enough.
+    """
     for path in folder.glob("*.png"):
         path.unlink()
     for shape, kind in (((48, 64), np.uint8), ((48, 64, 4), np.uint8), ((48, 64), np.uint16)):
@@ -148,13 +150,13 @@ def test_colour_depth_and_transparency_do_not_matter(folder):
 
 
 def test_a_missing_frame_is_named(folder):
-    """A gap in the numbers is a frame that is missing, not a jump ahead."""
+    """A gap in the numbers means a missing frame."""
     (folder / "7.png").unlink()
     assert error(folder).startswith(f"{folder}/7.png: missing, expected ")
 
 
 def test_numbers_may_go_in_larger_steps(folder):
-    """Frames numbered 0, 30, 60 are no sequence with gaps, unless one of them is missing."""
+    """Frames numbered 0, 30, 60 are a sequence without gaps, unless one of them is missing."""
     for path in folder.glob("*.png"):
         path.rename(folder / f"run{30 * int(path.stem):05}.png")
     assert len(ImageFolder(folder).files) == 12
@@ -163,7 +165,7 @@ def test_numbers_may_go_in_larger_steps(folder):
 
 
 def test_several_sequences_follow_each_other(folder):
-    """Clips in folders of their own are taken in order; numbers start again in each, or are no numbers."""
+    """Clips in separate folders are used in order; in each, numbers start again, or are not needed."""
     for clip in ("b", "a"):
         (folder / clip).mkdir()
         for number in (1, 2, 3):
@@ -198,19 +200,19 @@ def test_several_sequences_follow_each_other(folder):
     ],
 )
 def test_a_wrong_calibration_is_explained(folder, old, new, message):
-    """The message says what was got and expected, with file and line."""
+    """The message gives finding and expectation, with file and line."""
     (folder / "camera.yaml").write_text(VIEW.replace(old, new))
     assert message in error(folder)
 
 
 def test_a_camera_that_sees_no_road_is_refused(folder):
-    """A calibration whose horizon lies below the frame cannot be right."""
+    """A calibration with its horizon below the frame is refused."""
     (folder / "camera.yaml").write_text(CALTECH.replace("cy_px: 256.5", "cy_px: 600"))
     assert "pitch_deg: '14', expected road in the picture" in error(folder)
 
 
 def test_a_folder_without_calibration_is_explained(tmp_path):
-    """A missing camera.yaml gives its path and where to read how to write one."""
+    """For a missing camera.yaml the error gives its path and where to read how to write one."""
     assert error(tmp_path).startswith(f"{tmp_path}/camera.yaml: No such file")
 
 
@@ -219,7 +221,7 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 @pytest.mark.parametrize("text", EXAMPLES)
 def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
-    """Every camera.yaml the documentation shows is read, and gives a camera that sees road."""
+    """Every camera.yaml in the documentation is valid and gives a camera that sees road."""
     (tmp_path / "camera.yaml").write_text(text)
     pattern = re.search(r'files: "([^"]*)"', text)
     frame = tmp_path / pattern[1].replace("*", "1")
@@ -232,7 +234,7 @@ def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
 
 
 def test_the_docs_show_a_calibration_for_each_known_set():
-    """Caltech, TuSimple, CULane and Udacity frames, and one's own, each have a calibration in the docs."""
+    """Caltech, TuSimple, CULane, Udacity and a user's own frames each have a calibration in the docs."""
     names = " ".join(re.findall(r"name: (.*)", PAGE.read_text()))
     assert len(EXAMPLES) == 5
     assert all(name in names for name in ("caltech", "tusimple", "culane", "udacity", "my road"))

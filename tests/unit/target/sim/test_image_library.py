@@ -1,4 +1,4 @@
-"""The image library: frames made once, safely, and found by time or distance."""
+"""The image library: frames built once, safely, and found by time or distance."""
 
 import subprocess
 import sys
@@ -21,12 +21,12 @@ DIGEST = "ab" * 32
 
 
 def noise(seed=1):
-    """Frames of that shape, one after the other."""
+    """Frames of that shape with noise."""
     return iter(np.random.default_rng(seed).integers(0, 256, SHAPE, dtype=np.uint8))
 
 
 def refuse():
-    """Stands where nothing may be made again."""
+    """Fails if anything is built again."""
     raise AssertionError("made again")
 
 
@@ -45,13 +45,13 @@ def library(**given):
 
 
 def test_frames_are_found_by_distance_and_start_again():
-    """Every `spacing` metres comes the next frame, after the last the first, whatever the time."""
+    """The next frame comes every `spacing` metres, the first after the last, whatever the time."""
     frames = library(spacing=2.0)
     assert [frames.frame(9.9, x)[0, 0] for x in (0.0, 1.9, 2.0, 9.0, 10.0, 13.0)] == [0, 0, 1, 4, 0, 1]
 
 
 def test_frames_are_found_by_time_and_start_again():
-    """Frames taken at 10 a second follow the run's time, not the distance; a rounded time loses none."""
+    """Frames at 10 a second follow the run's time, not the distance; rounding of times skips none."""
     frames = library(fps=10.0)
     times = [k * 0.05 for k in range(12)]
     assert [frames.frame(t, 99.0)[0, 0] for t in times] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]
@@ -66,7 +66,7 @@ def test_the_rendered_loop_closes_on_a_dash():
 
 
 def test_frames_are_made_once(tmp_path):
-    """What is in the cache is not made again; it cannot be written to, and other digests do not meet it."""
+    """A cached frame is not built again; the cached file is read-only, and other digests do not find it."""
     first = cached(tmp_path, DIGEST, SHAPE, noise)
     again = cached(tmp_path, DIGEST, SHAPE, refuse)
     other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
@@ -99,7 +99,7 @@ def test_frames_are_made_once(tmp_path):
     ],
 )
 def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
-    """A cache file that is not what was written is replaced, and then sound again."""
+    """A changed cache file is replaced by a valid one."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     path.write_bytes(harm(path.read_bytes()))
@@ -108,7 +108,7 @@ def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
 
 
 def test_only_frames_that_are_looked_at_are_verified(tmp_path):
-    """Mapping a file costs next to nothing; a frame that is damaged is made anew when it is asked for."""
+    """Mapping a file takes almost no time; a damaged frame is rebuilt on access."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     data = path.read_bytes()
@@ -120,7 +120,7 @@ def test_only_frames_that_are_looked_at_are_verified(tmp_path):
 
 
 def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch):
-    """A file that is damaged again as soon as it is written: the frames are kept in memory."""
+    """If a file is damaged again right after writing, the frames are kept in memory."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     real = image_library._mapped
 
@@ -146,7 +146,7 @@ def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
 
 @pytest.mark.parametrize("place", [None, "file/cache", "x" * 300])
 def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, place):
-    """Without a cache, and with one that cannot be made, frames are equal to cached ones, and read-only."""
+    """Without a cache, or one that cannot be created, frames equal cached ones and are read-only."""
     (tmp_path / "file").write_text("in the way")
     cache = None if place is None else tmp_path / place
     frames = cached(cache, DIGEST, SHAPE, noise)
@@ -157,7 +157,7 @@ def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, p
 
 
 def test_processes_may_make_the_same_frames_at_once(tmp_path):
-    """Several processes that find the cache cold all end with the same frames, and leave one whole file."""
+    """Several processes that start with a cold cache all get the same frames, and leave one complete file."""
     code = (
         "import numpy as np, hashlib, pathlib, sys\n"
         "from selfdrive.sim.image_library import cached\n"
@@ -181,7 +181,9 @@ def test_processes_may_make_the_same_frames_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_the_rendered_library_is_the_road_in_steps(tmp_path):
-    """The 600 frames are those the renderer draws, equal for equal seeds, other for other seeds and marks."""
+    """The 600 frames are those of the renderer, equal for equal seeds, different for other seeds
+    and marks.
+    """
     pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
     frames = open_library(pictures, 5)
     assert frames.frames.shape == (600, 480, 640)

@@ -1,4 +1,4 @@
-"""Sideways motion: what torque does to the wheel, and the wheel to the car."""
+"""Lateral motion: from torque to wheel, and from wheel to car."""
 
 from math import radians
 
@@ -18,7 +18,7 @@ def run(car, seconds, torque, speed, curvature=0.0):
 
 
 def hold(car, seconds, angle, speed, curvature=0.0):
-    """Drive with the wheel held at an angle."""
+    """Simulate with the wheel held at an angle."""
     for _ in range(round(seconds * 100)):
         car.steer_angle, car.steer_rate = angle, 0.0
         car._move(speed)
@@ -32,7 +32,7 @@ def test_nothing_moves_without_torque(car):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_left_is_positive_all_the_way(car, sign):
-    """Torque to a side turns wheel, car and path to that side."""
+    """Torque to one side turns wheel, car and path to that side."""
     run(car, 1.0, 0.2 * sign, 20.0)
     assert car.steer_angle * sign > 0 and car.yaw_rate * sign > 0
     assert car.heading * sign > 0 and car.offset * sign > 0
@@ -52,7 +52,9 @@ def test_sides_are_symmetric():
 
 @pytest.mark.parametrize("speed", [1.0, 5.0, 15.0, 26.8, 40.0])
 def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
-    """Held at an angle, the car settles at yaw rate v delta / (L (1 + K v^2)), K the understeer gradient."""
+    """At a constant angle, the car settles at yaw rate v delta / (L (1 + K v^2)), K the understeer
+    gradient.
+    """
     p = get_params()
     rear = p.wheelbase - p.center_to_front
     understeer = (
@@ -75,7 +77,7 @@ def test_full_torque_is_limited_by_the_tyres(car):
 
 
 def test_the_wheel_returns_by_itself(car):
-    """Let go in a bend, the tyres pull the wheel back to the middle without a lasting swing."""
+    """Released in a bend, the wheel returns to the middle without lasting oscillation."""
     run(car, 3.0, 0.5, 20.0)
     turned = car.steer_angle
     run(car, 4.0, 0.0, 20.0)
@@ -83,7 +85,7 @@ def test_the_wheel_returns_by_itself(car):
 
 
 def test_the_wheel_has_a_stop(car):
-    """Turned on a standing car, the wheel comes to rest at its stop, and leaves it at once."""
+    """Turned on a standing car, the wheel stops at its stop, and leaves it at once."""
     run(car, 30.0, 1.0, 0.0)
     assert (car.steer_angle, car.steer_rate) == (8.7, 0.0)
     run(car, 0.01, -1.0, 0.0)
@@ -92,7 +94,7 @@ def test_the_wheel_has_a_stop(car):
 
 @pytest.mark.parametrize("speed", [0.0, 0.05, 0.3, 2.0])
 def test_slow_driving_is_stable(car, speed):
-    """At walking pace and at rest nothing grows without bounds, and a standing car does not move."""
+    """At walking pace and at rest nothing diverges, and a standing car does not move."""
     run(car, 20.0, 1.0, speed)
     assert abs(car.steer_angle) <= 8.7
     assert abs(car.lateral_speed) <= 2 * speed
@@ -102,7 +104,7 @@ def test_slow_driving_is_stable(car, speed):
 
 
 def test_a_bend_carries_the_lane_away(car):
-    """Straight on in a left-hand bend of 500 m, the car is to the right of its lane by s^2 / 2R."""
+    """Going straight in a left-hand bend of 500 m, the car is right of its lane by s^2 / 2R."""
     run(car, 1.0, 0.0, 20.0, curvature=0.002)
     assert car.offset == pytest.approx(-(20.0**2) / 1000, rel=0.02)
     assert car.heading == pytest.approx(-0.04, rel=0.01)

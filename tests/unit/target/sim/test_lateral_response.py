@@ -1,4 +1,4 @@
-"""How the controlled car behaves in its lane at 60 mph: overshoot, settling, steady error."""
+"""The controlled car's lane behaviour at 60 mph: overshoot, settling, steady error."""
 
 from dataclasses import replace
 
@@ -7,13 +7,13 @@ import pytest
 from selfdrive.sim.scenario import load_scenario
 from selfdrive.sim.simulator import Simulator
 
-FULL_TORQUE = 4096 / 3840  # of the EPS' full torque, the most that is ever sent
+FULL_TORQUE = 4096 / 3840  # of the EPS' full torque, the largest command
 STEP_AT, STEP = 800, 0.5  # simulation step, m
 
 
 @pytest.fixture
 def drive(scenarios):
-    """Runs a lateral scenario, mirrored if asked; `step` moves the lane (m, to the left) after 8 s."""
+    """Run a lateral scenario, mirrored on request; `step` moves the lane (m, to the left) after 8 s."""
 
     def run(name, side=1, step=0.0):
         scenario = load_scenario(scenarios / f"{name}.yaml")
@@ -42,7 +42,9 @@ def settling(trace, start, band):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_offset_start(drive, side):
-    """Engaged half a metre off: within 5 % after 3 to 3.6 s, 1 % beyond at most, 5 mm off in the end."""
+    """Engaged half a metre off, the car is within 5 % after 3 to 3.6 s, at most 1 % beyond, and 5 mm off in
+    the end.
+    """
     result = drive("L01", side)
     offset = side * result.trace["lateral_offset"]
     assert offset[:131] == pytest.approx(0.5)
@@ -54,7 +56,9 @@ def test_offset_start(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_step_in_lane_position(drive, side):
-    """A lane that moves half a metre aside is followed: half way in 1.5 s, 5 % in 3.4 s, 1 % overshoot."""
+    """After a lane step of half a metre, the car is half way in 1.5 s, within 5 % in 3.4 s, with 1 %
+    overshoot.
+    """
     result = drive("L01", step=side * STEP)
     trace = result.trace
     left_to_go = -side * trace["lateral_offset"][STEP_AT:] / STEP
@@ -70,7 +74,7 @@ def test_step_in_lane_position(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_bend_of_500_m(drive, side):
-    """In the bend the car runs 0.3 m outside the middle, steadily, with half the torque and no overshoot."""
+    """In the bend the car stays 0.3 m outside the middle, with half the torque and no overshoot."""
     result = drive("L02", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]
@@ -86,7 +90,7 @@ def test_bend_of_500_m(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_torque_saturation(drive, side):
-    """Two seconds of full torque are told; the car drifts out, stays in its lane and comes back calmly."""
+    """Two seconds of full torque raise an alert; the car drifts, stays in its lane and returns smoothly."""
     result = drive("L03", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]

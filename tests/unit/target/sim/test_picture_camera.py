@@ -1,4 +1,4 @@
-"""The camera with pictures: a frame as it looks from where the car is."""
+"""The camera with frames: a frame as seen from the car's pose."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ CAMERAS = pytest.mark.parametrize("model", [CALTECH, UDACITY])
 
 
 def camera(model, translation=GROUND, frames=12):
-    """A camera over a few frames of a rendered road, and who rendered them."""
+    """A camera over a few frames of a rendered road, and their renderer."""
     renderer = RoadRenderer(model, "dashed", 3, periods=2)
     pictures = np.stack([renderer.grey(k * SPACING) for k in range(frames)])
     pictures.flags.writeable = False
@@ -31,7 +31,9 @@ def camera(model, translation=GROUND, frames=12):
 @CAMERAS
 @pytest.mark.parametrize(("offset", "heading"), [(0.4, 0.0), (0.0, 0.02), (-0.5, -0.02), (0.9, 0.03)])
 def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, truth):
-    """Below the horizon a moved frame is the road drawn from the displaced pose, but for interpolation."""
+    """Below the horizon a moved frame equals the road drawn from the displaced pose, apart from
+    interpolation.
+    """
     looking, renderer = camera(model)
     seen = looking.look(truth(lateral_offset=offset, heading=heading, position=3 * SPACING)).picture
     drawn = renderer.grey(3 * SPACING, offset, heading)
@@ -44,7 +46,7 @@ def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, t
 
 @CAMERAS
 def test_lines_in_the_view_are_where_the_truth_says(model, truth):
-    """The lane's lines lie in the moved frame where the displaced car has them, to a fraction of a pixel."""
+    """The lines in the moved frame are where the displaced car sees them, to a fraction of a pixel."""
     looking, renderer = camera(model)
     offset, heading = 0.32, -0.015
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture.astype(float)
@@ -62,7 +64,7 @@ def test_lines_in_the_view_are_where_the_truth_says(model, truth):
 
 
 def test_in_the_middle_of_the_lane_the_frame_is_the_view(truth):
-    """A car that is where the frame was taken sees the frame itself, which may not be written to."""
+    """At the pose of the frame, the car sees the frame itself, read-only."""
     looking, renderer = camera(CALTECH)
     picture = looking.look(truth(position=2.5 * SPACING)).picture
     assert np.array_equal(picture, renderer.grey(2 * SPACING))
@@ -81,7 +83,7 @@ def test_poses_that_round_to_the_same_give_the_same_bytes(truth):
 
 
 def test_the_rounding_is_finer_than_a_pixel(truth):
-    """Half a step of the pose moves a line by less than half a pixel, even right before the car."""
+    """Half a step of the pose moves a line by less than half a pixel, even right in front of the car."""
     row = CALTECH.rows - 1
     assert 0.5 * OFFSET_STEP / CALTECH.metres_per_pixel(row) < 0.5
     assert 0.5 * HEADING_STEP * CALTECH.fx < 0.5
@@ -102,7 +104,7 @@ def test_above_the_horizon_the_view_pans_and_no_more(truth):
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.01), (40.0, 0.0)])
 def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
-    """In the paper's mode all rows move alike, as far as the lane has moved 10 m ahead."""
+    """In the paper's mode all rows shift alike, by the lane's shift 10 m ahead."""
     looking, renderer = camera(CALTECH, SHIFT)
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture
     away = offset + SHIFT_DISTANCE * np.tan(heading)
@@ -113,7 +115,7 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
 
 @pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
 def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
-    """The whole picture moves by a pixel for 0.03895 m, at most for 1 m; a turn of the car is not seen."""
+    """The whole image shifts by a pixel for 0.03895 m, at most for 1 m; the car's heading has no effect."""
     looking, renderer = camera(CALTECH, CODED)
     picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
     shift = round(min(max(offset, -1.0), 1.0) / 0.03895)
@@ -122,7 +124,7 @@ def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
 
 
 def test_the_message_stays_geometric(truth):
-    """Lane, path and lead in the message are the ideal camera's; only the picture is added."""
+    """Lane, path and lead in the message are the ideal camera's; the image is added."""
     looking, _ = camera(CALTECH)
     there = truth(lateral_offset=0.3, heading=0.01, d_rel=42.0)
     assert looking.look(there)._replace(picture=None) == Camera(Road(None, None)).look(there)
@@ -139,7 +141,7 @@ def test_any_size_of_frame_is_moved(truth):
 
 
 def test_pictures_show_no_curves():
-    """A road with curvature and pictures, which are of a straight one, are refused together."""
+    """Frames show a straight road, so frames on a road with curvature are refused."""
     with pytest.raises(ConfigError, match="a road with curvature, expected a straight road"):
         build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
 
@@ -147,7 +149,7 @@ def test_pictures_show_no_curves():
 @pytest.mark.parametrize("translation", [GROUND, SHIFT, CODED])
 @CAMERAS
 def test_a_part_is_that_of_the_whole_view(model, translation, truth):
-    """Of a moved frame whatever is cut out, to any row and column, has the bytes that all of it has there."""
+    """Any cut of a moved frame, at any row and column, has the bytes that the whole has there."""
     looking, _ = camera(model, translation, frames=1)
     random = np.random.default_rng(4)
     for _ in range(60):

@@ -1,4 +1,4 @@
-"""Longitudinal motion, against numbers measured on the original's plant."""
+"""Longitudinal motion agrees with numbers measured on the original's plant."""
 
 import pytest
 from selfdrive.car.honda.interface import get_params
@@ -25,7 +25,7 @@ def test_coasting_from_60_mph(plant):
 
 
 def test_position_uses_the_old_speed(plant):
-    """Euler's order: a step moves the car by its speed at the step's beginning, exactly."""
+    """By Euler's order, a step moves the car by exactly its speed at the step's beginning."""
     car = plant(10.0)
     car.step(Actuators(brake=1.0), 0.0, 0.0)
     assert car.position == 0.1
@@ -48,14 +48,14 @@ def test_brake_and_grade():
 
 
 def test_creep():
-    """An idling car creeps: 1 m/s^2 at rest falling to none at 1.5 m/s, less the rolling resistance."""
+    """An idling car creeps: 1 m/s^2 at rest, falling to zero at 1.5 m/s, less the rolling resistance."""
     assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
     assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
     assert acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)
 
 
 def test_the_car_never_drives_backwards(plant):
-    """Braked to a stop the car stays there: no speed, no acceleration, no further way."""
+    """A car braked to a stop stays there: no speed, acceleration or distance."""
     car = plant(1.0)
     for _ in range(200):
         car.step(Actuators(brake=1.0), 0.0, 0.0)
@@ -65,7 +65,9 @@ def test_the_car_never_drives_backwards(plant):
 
 
 def test_way_along_the_road(plant):
-    """Only the motion along the road counts: a car askew makes less way, one outside in a bend too."""
+    """Only motion along the road counts: a car at an angle covers less distance, as does one on the outside
+    of a bend.
+    """
     straight, askew, outside = plant(20.0), plant(20.0), plant(20.0)
     askew.lateral.heading = 0.5
     outside.lateral.offset = -2.0

@@ -11,7 +11,7 @@ TRUTH = ("t", "v_ego", "a_ego", "d_rel", "v_lead", "hwt", "steer_angle", "latera
 
 
 def driven(rows: int) -> tuple[Recorder, np.ndarray]:
-    """A recorder with so many rows, and the time and the heading of each."""
+    """A recorder with that many rows, and the time and the heading of each."""
     state = SimpleNamespace(
         **{"alerts": (), "enabled": True, "long_state": "pid", "angle_desired": 0.5},
         **dict.fromkeys(("v_ego", "a_ego", "v_cruise", "v_pid"), 1.5),
@@ -27,7 +27,7 @@ def driven(rows: int) -> tuple[Recorder, np.ndarray]:
 
 @pytest.mark.parametrize("rows", [0, 1, 63, 64, 65, 129, 4096, 4097, 8300])
 def test_every_row_is_in_the_trace(rows):
-    """However many rows there are, the trace has each of them in its place, and the last is the newest."""
+    """The trace has every row in its place, however many there are, and the last is the newest."""
     recorder, values = driven(rows)
     trace = recorder.trace()
     assert tuple(trace) == CHANNELS
@@ -38,7 +38,7 @@ def test_every_row_is_in_the_trace(rows):
 
 
 def test_later_rows_do_not_change_a_trace():
-    """A trace stays what it was when rows are added."""
+    """Adding rows does not change an earlier trace."""
     recorder, values = driven(100)
     trace = recorder.trace()
     others, _ = driven(100)

@@ -1,4 +1,4 @@
-"""The reference plant: what it takes from the original's simulator, errors and all."""
+"""The reference plant copies the original's simulator, including its errors."""
 
 import json
 from dataclasses import replace
@@ -42,7 +42,7 @@ def test_torque_turns_the_wheel_slowly(sign, speed):
 
 
 def test_only_every_fifth_step_moves_the_car():
-    """The turn of steps 0, 5, 10 ... moves the car, that of the others never does."""
+    """Steering of steps 0, 5, 10 ... moves the car, that of the others never does."""
     moved = []
     for pushed in range(10):
         lateral = CrudeLateral()
@@ -54,7 +54,7 @@ def test_only_every_fifth_step_moves_the_car():
 
 
 def test_nothing_turns_the_wheel_back():
-    """Without torque the wheel stays turned, and the car goes straight on where it is."""
+    """Without torque the wheel stays turned, and the car keeps its line."""
     lateral = CrudeLateral()
     for torque in [1.0] * 100 + [0.0] * 500:
         lateral.step(torque, 30.0, 0.0)
@@ -79,7 +79,9 @@ def test_it_moves_along_the_road_as_the_standard_plant(car):
 
 
 def test_headway_time(car):
-    """It is distance over speed, of the last moving step while the car stands, and 30 s before the first."""
+    """Headway time is distance over speed, of the last moving step while the car stands, and 30 s before the
+    first.
+    """
     assert ReferencePlant(get_params(), speed=0.0).headway(50.0) == 30.0
     assert car.headway(50.0) == 2.5
     car.speed = 0.0
@@ -88,7 +90,7 @@ def test_headway_time(car):
 
 
 def test_distance_ends_at_zero(car):
-    """A lead that was run over stays at 0 m; on the standard plant it falls behind."""
+    """A lead that was hit stays at 0 m; on the standard plant it falls behind."""
     car.position = 10.0
     assert (car.distance_to(12.0), car.distance_to(8.0)) == (2.0, 0.0)
     standard = Plant(get_params(), speed=20.0)
@@ -119,14 +121,14 @@ def test_drift_is_not_shown(s1):
     ("speed", "read"), [(0.5, 1.8), (0.29, 0.0), (1.0, 3.6), (3.5, 8.05), (6.0, 6.0), (20.0, 20.0)]
 )
 def test_speed_is_wrong_where_the_gearbox_is_believed(truth, speed, read):
-    """Its gearbox says km/h for m/s: 3.6 times too fast up to 1 m/s, less so up to 6 m/s."""
+    """Its gearbox reports km/h as m/s: 3.6 times too fast up to 1 m/s, less so up to 6 m/s."""
     sensors, interface = CarSensors(ReferencePlant.gearbox_scale), CarInterface()
     state = interface.update(sensors.measure(truth(v_ego=speed), 0, 0), 0.0)
     assert state.v_ego_raw == pytest.approx(read, abs=0.01)
 
 
 def test_a_scenario_may_choose_it(scenarios):
-    """The key `plant` or `on_plant` choose it; without them the plant is the standard one."""
+    """The key `plant`, or `on_plant`, selects it; the default is the standard plant."""
     assert parse_scenario(TEXT, "a.yaml", "").plant == "reference"
     plain = load_scenario(scenarios / "S1.yaml")
     assert plain.plant == "standard"
@@ -143,7 +145,7 @@ def test_a_scenario_may_choose_it(scenarios):
     ],
 )
 def test_what_it_does_not_know_is_refused(text, line, remedy):
-    """An unknown plant, a bend and a start beside the middle are answered at the line of `plant`."""
+    """An unknown plant, a bend and an offset start are refused at the line of `plant`."""
     with pytest.raises(ConfigError) as caught:
         parse_scenario(text, "a.yaml", "")
     assert str(caught.value).startswith(f"a.yaml:{line}: plant: ")
@@ -151,7 +153,7 @@ def test_what_it_does_not_know_is_refused(text, line, remedy):
 
 
 def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
-    """`--plant reference` runs on it and the record says so; a road it does not know ends with code 2."""
+    """`--plant reference` uses it and the record says so; an unsupported road exits with code 2."""
     common = ["--max-steps", "5", "--plant", "reference", "--out", str(tmp_path / "out")]
     assert main(["--scenario", str(scenarios / "S1.yaml"), *common]) == 0
     assert json.loads((tmp_path / "out" / "record.json").read_text())["plant"] == "reference"
@@ -162,7 +164,7 @@ def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
 
 
 def test_both_plants_in_one_simulator(s1):
-    """A run on one plant leaves nothing for the next on the other, and each is named in the record."""
+    """A run on one plant has no effect on the next on the other, and each is named in the record."""
     simulator, results = Simulator(), []
     for scenario in (s1, replace(s1, plant="standard"), s1):
         simulator.reset(replace(scenario, steps=200), 0)
@@ -175,7 +177,7 @@ def test_both_plants_in_one_simulator(s1):
 
 
 def test_lines_are_mirrored(s1):
-    """The controller is sent the left line where the right one is, and its own side is never seen."""
+    """The controller receives the left line in place of the right one, and never sees its true side."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()
@@ -185,7 +187,7 @@ def test_lines_are_mirrored(s1):
 
 
 def test_pictures_move_to_the_other_side(car):
-    """A car that is left of the middle is shown as far to the right; the rest is as it is."""
+    """A car left of the middle is shown equally far to the right; the rest is unchanged."""
     truth = GroundTruth(*(1.0, 50.0, 20.0, 20.0, 0.0, 0.3, 0.0, 0.0, 0.0, 20.0, 2.5), free_road=False)
     assert car.pictured(truth) == truth._replace(lateral_offset=-0.3)
     assert car.shown(truth) == truth._replace(lateral_offset=0.0)

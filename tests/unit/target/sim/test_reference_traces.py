@@ -1,4 +1,4 @@
-"""On the reference plant the loop is openpilot v0.4.2 in its own simulator: its recordings and figures.
+"""On the reference plant the loop agrees with openpilot v0.4.2 in its own simulator: recordings and figures.
 
 The recordings are not part of the project. OPENPILOT_TRACES names their folder.
 """
@@ -20,14 +20,14 @@ REPO = Path(__file__).parents[4]
 TRACES = Path(os.environ.get("OPENPILOT_TRACES", REPO.parent / "shared/reference/openpilot_v0.4.2/traces"))
 SCENARIOS = REPO / "fault_library" / "scenarios"
 RECORDED = ("S1", "S3", "S5", "S1_nolead", *(f"O{k:02}" for k in range(1, 11)))
-LOG_DELAY = 1  # steps by which what the controller published comes later into the recordings
+LOG_DELAY = 1  # delay in steps of the controller's messages in the recordings
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def recorded():
-    """Reads a recording: its steps, and columns as arrays, NaN where nothing was published."""
+    """Read a recording: its steps, and columns as arrays, NaN where nothing was published."""
 
     def read(name):
         path = TRACES / f"{name}.csv"
@@ -46,7 +46,7 @@ def recorded():
 
 @pytest.fixture(scope="module")
 def driven():
-    """Runs a scenario on the reference plant, once; `X_nolead` is X without its lead."""
+    """Run a scenario on the reference plant, once; `X_nolead` is X without its lead."""
 
     def run(name):
         scenario = on_plant(load_scenario(SCENARIOS / f"{name.removesuffix('_nolead')}.yaml"), "reference")
@@ -98,14 +98,16 @@ def test_what_the_controller_thought(recorded, driven, name):
 
 @pytest.mark.parametrize("name", ["S5", "O06", "O08"])
 def test_brake_at_rest(recorded, driven, name):
-    """It is the original's to the last count: raised beyond what holds the car only while the wheels turn."""
+    """The brake equals the original's to the last count: above the holding level only while the
+    wheels turn.
+    """
     _, column = recorded(name)
     assert driven(name).trace["brake"][-1] == pytest.approx(column("brake")[-1], abs=1e-5)
 
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_contexts(driven, name, rows):
-    """As many rows of the context table are reached as on the original; S1 just misses its fourth."""
+    """As many rows of the context table are reached as on the original; S1 narrowly misses its fourth."""
     result = driven(name)
     trace = result.trace
     armed = trace["t"] >= 1.5
@@ -117,7 +119,7 @@ def test_contexts(driven, name, rows):
 
 
 def faulty(scenario, disturb):
-    """Runs a scenario with `disturb(simulator, truths)` applied; `truths` are the ground truths so far."""
+    """Run a scenario with `disturb(simulator, truths)` applied; `truths` are the ground truths so far."""
     simulator, truths = Simulator(), []
     simulator.reset(scenario, 0)
     observe = simulator._observe
@@ -134,7 +136,7 @@ def s1(scenarios):
 
 
 def angle_off(degrees):
-    """The steering angle read is off while the headway time is in 0 .. 2 s."""
+    """The measured steering angle is off while the headway time is in 0 .. 2 s."""
 
     def disturb(simulator, truths):
         measure = simulator._sensors.measure
@@ -148,13 +150,13 @@ def angle_off(degrees):
     return disturb
 
 
-# Of the original 0.86 deg is published, and times; errors between are those that take the time (13.0 s also
-# the torque, 0.952) they took there.
+# The original's 0.86 deg is published, and times; errors in between are those that take the same time (13.0
+# s also the torque, 0.952) as there.
 @pytest.mark.parametrize(
     ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
 )
 def test_steering_angle_off(s1, degrees, leaves):
-    """An error drives the car out of its lane, the later the smaller it is, and below some size never."""
+    """An error drives the car out of its lane, later if it is smaller, and below some size never."""
     record = faulty(s1, angle_off(degrees))
     assert record["alerts"] == []
     if leaves is None:
@@ -184,7 +186,7 @@ def lose_model(simulator, truths):
     [(lose_frames, "can_error", 7.085, 18.28), (lose_model, "model_error", 7.415, 19.30)],
 )
 def test_loss_of_an_input(s1, disturb, alert, at, hit):
-    """Without CAN or model from the closest approach on, alert and contact come when the original's do."""
+    """Without CAN or model from the closest approach on, alert and contact occur at the original's times."""
     record = faulty(s1, disturb)
     assert [event["name"] for event in record["alerts"]] == [alert]
     assert record["alerts"][0]["t"] == pytest.approx(at, abs=0.011)

@@ -1,4 +1,4 @@
-"""Detectors that look up what they would see."""
+"""Detectors that look up earlier results."""
 
 import subprocess
 import sys
@@ -38,7 +38,7 @@ def frames():
 
 @pytest.fixture
 def look(frames, truth):
-    """Takes a picture of these frames from a pose, as `translation` moves them."""
+    """Take an image of these frames from a pose, moved by `translation`."""
 
     def taken(translation=GROUND, digest="d", **pose):
         library = ImageLibrary(
@@ -51,13 +51,13 @@ def look(frames, truth):
 
 
 def view(picture):
-    """A view with this picture and nothing else to go by."""
+    """A view with only this image."""
     nan = float("nan")
     return CameraView(nan, nan, nan, (), nan, picture)
 
 
 class Counting:
-    """Counts how often it is asked."""
+    """Counts its calls."""
 
     def __init__(self):
         self.asked, self.state = 0, ()
@@ -70,7 +70,7 @@ class Counting:
 
 @pytest.mark.parametrize("make", [PaperDetector, RobustDetector])
 def test_remembered_lines_are_those_seen(make, look, tmp_path):
-    """With clean and spoilt pictures: without memory, cold, warm and half warm give equal lines."""
+    """With clean and disturbed images, no memory, a cold, a warm and a half-warm one give equal lines."""
     rain = PaperRain(6, 1, MODEL)
     way = [(0.03 * k, 0.001 * k, 0.7 * k) for k in range(8)]
     seen = [look(lateral_offset=y, heading=turn, position=x) for y, turn, x in way]
@@ -85,13 +85,13 @@ def test_remembered_lines_are_those_seen(make, look, tmp_path):
         detector = RememberingDetector(make(MODEL), "it", DetectionMemory(tmp_path))
         for number, picture in enumerate(seen):
             assert repr(detector.detect(view(picture))) == expected[number], (known, number)
-            if known == 9 and number == 8:  # the rest is seen anew, on what was recalled
+            if known == 9 and number == 8:  # the rest is detected again, based on the recalled part
                 (tmp_path / FILE).unlink()
                 detector._memory = DetectionMemory(tmp_path)
 
 
 def test_nothing_is_looked_at_twice(look, tmp_path):
-    """A picture of the same key is not made and not looked at; an array always is."""
+    """An image with a known key is neither built nor analysed; an array always is."""
     looking = Counting()
     detector = RememberingDetector(looking, "it", DetectionMemory(tmp_path))
     lines = detector.detect(view(look(lateral_offset=0.1)))
@@ -107,7 +107,9 @@ def test_nothing_is_looked_at_twice(look, tmp_path):
 
 
 def test_what_makes_another_picture_makes_another_key(look, truth):
-    """Frame, pose, translation, frames, effects, their amounts, seeds, order, moments: none share a key."""
+    """Frame, pose, translation, frames, effects, their amounts, seeds, order and moments all change
+    the key.
+    """
     base = look()
     moment, later = truth(t=1.0), truth(t=1.05)
     rain, light = PaperRain(5, 1, MODEL), Brightness(20, 1, MODEL)
@@ -137,14 +139,14 @@ def test_what_makes_another_picture_makes_another_key(look, truth):
 
 
 def test_what_makes_no_other_picture_makes_no_other_key(look, truth):
-    """Poses that round alike share a key, and moments under an effect that does not move."""
+    """Poses that round alike share a key, as do moments under an effect that does not move."""
     assert look(lateral_offset=0.1).key == look(lateral_offset=0.1004).key
     light = Brightness(20, 1, MODEL)
     assert light.apply(look(), truth(t=1.0)).key == light.apply(look(), truth(t=2.0)).key
 
 
 def test_effects_from_elsewhere_are_looked_at(look, truth):
-    """What an effect does whose code no digest covers is not remembered: it gives an array."""
+    """The result of an effect outside the digest is not remembered: it gives an array."""
 
     class Upside(Effect):
         UNIT, LEAST, MOST = "times", 0.0, 1.0
@@ -160,7 +162,7 @@ def test_effects_from_elsewhere_are_looked_at(look, truth):
 
 
 def test_other_code_has_another_digest(tmp_path):
-    """Any change of a file that sees, and none of one that does not, changes what memories are kept under."""
+    """The memory's key changes with any file that affects detection, and with no other."""
     root = tmp_path / "selfdrive"
     copytree(ROOT, root)
     before = seeing_digest(root)
@@ -178,7 +180,9 @@ def test_other_code_has_another_digest(tmp_path):
 
 
 def test_all_code_that_sees_is_in_the_digest():
-    """What detectors, frames and effects load is covered, but for plain messages, errors and YAML."""
+    """The digest covers all code loaded by detectors, frames and effects, except plain messages, errors and
+    YAML.
+    """
     code = (
         "import sys, selfdrive.visiond.paper_detector, selfdrive.visiond.robust_detector\n"
         "import selfdrive.sim.effects, selfdrive.sim.image_library, selfdrive.sim.moved_picture\n"

@@ -48,7 +48,7 @@ def reference(trace, tmp_path):
 
 @pytest.fixture
 def finished(trace, tmp_path):
-    """Puts a trace into the folder of a finished run of S1; returns the folder of runs."""
+    """Put a trace into the folder of a finished run of S1; return the folder of runs."""
 
     def put(**changes):
         folder = tmp_path / "runs" / "S1"
@@ -70,7 +70,7 @@ def replay(reference, runs, *arguments):
 
 
 def test_written_and_read_back(trace, reference):
-    """A reference is the trace it was written from, in every fifth row, to six digits."""
+    """A reference is the trace's every fifth row, to six digits."""
     assert list(reference.steps) == list(range(0, STEPS, 5))
     for column in COLUMNS:
         if column.channel != "fcw":
@@ -80,7 +80,7 @@ def test_written_and_read_back(trace, reference):
 
 
 def test_rms_and_largest_difference(trace, reference):
-    """A hump of 0.6 m/s on a tenth of the rows has the RMS one works out by hand, and the time of its top."""
+    """A hump of 0.6 m/s on a tenth of the rows has the hand-computed RMS, and the time of its peak."""
     trace["v_ego"] = trace["v_ego"].copy()
     trace["v_ego"][300:400] -= 0.5
     trace["v_ego"][350] -= 0.1
@@ -99,14 +99,16 @@ def test_lag(trace, late):
 
 
 def test_no_lag_to_be_seen():
-    """A constant has no lag, and a steady slope, which fits with any, counts as being on time."""
+    """A constant has no lag, and a constant slope counts as being on time."""
     steps = np.arange(0, STEPS, 5)
     assert time_lag(steps, np.ones(len(steps)), np.ones(STEPS)) is None
     assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
 
 
 def test_crossings():
-    """Each stretch beyond the band is a crossing, with its ends and its worst moment; the band is inside."""
+    """Each stretch beyond the band is a crossing, with its ends and its worst moment; the band is
+    inclusive.
+    """
     seconds = np.arange(8) / 20
     found = crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
     assert [(one.begin, one.end, one.worst, one.at) for one in found] == [
@@ -116,7 +118,7 @@ def test_crossings():
 
 
 def test_messages_may_be_a_cycle_late(trace, reference):
-    """What the controller publishes may be seen a cycle later; what the world is, may not."""
+    """The controller's messages may arrive a cycle later; the world's state may not."""
     reference.channels["v_ego_est"] = np.concatenate(([0.0], trace["v_ego"][4::5][: STEPS // 5 - 1]))
     trace["v_ego_est"] = trace["v_ego"]
     reference.channels["v_ego"] = reference.channels["v_ego_est"]
@@ -128,7 +130,7 @@ def test_messages_may_be_a_cycle_late(trace, reference):
 
 
 def test_lead_compared_while_both_see_one(trace, reference):
-    """Estimates of a lead that one of the two does not see are not compared; whether it is seen, is."""
+    """Estimates of a lead are compared only if both see one; whether it is seen is always compared."""
     trace["lead_status"] = np.where(np.arange(STEPS) < 500, 0, 1)
     trace["lead_d_rel"] = np.where(np.arange(STEPS) < 500, 99.0, 0.0)
     comparison = compare(reference, trace, NO_LIMITS)
@@ -137,13 +139,13 @@ def test_lead_compared_while_both_see_one(trace, reference):
 
 
 def test_no_number_is_beyond_any_limit(trace, reference):
-    """A channel that is no longer a number differs infinitely, rather than not being compared."""
+    """A channel that becomes NaN differs infinitely."""
     trace["v_ego"] = np.where(np.arange(STEPS) == 500, np.nan, trace["v_ego"])
     assert channel(compare(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
 
 
 def test_free_road_has_no_lead_to_compare(trace, reference):
-    """On a free road the speed of a lead that is not there is left out."""
+    """On a free road the speed of the missing lead is left out."""
     with_lead = {result.column.channel for result in compare(reference, trace, NO_LIMITS).channels}
     without = {
         result.column.channel for result in compare(reference, trace, NO_LIMITS, free_road=True).channels
@@ -152,7 +154,7 @@ def test_free_road_has_no_lead_to_compare(trace, reference):
 
 
 def test_key_figures(trace):
-    """Engaging lies between two rows, set speeds stand in their order, headway counts while moving only."""
+    """Engaging lies between two rows, set speeds keep their order, headway counts only while moving."""
     rows = {name: values[::5] for name, values in trace.items()}
     rows["v_ego"] = np.where(np.arange(200) > 190, 0.0, rows["v_ego"])
     rows["v_cruise"] = np.where(np.arange(200) < 100, 97, 104) * KPH_TO_MS
@@ -180,7 +182,9 @@ def test_key_figures(trace):
     ],
 )
 def test_difference_of_figures(name, reference, ours, expected):
-    """Spans differ by the gap between them, lists by their worst pair, and what only one has, infinitely."""
+    """Spans differ by the gap between them, lists by their worst pair; a figure of only one side differs
+    infinitely.
+    """
     assert difference(name, reference, ours) == pytest.approx(expected)
 
 
@@ -207,7 +211,7 @@ def test_beyond_tolerance(reference, finished, trace, capsys):
     ("limits", "code"), [("{max: 0.9}", 1), ("{max: 1.1}", 0), ("{lag_s: 0.2}", 0), ("{lag_s: 0.1}", 1)]
 )
 def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code):
-    """Largest difference and lag are limits of their own."""
+    """Largest difference and lag have separate limits."""
     late = np.interp(trace["t"] - 0.15, trace["t"], trace["v_ego"])
     changed = late if "lag" in limits else trace["v_ego"] + (np.arange(STEPS) == 500)
     table = tmp_path / "table.yaml"
@@ -216,7 +220,7 @@ def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code)
 
 
 def test_beyond_in_a_key_figure(reference, finished, trace, capsys):
-    """Another set speed alone is beyond tolerance."""
+    """A different set speed alone is beyond tolerance."""
     assert replay(reference, finished(v_cruise=np.full(STEPS, 96 * KPH_TO_MS))) == 1
     assert "difference 1.000, limit 0  <-- beyond" in capsys.readouterr().out
 
@@ -233,7 +237,7 @@ def test_references_change_with_the_flag_only(reference, finished, trace, capsys
 
 
 def test_drives_the_scenario_itself(tmp_path, scenarios):
-    """Without finished runs the scenario is driven; its trace, kept as a reference, is met again exactly."""
+    """Without finished runs the scenario is simulated; its trace, stored as a reference, matches exactly."""
     text = (scenarios / "S1.yaml").read_text().replace("duration_s: 30", "duration_s: 2")
     (tmp_path / "S1.yaml").write_text(text)
     given = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path)]
@@ -257,7 +261,7 @@ def test_drives_the_scenario_itself(tmp_path, scenarios):
     ],
 )
 def test_wrong_reference_file(reference, finished, capsys, line, old, new, expected):
-    """A mistake in a reference is told with file and line, exit code 2."""
+    """A mistake in a reference is reported with file and line, exit code 2."""
     lines = reference.path.read_text().splitlines()
     assert old in lines[line - 1]
     lines[line - 1] = lines[line - 1].replace(old, new, 1)
@@ -269,14 +273,14 @@ def test_wrong_reference_file(reference, finished, capsys, line, old, new, expec
 
 
 def test_reference_saved_by_a_spreadsheet(reference, finished):
-    """The invisible mark that some programs put before the first column's name is no part of that name."""
+    """A byte order mark before the first column's name is ignored."""
     reference.path.write_bytes(b"\xef\xbb\xbf" + reference.path.read_bytes())
     assert list(read_reference(reference.path).channels) == list(reference.channels)
     assert replay(reference, finished()) == 0
 
 
 def test_reference_of_another_length(trace, reference):
-    """A reference that ends before the run, or after it, is refused."""
+    """A reference that ends before or after the run is refused."""
     for steps in (STEPS - 100, STEPS + 100):
         cut = {name: np.resize(values, steps) for name, values in trace.items()}
         with pytest.raises(ConfigError, match="the last row is of"):
@@ -284,7 +288,7 @@ def test_reference_of_another_length(trace, reference):
 
 
 def test_limited_channel_must_be_there(trace, reference):
-    """What has a tolerance cannot be missing from the reference, or be empty in all rows."""
+    """A channel with a tolerance must be in the reference with a value in some row."""
     tolerances = load_tolerances(TOLERANCES)
     reference.channels["d_rel"][:] = np.nan
     with pytest.raises(ConfigError, match="nothing in column 'd_rel'"):
@@ -306,14 +310,14 @@ def test_limited_channel_must_be_there(trace, reference):
     ],
 )
 def test_wrong_tolerance_table(reference, finished, tmp_path, capsys, text, expected):
-    """A mistake in the table is told with file and line, exit code 2."""
+    """A mistake in the table is reported with file and line, exit code 2."""
     (tmp_path / "table.yaml").write_text(text.replace("{v_ego}", "{rms: 0.1}"))
     assert replay(reference, finished(), "--tolerances", str(tmp_path / "table.yaml")) == 2
     assert expected in capsys.readouterr().err
 
 
 def test_wrong_folders_and_names(reference, finished, tmp_path, capsys):
-    """No references, no such scenario, no such run, and a run of something else end with exit code 2."""
+    """Missing references, scenarios or runs, and a run of something else, end with exit code 2."""
     assert main(["--references", str(tmp_path / "nowhere")]) == 2
     assert main(["--references", str(reference.path.parent), "X9"]) == 2
     assert main(["--references", str(reference.path.parent), "--scenarios", str(tmp_path)]) == 2
@@ -340,7 +344,7 @@ def test_limits_asked_for():
 
 @pytest.mark.slow
 def test_recorded_traces(capsys):
-    """On the reference plant every recorded trace of the original is met within tolerance."""
+    """On the reference plant every recorded trace of the original matches within tolerance."""
     if not any(TRACES.glob("*.csv")):
         pytest.skip(f"no recorded runs in {TRACES}; set OPENPILOT_TRACES to their folder")
     code = main(["--references", str(TRACES)])

@@ -1,4 +1,4 @@
-"""Rendered roads: lines where the truth says, no flicker far away, equal bytes for equal seeds."""
+"""Rendered roads: lines at their true place, no flicker in the distance, equal bytes for equal seeds."""
 
 from dataclasses import replace
 
@@ -49,7 +49,7 @@ def standard():
 @pytest.mark.parametrize("model", [CALTECH, UDACITY])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.4, 0.01), (-0.6, -0.03)])
 def test_lines_are_where_the_truth_says(model, offset, heading):
-    """The middle of each line in each row is the analytic one, to a fraction of a pixel."""
+    """The middle of each line in each row equals the analytic one, to a fraction of a pixel."""
     renderer = RoadRenderer(model, BARE, 0, periods=1)
     picture = renderer.grey(5.0, offset, heading).astype(float) - BARE.asphalt
     errors = []
@@ -68,7 +68,7 @@ def test_lines_are_where_the_truth_says(model, offset, heading):
 
 
 def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixel():
-    """A line's light in a row is that of its width on the road, from a few metres to over a hundred."""
+    """A line's light in a row matches its width on the road, from a few metres to over a hundred."""
     renderer = RoadRenderer(CALTECH, BARE, 0, periods=1)
     contrast = renderer.grey(0.0).astype(float) - BARE.asphalt
     a, b = CALTECH.line_in_picture(*renderer.truth()[0])
@@ -81,7 +81,7 @@ def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixe
 
 @pytest.mark.parametrize("heading", [0.0, 0.02])
 def test_the_far_field_is_anti_aliased(heading):
-    """A picture is what a camera with sixteen times the pixels sees, averaged, up to the horizon."""
+    """An image equals the average of one with sixteen times the pixels, up to the horizon."""
     look = replace(BARE, right=replace(FRESH, dashed=True))
     coarse = RoadRenderer(CALTECH, look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
     fine = RoadRenderer(finer(CALTECH, 4), look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
@@ -93,7 +93,7 @@ def test_the_far_field_is_anti_aliased(heading):
 
 
 def test_far_dashes_do_not_flicker():
-    """Beyond 150 m, where a row spans two dash periods, a line hardly changes from picture to picture."""
+    """Beyond 150 m, where a row spans two dash periods, a line hardly changes from frame to frame."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     last = int(CALTECH.row(150.0))
     pictures = np.stack([renderer.grey(1.342 * k) for k in range(9)]).astype(int)
@@ -114,13 +114,13 @@ def test_dashes_have_us_dimensions():
 
 
 def test_the_road_closes_on_itself():
-    """After the strip's length the same picture comes again."""
+    """After the strip's length the same frame repeats."""
     renderer = RoadRenderer(CALTECH, "dashed", 3, periods=2)
     assert np.array_equal(renderer.grey(4.0, 0.2, 0.01), renderer.grey(4.0 + 2 * DASH_PERIOD, 0.2, 0.01))
 
 
 def test_equal_seeds_give_equal_bytes_in_any_order(standard):
-    """A picture follows from model, look, seed and pose alone, not from the pictures drawn before."""
+    """A frame depends only on model, look, seed and pose, not on earlier frames."""
     again = RoadRenderer(CALTECH, standard_look("dashed"), 3, periods=2)
     poses = [(0.0, 0.0, 0.0), (7.7, 0.3, -0.01), (19.0, -0.5, 0.02)]
     forth = [standard.grey(*pose) for pose in poses]
@@ -134,7 +134,7 @@ def test_another_seed_gives_another_road(standard):
 
 
 def test_the_standard_road_has_the_tones_of_a_road():
-    """Asphalt is mid grey, white paint bright, yellow paint between: what gains and biases work on."""
+    """Asphalt is mid grey, white paint bright, yellow paint between, as input for gains and biases."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=4).grey(0.0)
     left, right = (CALTECH.line_in_picture(y, 0.0) for y in (1.85, -1.85))
     row = 400
@@ -153,7 +153,7 @@ def test_unknown_marks_are_refused():
 
 
 def test_every_part_of_a_look_shows():
-    """Each thing that may vary between roads changes the picture."""
+    """Each property that may vary between roads changes the image."""
     base = replace(BARE, far_left=FRESH, far_right=FRESH)
     plain = RoadRenderer(UDACITY, base, 1, periods=1).grey(0.0)
     changes = {
@@ -185,7 +185,7 @@ def test_every_part_of_a_look_shows():
 
 
 def test_colours_keep_the_grey_values(standard):
-    """The coloured picture is as bright as the grey one; left line yellow, sky blue, verge green."""
+    """The coloured image is as bright as the grey one; left line yellow, sky blue, verge green."""
     grey, colour = standard.grey(3.0, 0.2, 0.01), standard.colour(3.0, 0.2, 0.01)
     assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(int) - grey).mean() < 2.0
     blue, green, red = colour[20, 320].astype(int)
@@ -211,7 +211,7 @@ def test_the_lead_stands_on_the_road_where_it_is(standard, offset, heading):
 
 
 def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
-    """A lead that is hit, or out of sight, leaves the picture as it is."""
+    """A lead that is hit, or out of sight, leaves the image unchanged."""
     plain = standard.colour(3.0)
     assert np.array_equal(plain, standard.colour(3.0, lead=-3.0))
     assert np.array_equal(plain, standard.colour(3.0, lead=500.0))

@@ -12,7 +12,7 @@ from selfdrive.sim.run import main
 
 @pytest.fixture
 def run(scenarios, tmp_path):
-    """Runs S1 for some steps; returns the folder."""
+    """Run S1 for some steps; return the folder."""
 
     def go(name, *arguments, scenario="S1", steps=150):
         folder = tmp_path / name
@@ -29,7 +29,7 @@ def contents(folder):
 
 
 def test_what_is_written(run, scenarios):
-    """A trace with one row a step, and a record that says what was run and holds the trace's digest."""
+    """A run writes a trace with one row a step, and a record of its inputs with the trace's digest."""
     folder = run("a", "--seed", "5")
     trace = np.load(folder / "trace.npz")
     record = json.loads((folder / "record.json").read_text())
@@ -45,14 +45,16 @@ def test_what_is_written(run, scenarios):
 
 
 def test_same_bytes_whatever_ran_before(run):
-    """The same run twice in one process, another scenario in between, gives the same files to the byte."""
+    """The same run twice in one process, with another scenario in between, gives the same bytes."""
     first = contents(run("a"))
     run("other", "--no-lead", scenario="S2")
     assert contents(run("b")) == first
 
 
 def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
-    """The record stands for a whole run: with the disk full half way, none is left, old or new."""
+    """A record exists only for a whole run: if the disk fills up half way, neither the old nor a new one is
+    left.
+    """
     folder = run("a")
     opened = Path.open
 
@@ -80,7 +82,7 @@ def test_no_lead(run):
 
 
 def test_a_wrong_scenario_is_answered(tmp_path, capsys):
-    """A user's mistake gives its place and a remedy on the error stream, exit code 2, and no files."""
+    """A user's mistake is reported on stderr with place and remedy, exit code 2, and no files."""
     bad = tmp_path / "bad.yaml"
     bad.write_text("schema: scenario/1\nnmae: x\n")
     assert main(["--scenario", str(bad), "--out", str(tmp_path / "out")]) == 2
@@ -92,7 +94,7 @@ def test_a_wrong_scenario_is_answered(tmp_path, capsys):
 
 
 def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
-    """An output folder in the way of a file is told by name."""
+    """An output path that is a file is reported by name."""
     (tmp_path / "file").write_text("")
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--max-steps", "1"]
     assert main([*arguments, "--out", str(tmp_path / "file" / "out")]) == 2
@@ -100,7 +102,7 @@ def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
 
 
 def test_frames_without_pictures(scenarios, tmp_path, capsys):
-    """Who names a folder of frames and forgets to ask for pictures is told, not driven by ideal sight."""
+    """Naming a folder of frames without requesting frames is an error."""
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), "--max-steps", "1"]
     assert main([*arguments, "--frames", "mine"]) == 2
     assert "--frames mine, expected --pictures" in capsys.readouterr().err
@@ -112,7 +114,7 @@ def test_frames_without_pictures(scenarios, tmp_path, capsys):
     [[], ["--max-steps", "0"], ["--seed", "x"], ["--seed", "-1"], ["--max-steps", "many"]],
 )
 def test_wrong_arguments(scenarios, tmp_path, arguments, capsys):
-    """Missing or impossible arguments end with code 2, and speak of what was given."""
+    """Missing or impossible arguments exit with code 2 and name the argument."""
     full = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), *arguments]
     with pytest.raises(SystemExit) as caught:
         main(full if arguments else [])

@@ -1,4 +1,4 @@
-"""Runs in which the controller sees the road in pictures."""
+"""Runs in which the controller sees the road in frames."""
 
 import subprocess
 import sys
@@ -40,7 +40,7 @@ spacing_m: {SPACING}
 
 
 class LineReader:
-    """Reads the lane's lines out of the picture, near where it last saw them, and nothing else."""
+    """Reads only the lane's lines from the image, near where it last saw them."""
 
     def __init__(self, model: CameraModel) -> None:
         self._model = model
@@ -83,7 +83,7 @@ def frames(tmp_path):
 
 
 def brought_aside(scenarios, steps):
-    """S1, begun 0.3 m left of the lane's middle."""
+    """S1, started 0.3 m left of the lane's middle."""
     return replace(load_scenario(scenarios / "S1.yaml"), lateral_offset=0.3, steps=steps)
 
 
@@ -91,7 +91,7 @@ def brought_aside(scenarios, steps):
 def test_the_loop_closes_through_the_picture(
     monkeypatch, scenarios, frames, tmp_path, translation, left_over
 ):
-    """A controller that knows the lane from pictures alone steers a car from aside into the middle."""
+    """A controller that knows the lane only from frames steers an offset car into the middle."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(frames=frames, translation=translation, cache=tmp_path / "cache")
     result = simulate(brought_aside(scenarios, 1000), 0, pictures)
@@ -102,8 +102,8 @@ def test_the_loop_closes_through_the_picture(
 
 @pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
 def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
-    """From fair weather into rain, trace and record are the same whatever is in the cache, also damaged or
-    not to be had; and a run whose pictures are all known looks at none.
+    """From fair weather into rain, trace and record are the same for any cache content, even damaged or
+    missing; a run with only known frames analyses none.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     clean, look = PictureCamera.look, []
@@ -140,8 +140,8 @@ def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_pat
 
 
 def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames, tmp_path):
-    """With `--forget` a memory that is wrong changes no byte of a run, and without it the trace is another;
-    who forgets leaves nothing in the memory, and says nothing of it in the record.
+    """With `--forget` a wrong memory changes no byte of a run, and without it the trace differs; such a run
+    stores nothing in the memory and mentions nothing in the record.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     cache = tmp_path / "cache"
@@ -168,7 +168,7 @@ def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames
 
 
 def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
-    """Neither what is imported nor what detects starts a second thread, so that the process may be forked."""
+    """Neither imports nor detectors start a second thread, so the process can be forked."""
     code = (
         "import os, sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
@@ -185,7 +185,7 @@ def test_a_run_with_pictures_has_one_thread(scenarios, frames, tmp_path):
 
 
 def test_runs_without_pictures_load_nothing_for_them():
-    """The libraries that take long to load are not touched in runs that see ideally."""
+    """Runs with ideal vision do not import the slow libraries."""
     code = (
         "import sys; from pathlib import Path; from dataclasses import replace\n"
         "from selfdrive.sim.run import simulate; from selfdrive.sim.scenario import load_scenario\n"
@@ -203,7 +203,7 @@ def test_runs_without_pictures_load_nothing_for_them():
 @pytest.mark.slow
 @pytest.mark.parametrize("translation", [GROUND, SHIFT])
 def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, tmp_path_factory, translation):
-    """With lines read from the pictures no scenario leaves the lane's middle, or alerts the driver."""
+    """With lines read from frames, every scenario stays in the lane's middle without alerts."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):

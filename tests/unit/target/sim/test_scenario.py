@@ -1,4 +1,4 @@
-"""Scenario files: what they mean, and how mistakes in them are answered."""
+"""Scenario files: their meaning, and errors for mistakes."""
 
 import pytest
 from selfdrive.common.errors import ConfigError
@@ -52,7 +52,7 @@ def test_everything_arrives_in_si_units():
 
 
 def test_buttons_are_down_from_press_to_release():
-    """The step of the press is the first with the button down, the step of the release the first without."""
+    """The button is down from the step of the press up to, but excluding, the step of the release."""
     scenario = parse(GOOD)
     assert [scenario.button(k) for k in (119, 120, 129, 130, 505)] == [0, 3, 3, 0, 2]
 
@@ -113,7 +113,7 @@ def test_what_may_be_left_out():
     ],
 )
 def test_mistakes(text, line, got, remedy):
-    """A mistake is told with file and line, what was got, what was expected and what to do."""
+    """A mistake is reported with file and line, finding, expectation and remedy."""
     with pytest.raises(ConfigError) as caught:
         parse(text)
     message = str(caught.value)
@@ -123,13 +123,13 @@ def test_mistakes(text, line, got, remedy):
 
 
 def test_a_number_is_what_it_looks_like():
-    """Sixty is sixty however it is written; YAML 1.1 would read a leading zero as octal."""
+    """Sixty is read as sixty in any notation; YAML 1.1 would read a leading zero as octal."""
     for text in ("60", "060", "60.", "+6.0e1"):
         assert parse(edit("speed_mph: 60", f"speed_mph: {text}")).speed == pytest.approx(26.8224)
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    """A file that is not there, one that is no text, and one without a bottom are told by name."""
+    """A missing file, one that is no text, and one with endless nesting are reported by name."""
     (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
     with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
         load_scenario(tmp_path / "deep.yaml")
@@ -142,7 +142,7 @@ def test_files_that_cannot_be_read(tmp_path):
 
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_five_scenarios(scenarios, name):
-    """All five: 60 mph, 100 m to the lead at 40 mph, set pressed at 1.2 s for 0.1 s, 30 s."""
+    """All five have 60 mph, 100 m to the lead at 40 mph, set pressed at 1.2 s for 0.1 s, and 30 s."""
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
     assert scenario.lead.gap == 100.0

@@ -1,4 +1,4 @@
-"""The reference of scenario files: what it says is what the parser does."""
+"""The reference of scenario files agrees with the parser."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ SCENARIOS = sorted((CLONE / "fault_library" / "scenarios").glob("*.yaml"))
 
 
 def accepted(data: dict[str, Any]) -> tuple[bool, bool]:
-    """Whether the schema and whether the parser take a scenario."""
+    """Whether the schema and the parser accept a scenario."""
     try:
         parse_scenario(yaml.safe_dump(data), "test", "")
     except ConfigError:
@@ -28,7 +28,7 @@ def accepted(data: dict[str, Any]) -> tuple[bool, bool]:
 
 
 def test_page_and_schema_are_up_to_date() -> None:
-    """What is committed is what the parser's keys and bounds give now."""
+    """The committed page and schema match the parser's keys and bounds."""
     remedy = "run: python -m selfdrive.sim.scenario_page"
     assert (REFERENCE / "scenario.md").read_text() == scenario_page.page(), remedy
     assert json.loads((REFERENCE / "schemas" / "scenario.json").read_text()) == scenario_page.schema(), remedy
@@ -36,7 +36,7 @@ def test_page_and_schema_are_up_to_date() -> None:
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_the_library_follows_the_schema(path: Path) -> None:
-    """Every scenario of the library is one to the parser and to the schema."""
+    """The parser and the schema accept every scenario of the library."""
     assert accepted(yaml.safe_load(path.read_text())) == (True, True)
 
 
@@ -65,13 +65,15 @@ def full() -> dict[str, Any]:
 
 
 def test_a_full_one_is_taken() -> None:
-    """What the next test breaks is right before."""
+    """The scenario that the next test breaks is valid."""
     assert accepted(full()) == (True, True)
 
 
 @pytest.mark.parametrize("name", scenario_page.SECTIONS)
 def test_schema_and_parser_agree_on_keys_and_bounds(name: str) -> None:
-    """Each needed key missing, an unknown key, text for a number, each bound passed: both refuse."""
+    """Both refuse a missing required key, an unknown key, text for a number, and a value beyond
+    each bound.
+    """
     _, types, needed = scenario_page.SECTIONS[name]
     breaks: list[tuple[str, Any]] = [(key, None) for key in needed] + [("unheard_of", 1)]
     for key, kind in types.items():

@@ -1,4 +1,4 @@
-"""Files whose content the detections' memory depends on, and mutants of them."""
+"""Files that the detections' memory depends on, and mutants of them."""
 
 import json
 from collections.abc import Callable
@@ -31,8 +31,9 @@ Drive = Callable[..., tuple[str, str]]
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Drive:
-    """Drives a mutant for a second, on three frames: its record with the trace's digest, its counts. The
-    fault is in `function` of a file, after the assignment of `name`, and acts from `time_s` on.
+    """Run a mutant for a second, on three frames; return its record with the trace's digest, and its counts.
+
+    The fault is in `function` of a file, after the assignment of `name`, and acts from `time_s` on.
     """
     frames, work = tmp_path / "frames", tmp_path / "work"
     frames.mkdir()
@@ -74,13 +75,14 @@ def drive(tmp_path: Path) -> Drive:
 
 
 def memory() -> Path:
-    """Where the harness has the target keep what was seen."""
+    """The folder where the harness lets the target store detections."""
     return caches.of_target("openpilot") / FILE
 
 
 def test_the_manifest_names_every_file_that_sees() -> None:
-    """A mutant of a file whose bytes the memory's key has is run where that file is on the disk; faults in
-    visiond and in the camera, which are not in the key, can be forked."""
+    """A mutant of a file in the memory's key runs from the disk; faults in visiond and in the camera, which
+    are not in the key, can be forked.
+    """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     package = ROOT / "target" / "selfdrive"
     seeing = {f"selfdrive/{p.relative_to(package).as_posix()}" for glob in SEEING for p in package.glob(glob)}
@@ -97,8 +99,9 @@ def test_the_manifest_names_every_file_that_sees() -> None:
 
 
 def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
-    """A mutant of one is run where it is on the disk, so that the compiled code is not found; what chooses
-    between the two takes no faults."""
+    """A mutant of a file with compiled code runs from the disk, so that the compiled code is not found; the
+    code that chooses between the two accepts no faults.
+    """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     target = ROOT / "target"
     stood_for = {
@@ -114,7 +117,9 @@ def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
 
 
 def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
-    """All that a library is found by travels with a mutant: without a header, say, slow Python would run."""
+    """A mutant's tree has everything that identifies a library: without a header, for example, slow Python
+    would run.
+    """
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
     base = prepare_base(manifest, tmp_path / "base")
     found = {
@@ -126,8 +131,8 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
 
 
 def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
-    """A fault in a detector's code gives the same trace and the same counts in a run that shares nothing, and
-    in runs after itself and after the same fault at another time; nothing of it is kept.
+    """A fault in a detector gives the same trace and counts in a run without sharing, after itself, and after
+    the same fault at another time; none of its results is stored.
     """
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))
@@ -139,13 +144,13 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> Non
 @pytest.mark.slow
 @pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("mark_windows-*")), reason="nothing is compiled")
 def test_a_fault_in_code_that_was_compiled_acts(drive: Drive) -> None:
-    """Compiled helpers do not stand for a mutant of the code that they were made of."""
+    """Compiled helpers do not replace mutated code."""
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)
     assert '"count": 14' in acted[1] and acted == drive(place, 0.3, independent=True)
 
 
 def test_a_fault_elsewhere_leaves_the_memory_in_use(drive: Drive) -> None:
-    """What a mutant's pristine detector saw is kept."""
+    """Detections of a mutant's pristine detector are stored."""
     drive(("selfdrive/controls/lib/latcontrol.py", "LatControl.plan", "factor"), 0.3)
     assert memory().exists()

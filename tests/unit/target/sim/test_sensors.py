@@ -1,4 +1,4 @@
-"""What sensors and radar put on the bus."""
+"""What sensors and radar send on the bus."""
 
 import cantools
 import pytest
@@ -21,7 +21,7 @@ def read(database, frames):
 
 
 def test_speed_and_angle_as_cantools_reads_them(truth):
-    """All speeds agree with the truth in km/h, the angle is in degrees."""
+    """All speeds equal the truth in km/h, and the angle is in degrees."""
     frames = CarSensors().measure(truth(v_ego=20.0, steer_angle=-0.1, steer_rate=0.2), 3, 0)
     values = read(CAR, frames)
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(72.0)
@@ -34,14 +34,14 @@ def test_speed_and_angle_as_cantools_reads_them(truth):
 
 @pytest.mark.parametrize(("speed", "shown"), [(0.29999, 0.0), (0.3, 1.08), (0.0, 0.0)])
 def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
-    """Below 0.3 m/s all speeds read 0, but wheels that turn at all count as moving."""
+    """Below 0.3 m/s all speeds read 0, but turning wheels count as moving."""
     values = read(CAR, CarSensors().measure(truth(v_ego=speed), 0, 0))
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(shown)
     assert values["STANDSTILL"]["WHEELS_MOVING"] == (speed > 0)
 
 
 def test_every_message_has_its_period_and_counter(truth):
-    """Each message comes in its own period, its counter moving on by one every time."""
+    """Each message has its own period, and its counter advances by one each time."""
     sensors, seen = CarSensors(), {}
     for frame in range(100):
         for name, values in read(CAR, sensors.measure(truth(v_ego=0.1 * frame), 0, frame)).items():
@@ -58,14 +58,14 @@ def radar(truth, road=None, **values):
 
 
 def test_radar_cuts_off_towards_zero(truth):
-    """Distance and speed lose what is less than a step, whatever the sign, like the original's."""
+    """Distance and speed are truncated towards zero, like the original's."""
     track = radar(truth, d_rel=97.681, v_ego=26.777, v_lead=17.8868)
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (97.625, -8.875)
 
 
 @pytest.mark.parametrize(("d_rel", "read_as"), [(255.99, 255.9375), (256.0, 0.0), (317.0, 61.0), (-5.0, 0.0)])
 def test_radar_distance_wraps(truth, d_rel, read_as):
-    """Twelve bits of 1/16 m wrap around at 256 m; behind the bumper reads 0."""
+    """Twelve bits of 1/16 m wrap around at 256 m; a lead behind the bumper reads 0."""
     assert radar(truth, d_rel=d_rel)["LONG_DIST"] == read_as
 
 
@@ -79,7 +79,7 @@ def test_radar_sees_the_lead_where_it_is(truth):
 
 
 def test_radar_of_a_broken_measurement():
-    """What is no number reads 0 and raises nothing."""
+    """NaN reads 0 and raises nothing."""
     sensor = RadarSensor(Road(None, None))
     track = read(RADAR, sensor._pack(float("nan"), float("inf"), 0.0))["TRACK_15"]
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (0.0, 0.0)

@@ -14,7 +14,7 @@ from selfdrive.sim.simulator import Simulator
 
 
 class Script:
-    """In the controller's place: notes what it is given, sends what `commands(step)` says."""
+    """Replaces the controller: records its input and sends `commands(step)`."""
 
     def __init__(self, commands=lambda step: (0, 0, 0)):
         self.commands = commands
@@ -49,7 +49,7 @@ def drive(scenario, script, steps):
 
 
 def test_a_command_acts_in_the_next_step(s1):
-    """What is sent in step k moves the car in step k + 1, and row k shows the commands that were felt."""
+    """A command of step k moves the car in step k + 1, and row k shows the active commands."""
     script = Script(lambda step: (-384, 51, 0) if step == 3 else (0, 0, 0))
     trace = drive(s1, script, 8).result().trace
     assert np.flatnonzero(trace["brake"]).tolist() == [4]
@@ -60,7 +60,7 @@ def test_a_command_acts_in_the_next_step(s1):
 
 
 def test_what_the_controller_is_given(s1):
-    """Car frames every step; radar frames and a view every fifth, from the same moment."""
+    """Car frames come every step; radar frames and a view every fifth, from the same moment."""
     script = Script()
     drive(s1, script, 20)
     assert [t for t, _, _ in script.steps] == [k / 100 for k in range(20)]
@@ -84,7 +84,7 @@ def test_buttons_reach_the_bus(s1):
 
 
 def test_truth_of_a_coasting_run(s1):
-    """The first rows hold the original's plant to its printed digits, and HWT is distance over speed."""
+    """The first rows equal the original's plant to its printed digits, and HWT is distance over speed."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
     expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}
@@ -113,7 +113,9 @@ def test_free_road(s1):
 
 
 def test_hazards_and_alerts_in_the_record(s1):
-    """First hazards with their times; of counted alerts the first of each kind, and every raising."""
+    """The record has the first hazards with their times; the first of each kind of counted alerts, and every
+    raising.
+    """
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
     simulator.reset(replace(s1, steps=1000), 7)
@@ -137,7 +139,7 @@ def test_hazards_and_alerts_in_the_record(s1):
 
 
 def test_trace_channels(s1):
-    """Every channel has one value a step, of its type; the controller's own view is among them."""
+    """Every channel has one value a step, of its type, including the controller's own view."""
     script = Script()
     script.radar_state = SimpleNamespace(lead_one=LeadData(status=True, d_rel=50.0, v_lead_k=17.0))
     script.controlsd.plan = Plan(v_target=25.0, source="mpc2")

@@ -1,4 +1,4 @@
-"""Regions of warped pictures: OpenCV's bits of the whole, from C as from OpenCV."""
+"""Regions of warped images have OpenCV's bits of the whole, from C as from OpenCV."""
 
 import ctypes
 import subprocess
@@ -29,7 +29,7 @@ def library(all_compiled):
 
 
 def moves(random):
-    """Homographies of cars beside the lane's middle, a little, far or absurdly; and impossible ones."""
+    """Homographies of cars slightly, far or absurdly off the lane's middle; and impossible ones."""
     for offset, heading in random.normal(0.0, 1.0, (12, 2)) * ((0.5, 0.02),):
         yield product(product(np.linalg.inv(TO_CAR), car_to_road(0.0, offset, heading)), TO_CAR)
     for offset, heading in ((9.0, 0.4), (-30.0, 1.5), (0.0, 3.0)):
@@ -42,13 +42,13 @@ def moves(random):
 
 
 def sources(random):
-    """Noise, stripes of a pixel, black and white."""
+    """Noise, one-pixel stripes, black and white."""
     stripes = np.tile(np.array([0, 255], np.uint8), SHAPE[0] * SHAPE[1] // 2).reshape(SHAPE)
     return random.integers(0, 256, SHAPE, np.uint8), stripes, np.full(SHAPE, 255, np.uint8)
 
 
 def test_a_region_is_that_of_opencvs_whole():
-    """With any matrix the reference's region is cut out of what OpenCV makes of all."""
+    """With any matrix, the reference's region equals the cut of OpenCV's whole result."""
     random = np.random.default_rng(1)
     for matrix in moves(random):
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -62,7 +62,7 @@ def test_a_region_is_that_of_opencvs_whole():
 
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
-    """In any region, of contiguous pictures and of cut ones."""
+    """The bits agree in any region, for contiguous and cut images."""
     if not agrees(library):
         pytest.skip("OpenCV calculates in another way here")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
@@ -81,7 +81,7 @@ def test_compiled_warps_have_the_same_bits(library):
 @needs_compiler
 @pytest.mark.parametrize("option", ["-DIS_FAST=0", "-DIS_WIDE=0"])
 def test_processors_without_wide_vectors_warp_the_same(library, tmp_path, option):
-    """The bits do not depend on the instructions that a processor has."""
+    """The bits do not depend on the processor's instruction set."""
     words = [*compile_helpers.compiler(), option, compiled_warp.C_SOURCE, "-o", tmp_path / "warp.so"]
     subprocess.run([*words, *compile_helpers.OPTIONS], check=True)
     narrow = compiled.Library(ctypes.CDLL(str(tmp_path / "warp.so")), b"")
@@ -95,7 +95,9 @@ def test_processors_without_wide_vectors_warp_the_same(library, tmp_path, option
 @needs_compiler
 @pytest.mark.parametrize("shape", [(50, 100), (64, 64), (3, 65), (1, 200), (2, 64)])
 def test_pictures_of_any_size_are_warped(library, shape):
-    """Also where there is but a row, and where a row is no whole number of vectors."""
+    """Images of any size work, even with a single row, or rows that are not a multiple of the
+    vector width.
+    """
     if not agrees(library):
         pytest.skip("OpenCV calculates in another way here")
     random, fast = np.random.default_rng(3), CompiledWarp(library)
@@ -107,7 +109,7 @@ def test_pictures_of_any_size_are_warped(library, shape):
 
 @needs_compiler
 def test_what_is_no_grey_picture_is_left_to_opencv(library):
-    """A fault may make a picture of floats."""
+    """A fault may make a float image, which is left to OpenCV."""
     source = np.random.default_rng(4).random(SHAPE).astype(np.float32)
     region = Region(5, 9, 3, 200)
     assert np.array_equal(CompiledWarp(library)(source, np.eye(3), region), source[region.part])
@@ -115,7 +117,7 @@ def test_what_is_no_grey_picture_is_left_to_opencv(library):
 
 @needs_compiler
 def test_another_opencv_is_left_alone(library, monkeypatch):
-    """Where it has other bits than the compiled warp, it is OpenCV that warps, and no library is named."""
+    """If OpenCV has other bits than the compiled warp, OpenCV warps, and no library is named."""
 
     def rounds_otherwise(source, matrix, region):
         return warp(source, matrix * (1.0 + 1e-7), region)
@@ -128,7 +130,7 @@ def test_another_opencv_is_left_alone(library, monkeypatch):
 
 @needs_compiler
 def test_without_a_library_opencv_warps(library):
-    """And its name is nobody's."""
+    """Without a library OpenCV warps, and no library is named."""
     assert isinstance(library.code, ctypes.CDLL)
     folder, compiled._folder = compiled._folder, None
     assert build_warp() == (warp, "")

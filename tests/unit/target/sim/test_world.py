@@ -12,7 +12,7 @@ BEND = Road(None, ((0.0,), (0.002,)))
 
 
 def test_lead_follows_its_profile():
-    """The lead has the speed its table gives at each step's beginning, and moves with it."""
+    """The lead has its table's speed at each step's beginning, and moves with it."""
     lead = LeadVehicle(100.0, (0.0, 1.0, 2.0), (10.0, 10.0, 20.0))
     speeds = []
     for frame in range(300):
@@ -33,7 +33,7 @@ def test_grade_and_curvature_tables():
 
 
 def test_bend_is_a_parabola_for_constant_curvature():
-    """A road of constant curvature leaves its tangent by k x^2 / 2, to the side of the curvature."""
+    """A road of constant curvature departs from its tangent by k x^2 / 2, to the side of the curvature."""
     points = BEND.bend(0.0, 50)
     assert points == pytest.approx([0.001 * x * x for x in range(50)])
     assert BEND.sideways(0.0, 40.2) == points[40]
@@ -58,7 +58,7 @@ def test_heading_and_bend_in_view(truth):
 
 
 def test_ideal_vision_passes_geometry_on(truth):
-    """The model holds the view's lines shifted by where they pass the car, and the lead's distance."""
+    """The model has the view's lines, shifted to where they pass the car, and the lead's distance."""
     visiond = Visiond(IdealDetector())
     assert visiond.latest is None
     visiond.update(Camera(BEND).look(truth(lateral_offset=0.5, d_rel=33.0)), 7.0)

@@ -1,4 +1,4 @@
-"""Driving by the paper's detector: the five scenarios on rendered roads."""
+"""Lane keeping with the paper's detector: the five scenarios on rendered roads."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def drive(name: str, marks: str, cache: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_lane_is_kept_between_solid_lines(name, cache):
-    """No hazard, no alert that steering is at its limit, and never more than 0.3 m from the middle."""
+    """There is no hazard, no steering limit alert, and at most 0.3 m from the middle."""
     result = drive(name, "solid", cache)
     assert set(result.record["hazards"].values()) == {None}
     assert "steer_saturated" not in [alert["name"] for alert in result.record["alerts"]]

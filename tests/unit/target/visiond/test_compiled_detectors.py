@@ -1,4 +1,4 @@
-"""Detectors with their arithmetic in C see what the Python sees, to the last bit."""
+"""Detectors with their arithmetic in C return the Python code's results, to the last bit."""
 
 from dataclasses import replace
 from math import sin
@@ -41,7 +41,7 @@ DETECTORS = {
 
 @pytest.fixture(scope="module", params=["", " -DPLAIN"], ids=["vectors", "plain"])
 def helpers(request, tmp_path_factory, all_compiled):
-    """A folder with all libraries: those of any processor, and those with the widest vectors of this one."""
+    """A folder with all libraries: for any processor, and with the widest vectors of this one."""
     if not request.param:
         return all_compiled
     folder = tmp_path_factory.mktemp("compiled")
@@ -61,7 +61,9 @@ def _found(helpers):
 
 @pytest.fixture(scope="module")
 def pictures():
-    """A road with either kind of marks from many poses, clean and under every effect; noise; nothing."""
+    """A road with either kind of marks from many poses, clean and under every effect; noise; an
+    empty image.
+    """
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
     changes = [None] * 8 + [
@@ -82,7 +84,7 @@ def pictures():
 
 
 def view(picture) -> CameraView:
-    """A view of which only the picture is right."""
+    """A view with only a valid image."""
     return CameraView(
         left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture
     )
@@ -90,7 +92,7 @@ def view(picture) -> CameraView:
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_lines_are_the_same_to_the_bit(name, pictures):
-    """In clean pictures, under all effects, in noise and in nothing, one after the other."""
+    """The bits agree for clean images, all effects, noise and empty images, in sequence."""
     plain, build, kind = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     assert type(fast) is kind and fast.calculated_by != slow.calculated_by
@@ -109,7 +111,7 @@ def test_lines_are_the_same_to_the_bit(name, pictures):
     ids=["wide", "small", "narrow"],
 )
 def test_lines_of_another_camera_are_the_same_to_the_bit(model):
-    """Whatever the size of its part of the road."""
+    """The bits agree for any size of its part of the road."""
     slow, fast = PaperDetector(model), build_paper_detector(model)
     road = RoadRenderer(model, "dashed", 2, periods=2)
     for k in range(8):
@@ -119,7 +121,7 @@ def test_lines_of_another_camera_are_the_same_to_the_bit(model):
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_what_a_fault_makes_of_a_picture_is_seen_or_refused_alike(name, pictures):
-    """Another type, order or size: the same lines, or the same error."""
+    """Another type, order or size gives the same lines or the same error."""
     plain, build, _ = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     odd = [
@@ -149,7 +151,7 @@ def _outcome(detector, picture) -> str:
     "width, rows, focal", [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
 )
 def test_maps_of_any_camera_are_the_same(width, rows, focal):
-    """Also of one whose pictures cannot be halved without a rest."""
+    """Maps agree for any camera, even with image sizes that cannot be halved evenly."""
     model = CameraModel.from_view(width=width, rows=rows, horizon=0.3 * rows, focal=focal, height=1.3)
     slow, fast = RoadView(model), CompiledRoadView(model, compiled.library(compiled_view.C_SOURCE))
     for seed in range(5):
@@ -159,8 +161,9 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_the_same_lines_are_voted_for(seed):
-    """Among any number of points, in maps with and without content, before anything is known and after, also
-    where no lane of that width fits in, and where there are too many candidates for C."""
+    """The votes agree for any number of points, in maps with and without content, with and without history,
+    also if no lane of that width fits, or C has too many candidates.
+    """
     chance = np.random.default_rng(seed)
     view = RoadView(MODEL)
     road = chance.integers(0, 2, (len(view.drop), len(view.y)), np.uint8)
@@ -186,7 +189,7 @@ def _voted(choose, *given) -> str:
 
 @pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
 def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
-    """Another version of OpenCV may filter otherwise: then the Python does all of it."""
+    """Another version of OpenCV may filter differently: then Python does everything."""
     here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
 
     def otherwise(*given):
@@ -205,7 +208,7 @@ def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
 
 
 def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
-    """Features of each window, in steps, are those of Hog; windows above any threshold those of the net."""
+    """Features of each window, in steps, equal Hog's; windows above any threshold equal the net's."""
     size = 112, 480
     hog, net = Hog(*size), LaneNet.load()
     for threshold in (0.0, 4.0, -2.5):
@@ -224,7 +227,7 @@ def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
 
 
 def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
-    """C says that it cannot tell, and the detector asks the net."""
+    """C reports an undecided score, and the detector asks the net."""
     part = np.ascontiguousarray(pictures[0][200:232, 280:312])
     score = float(LaneNet.load().score(windows(Hog(32, 32).blocks(part)).reshape(1, FEATURES))[0])
     library = compiled.library(compiled_windows.C_SOURCE)

@@ -1,4 +1,4 @@
-"""The exact DBSCAN on masks against scikit-learn's."""
+"""The exact DBSCAN on masks agrees with scikit-learn's."""
 
 import cv2
 import numpy as np
@@ -10,12 +10,12 @@ from sklearn.cluster import DBSCAN
 
 
 def labels(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """What ours makes of the mask's pixels."""
+    """Our labels of the mask's pixels."""
     return dbscan(np.flatnonzero(mask), mask.shape, eps, min_samples).tolist()
 
 
 def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """What scikit-learn makes of the mask's pixels."""
+    """scikit-learn's labels of the mask's pixels."""
     points = np.argwhere(mask)
     if not len(points):
         return []
@@ -32,7 +32,7 @@ def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
     need=st.floats(0.0, 1.5),
 )
 def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, eps, need):
-    """Label for label, for sparse and dense masks and few and many samples needed."""
+    """Labels agree for sparse and dense masks, and for few and many required samples."""
     mask = (np.random.default_rng(seed).random((rows, width)) < share).astype(np.uint8)
     min_samples = 1 + int(need * share * (2 * eps + 1) ** 2)
     assert labels(mask, eps, min_samples) == expected(mask, eps, min_samples)
@@ -40,7 +40,7 @@ def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, e
 
 @pytest.mark.parametrize(("eps", "min_samples"), [(1, 2), (3, 6), (4, 10), (6, 30)])
 def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
-    """Label for label on what edges look like: many thin crossing and broken lines."""
+    """Labels agree on masks like edges: many thin crossing and broken lines."""
     rng = np.random.default_rng(eps)
     mask = np.zeros((128, 320), np.uint8)
     for _ in range(25):
@@ -51,7 +51,9 @@ def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
 
 
 def test_a_pixel_between_two_clusters_belongs_to_the_first():
-    """A border pixel within reach of two clusters is the lower numbered one's, and no bridge between them."""
+    """A border pixel within reach of two clusters belongs to the lower-numbered one and does not
+    join them.
+    """
     mask = np.array([[1, 1, 1, 0, 0, 0, 1, 1, 1]] * 3, np.uint8)
     mask[1, 4] = 1
     assert labels(mask, 2, 8) == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]

@@ -18,7 +18,7 @@ def _road(model):
 
 @pytest.fixture
 def frames(tmp_path):
-    """A folder with a frame of each shape of camera, and the truth of both, written to truth.json."""
+    """A folder with a frame of each camera shape, and both truths in truth.json."""
     folder = tmp_path / "frames"
     (folder / "deep").mkdir(parents=True)
     lines = {}
@@ -61,7 +61,7 @@ def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
 
 
 def test_a_line_elsewhere_is_a_miss(frames, capsys):
-    """A line further off than the limit makes the frame a miss; the command itself succeeded."""
+    """A line further off than the limit makes the frame a miss; the command itself succeeds."""
     lines = _lines(frames)
     lines["p1_one"]["L"][1] -= 30.0
     _write(frames, lines)
@@ -71,7 +71,7 @@ def test_a_line_elsewhere_is_a_miss(frames, capsys):
 
 
 def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
-    """Where a detector saw nothing, it gets no credit for what it expects."""
+    """If a detector saw nothing, its expectation earns no credit."""
     cv2.imwrite(str(frames / "frames" / "one.png"), np.full((540, 960, 3), 90, np.uint8))
     _write(frames, {"p1_one": _lines(frames)["p1_one"]})
     assert _run(frames) == 0
@@ -80,7 +80,7 @@ def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
 
 
 def test_lines_win_over_centres(frames, capsys):
-    """An entry with both is judged by its lines."""
+    """An entry with lines and centres is judged by its lines."""
     lines = _lines(frames)
     lines["p1_one"]["gt"] = {"L": 1.0, "R": 2.0}
     _write(frames, lines)
@@ -89,7 +89,7 @@ def test_lines_win_over_centres(frames, capsys):
 
 
 def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
-    """An entry whose lines are null is judged by its centres."""
+    """An entry with null lines is judged by its centres."""
     lines = _lines(frames)
     left, right = (lines["p1_one"][side] for side in "LR")
     lines["p1_one"] = {
@@ -103,7 +103,7 @@ def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
 
 
 def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, capsys):
-    """The key's first word picks the folder; where it does not, the frame is refused, not guessed."""
+    """The key's first word selects the folder; if it does not, the frame is refused, not guessed."""
     folder = frames / "frames"
     for camera in ("p1", "tus"):
         (folder / camera).mkdir()
@@ -118,19 +118,19 @@ def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, c
 
 
 def test_overlays_that_cannot_be_written_are_named(frames, capsys):
-    """A file in the way of the folder ends with its name."""
+    """If a file is in the way of the folder, the error names it."""
     (frames / "drawn").write_text("in the way")
     assert _run(frames, "--overlays", str(frames / "drawn")) == 2
     assert "drawn/robust_p1_one.png" in capsys.readouterr().err
 
 
 def test_a_folder_s_own_camera_is_used(frames, capsys):
-    """A camera.yaml beside the frames makes keys of any kind possible."""
+    """With a camera.yaml next to the frames, keys may have any form."""
     (frames / "frames" / "camera.yaml").write_text(
         "schema: camera/1\nname: mine\nfiles: '*.png'\nwidth: 960\nrows: 540\n"
         "horizon_row: 318\nfocal_px: 868.5\nheight_m: 1.21\nfps: 20\n"
     )
-    for number in (3, 4, 9):  # no sequence: what is to be looked at is in the truth file
+    for number in (3, 4, 9):  # not a sequence: the truth file lists the frames
         (frames / "frames" / f"{number}.png").write_bytes(b"")
     _write(frames, {"one": _lines(frames)["p1_one"]})
     assert _run(frames) == 0
@@ -150,7 +150,7 @@ def test_a_folder_s_own_camera_is_used(frames, capsys):
     ],
 )
 def test_a_wrong_truth_is_named(frames, capsys, lines, words):
-    """A frame or camera that is not there and a line that is none are errors of the user, with names."""
+    """A missing frame or camera, or an invalid line, is a user's error with names."""
     _write(frames, lines)
     assert _run(frames) == 2
     error = capsys.readouterr().err
@@ -158,14 +158,14 @@ def test_a_wrong_truth_is_named(frames, capsys, lines, words):
 
 
 def test_an_unreadable_frame_is_named(frames, capsys):
-    """A file that is no picture is an error that names it."""
+    """A file that is no image is an error that names it."""
     (frames / "frames" / "one.png").write_bytes(b"no picture")
     assert _run(frames) == 2
     assert "one.png" in capsys.readouterr().err
 
 
 def test_a_missing_truth_file_is_named(frames, capsys):
-    """So is a truth file that is not there."""
+    """A missing truth file is an error that names it."""
     (frames / "truth.json").unlink()
     assert _run(frames) == 2
     assert "truth.json" in capsys.readouterr().err
@@ -173,7 +173,7 @@ def test_a_missing_truth_file_is_named(frames, capsys):
 
 @pytest.mark.parametrize("width", [640, 960, 1280])
 def test_the_canonical_frame_has_its_vanishing_row_at_200(width):
-    """Whatever its size, a frame ends up 640 wide with the camera's vanishing row in row 200."""
+    """Any frame ends up 640 wide with the camera's vanishing row in row 200."""
     rows = width * 9 // 16
     frame = np.zeros((rows, width, 3), np.uint8)
     row = round(425 / 720 * rows)

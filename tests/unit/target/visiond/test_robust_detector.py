@@ -18,7 +18,7 @@ CAMERAS = {
     "flat": CameraModel.from_view(width=640, rows=480, horizon=200, focal=579, height=1.21),
     "large": CameraModel.from_view(width=1280, rows=720, horizon=330, focal=1000, height=1.5),
 }
-STEP = 1.342  # m between pictures
+STEP = 1.342  # m between frames
 
 
 @cache
@@ -28,7 +28,7 @@ def renderer(camera: str = "steep", marks: str = "solid") -> RoadRenderer:
 
 
 def see(detector: RobustDetector, picture: np.ndarray) -> LaneLines:
-    """What the detector makes of a picture; the view's geometry is of no use."""
+    """The detector's result for an image; the view's geometry is invalid."""
     nan = float("nan")
     return detector.detect(
         CameraView(left_lane_y=nan, right_lane_y=nan, path_y=nan, bend=(), lead_d_rel=nan, picture=picture)
@@ -44,7 +44,7 @@ def errors(lines: LaneLines, truth: tuple) -> list[float]:
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.6, -0.03), (-0.7, 0.04)])
 def test_a_first_picture_is_enough(camera, marks, offset, heading):
-    """Without a past both lines are found, to some cm and a few mrad, and the path is between them."""
+    """Without history both lines are found, to some cm and a few mrad, with the path between them."""
     road = renderer(camera, marks)
     truth = road.truth(offset, heading)
     lines = see(RobustDetector(road.model), road.grey(3.0, offset, heading))
@@ -76,7 +76,7 @@ def test_another_road_with_distractors():
 
 @pytest.mark.parametrize("tone", [0, 128, 255])
 def test_an_empty_picture_shows_no_lines(tone):
-    """In a picture of one tone no line is seen; both are expected where a car in its lane has them."""
+    """In an image of one tone no line is seen; both are expected at an assumed lane's positions."""
     model = CAMERAS["steep"]
     lines = see(RobustDetector(model), np.full((model.rows, model.width), tone, np.uint8))
     assert (lines.left.prob, lines.right.prob, lines.path.prob) == (0.0, 0.0, 0.0)
@@ -84,7 +84,7 @@ def test_an_empty_picture_shows_no_lines(tone):
 
 
 def test_lines_are_held_for_a_while_ever_less_probable():
-    """When nothing is seen any more, the lines stay and fade; after a second there is none."""
+    """When nothing is seen any more, the lines stay and fade; after a second there are none."""
     road = renderer()
     detector = RobustDetector(road.model)
     before = see(detector, road.grey(0.0, 0.4, 0.02))
@@ -101,7 +101,7 @@ def test_lines_are_held_for_a_while_ever_less_probable():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_line_is_enough_to_know_the_other(side):
-    """With half of the view covered, the covered line goes where the other one puts it, and fades."""
+    """With half of the view covered, the covered line follows from the other one, and fades."""
     road = renderer()
     detector = RobustDetector(road.model)
     see(detector, road.grey(0.0))
@@ -120,7 +120,7 @@ def test_one_line_is_enough_to_know_the_other(side):
 
 
 def test_lines_are_followed_through_rain():
-    """With ten thousand streaks over a dashed road, which hide paint for a moment, the lane is not lost."""
+    """Behind ten thousand streaks over a dashed road, which briefly hide paint, the lane is not lost."""
     from types import SimpleNamespace
 
     from selfdrive.sim.effects import PaperRain
@@ -136,7 +136,7 @@ def test_lines_are_followed_through_rain():
 
 
 def test_beyond_a_line_the_next_lane_is_the_car_s():
-    """A car that drifts over a line is first told of its old lane, then of the one it is in."""
+    """A car that drifts over a line first gets its old lane, then the one it is in."""
     road = renderer()
     detector = RobustDetector(road.model)
     for i in range(75):
@@ -148,7 +148,9 @@ def test_beyond_a_line_the_next_lane_is_the_car_s():
 
 
 def test_the_same_pictures_give_the_same_lines():
-    """Two detectors agree to the last bit, whatever another one sees between, and leave the picture alone."""
+    """Two detectors agree to the last bit, whatever another one sees in between, and do not modify
+    the image.
+    """
     road = renderer()
     first, second, other = (RobustDetector(road.model) for _ in range(3))
     noise = np.random.default_rng(2)

@@ -1,4 +1,4 @@
-"""Training: the same windows and the same net from the same seed, and a net that knows marks."""
+"""Training: a seed always gives the same windows and the same net, and the net recognizes marks."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,9 @@ def sample() -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
-    """With and without a mark, at most so many of each from a picture; a second draw gives the same bytes."""
+    """Windows with and without a mark come in equal numbers, limited for each image; a second draw gives the
+    same bytes.
+    """
     features, labels = sample
     assert 0.4 < labels.mean() < 0.6
     assert len(labels) <= 2 * 6 * 2 * EACH
@@ -25,13 +27,13 @@ def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
 
 
 def test_the_shipped_net_knows_marks_on_roads_it_has_not_seen(sample):
-    """It tells at least three in four windows right, of roads drawn to be hard."""
+    """It classifies at least three in four windows correctly, on deliberately hard roads."""
     features, labels = sample
     assert np.mean((LaneNet.load().score(features) > 0.0) == labels) >= 0.75
 
 
 def test_weights_can_be_stored_and_loaded(tmp_path):
-    """A net that was written and read again is the same, and is written in the same bytes."""
+    """A net written and read again is the same, and has the same bytes when written."""
     net = LaneNet.load()
     net.save(tmp_path / "a.npz")
     LaneNet.load(tmp_path / "a.npz").save(tmp_path / "b.npz")
@@ -40,7 +42,7 @@ def test_weights_can_be_stored_and_loaded(tmp_path):
 
 @pytest.mark.slow
 def test_training_anew_gives_the_same_net_which_agrees_with_the_shipped_one(tmp_path, sample, capsys):
-    """Two small trainings write the same bytes; most windows are judged as by the net that ships."""
+    """Two small trainings write the same bytes and agree with the shipped net on most windows."""
     for name in ("a.npz", "b.npz"):
         assert train.main(["--small", "--out", str(tmp_path / name)]) == 0
     assert "are told right" in capsys.readouterr().out

@@ -15,7 +15,7 @@ from selfdrive.visiond.under_effects import HEADS, IN_A_ROW, main
 
 @pytest.fixture(scope="module")
 def frames(tmp_path_factory):
-    """A folder with one frame, and the truth of it."""
+    """A folder with one frame, and its truth."""
     folder = tmp_path_factory.mktemp("frames")
     road = RoadRenderer(UDACITY, "solid", 1, periods=2)
     down = SOURCES["p1"].vanishing_row * 640 / 960 - 200
@@ -28,7 +28,7 @@ def frames(tmp_path_factory):
 
 
 def test_misses_are_counted_by_level(frames, tmp_path, capsys):
-    """As many pictures as seeds where chance has a part in the effect, one where it has none."""
+    """A random effect has as many images as seeds, a deterministic one has one."""
     chosen = ["--effect", "PaperOcclusion", "--effect", "MedianBlur", "--seeds", "3"]
     assert main([*frames, *chosen, "--csv", str(tmp_path / "found.csv")]) == 0
     printed = capsys.readouterr().out.splitlines()
@@ -50,7 +50,7 @@ def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    """Two rows of five, with room for effects of fewer levels."""
+    """Strips have two rows of five, with room for effects of fewer levels."""
     kinds = {kind.__name__: kind for kind in LEVELS}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
@@ -60,6 +60,6 @@ def test_strips_show_all_levels(frames, tmp_path):
 
 
 def test_missing_frames_are_told(frames, tmp_path, capsys):
-    """In one line, with what to do."""
+    """Missing frames are reported in one line, with a remedy."""
     assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
     assert "p1_one" in capsys.readouterr().err
