@@ -1,4 +1,4 @@
-"""From a campaign file to its frozen plan: experiments, sampling, filters, chunks, provenance.
+"""Turn a campaign file into its frozen plan: experiments, sampling, filters, chunks and provenance.
 
 This package does not run or judge experiments.
 """

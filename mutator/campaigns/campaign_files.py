@@ -1,4 +1,4 @@
-"""Campaign files: faults, scenarios, triggers and limits of a campaign."""
+"""Campaign files: the faults, scenarios, triggers and limits of a campaign."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -24,10 +24,10 @@ _Told = TypeVar("_Told")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """A selection of faults: specs by glob over `<module>/<fault_type>/<variant>`, a spec `file`, or
+    """A selection of faults: specs by a glob over `<module>/<fault_type>/<variant>`, a spec `file`, or
     `operators`.
 
-    `values` is how many of a variant's values are taken, spread evenly in spec order (None: all).
+    `values` is the number of values to take from each variant, spread evenly in spec order (None: all).
     """
 
     spec: str
@@ -40,7 +40,7 @@ class Selection:
 class Canary:
     """A fault known to be harmful: its largest value, active from `at_s` on, must reach `hazard`.
 
-    `spec` is a whole `<module>/<fault_type>/<variant>`.
+    `spec` is the full name of a variant, `<module>/<fault_type>/<variant>`.
     """
 
     spec: str
@@ -51,18 +51,19 @@ class Canary:
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """A checked campaign file. Times are seconds of simulation; `source` is the file as read.
+    """A checked campaign file. Times are simulated seconds; `source` is the file as read.
 
-    * `sample`: how many experiments are taken, equally per variant; with `proportional`, in pairs, in
-      proportion to the number of each fault type and scenario
+    * `sample`: the number of experiments to take, equally per variant. With `proportional`, experiments are
+      taken in pairs, in proportion to the number of each fault type and scenario.
     * `study`: the published work that reports compare with (None: none)
-    * `setting_in(reading)`: manifest changes of every run
+    * `setting_in(reading)`: the manifest changes that apply to every run
     * `reading`: None for the library's default
-    * `armed_after(reading)`: no trigger fires and no random time is drawn before it; None: as in the manifest
+    * `armed_after(reading)`: the time before which no trigger fires and no random time is drawn; None: as in
+      the manifest
     * `table`, `listed`: the triggers, from a context table or a list
-    * `seeds`: the campaign is repeated with each
+    * `seeds`: the seeds; the campaign is repeated with each
     * `hold_s`: how long a triggered fault stays active (None: while its context holds, or to the end)
-    * `after_hazard`: whether runs end at their first terminal hazard
+    * `after_hazard`: whether runs continue or end at their first terminal hazard
     """
 
     name: str
@@ -97,19 +98,19 @@ class Campaign:
         return self.seeds[0]
 
     def armed_after(self, reading: str) -> float | None:
-        """When triggers are armed under a reading; None if the campaign does not say."""
+        """The time at which triggers are armed under a reading; None if the campaign does not set it."""
         return _in(self.armed_after_s, reading) if self.armed_after_s else None
 
     def setting_in(self, reading: str) -> tuple[str, ...]:
-        """The manifest changes under a reading."""
+        """The manifest changes that apply under a reading."""
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """Their position in the file."""
+        """The position of these manifest changes in the file."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
-        """An error (not raised) that points into the campaign file."""
+        """Return an error, not raised, that points into the campaign file."""
         return self.yaml.error(keys, got, expected=expected, remedy=remedy)
 
 
@@ -118,9 +119,9 @@ def _in(told: Mapping[str, _Told], reading: str) -> _Told:
 
 
 def load_campaign(path: Path) -> Campaign:
-    """Read a campaign file strictly; MutatorError with file and line for any mistake.
+    """Read a campaign file strictly; any mistake raises MutatorError with file and line.
 
-    Only `load_study` checks that its study is available, so old runs open without it.
+    The study may be missing here, so that old runs still open. `load_study` checks it.
     """
     model, source = read(path, CampaignModel, SCHEMA, older={SCHEMA: with_list})
     _check_once(model, source)
@@ -181,7 +182,7 @@ def _seeds(model: CampaignModel) -> range:
 
 
 def _check_once(model: CampaignModel, source: Source) -> None:
-    """Check that no scenario, method or change of a setting appears twice."""
+    """Check that no scenario, method or manifest change appears twice."""
     settings: dict[Keys, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
@@ -196,12 +197,14 @@ def _check_once(model: CampaignModel, source: Source) -> None:
 
 
 def _spec_file(campaign: Path, spec: str) -> Path | None:
-    """The spec file that a selection names; None if it names specs of the library."""
+    """The spec file that a selection names; None if it selects specs of the library."""
     return campaign.parent / spec if spec.endswith((".yaml", ".yml")) else None
 
 
 def load_study(campaign: Campaign) -> Study | None:
-    """The study that a campaign names, or None; MutatorError with file and line if it is unavailable."""
+    """Load the study that a campaign names (None: none); MutatorError with file and line if it is
+    unavailable.
+    """
     if campaign.study is None:
         return None
     try:
@@ -213,7 +216,7 @@ def load_study(campaign: Campaign) -> Study | None:
 
 
 def check_readings(campaign: Campaign, readings: Readings) -> None:
-    """Raise MutatorError for an undeclared reading, or one that `armed_after_s` or `setting` omits."""
+    """Raise MutatorError for an undeclared reading, or if `armed_after_s` or `setting` omits a reading."""
     known = ", ".join(readings.names)
     remedy = f"correct the name, or declare the reading in the library's {FILE}"
     if campaign.reading is not None and campaign.reading not in readings.names:

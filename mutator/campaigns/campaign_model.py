@@ -18,38 +18,41 @@ from mutator.operators.names import Operator
 
 
 class SelectionModel(StrictModel, title="A selection"):
-    """Faults of the library by the names of their specs, faults of a spec file, or mutants of `operators`."""
+    """Select specs of the library by name, a spec file, or mutants of `operators`."""
 
     spec: str | None = Field(
         None,
-        description="A glob over `<module>/<fault_type>/<variant>`: `sensor/*`, `sensor/speed/low`; or a "
-        "spec file that is not in the library, by its path from the folder of the campaign: `my_fault.yaml`.",
+        description="A glob over `<module>/<fault_type>/<variant>`, such as `sensor/*` or "
+        "`sensor/speed/low`. Or a spec file outside the library, as a path relative to the "
+        "campaign's folder: `my_fault.yaml`.",
     )
     values: int | None = Field(
-        None, ge=1, description="How many of each variant's values, spread evenly; without it, all."
+        None, ge=1, description="How many values to take from each variant, spread evenly. Default: all."
     )
     operators: list[Annotated[Operator, Field(strict=False)]] | None = Field(
         None,
         min_length=1,
-        description="Instead of a spec: the mutants of these [operators](operators.md), in lines that golden "
-        "runs of the campaign's scenarios execute.",
+        description="Instead of `spec`: mutants of these [operators](operators.md), in lines that the "
+        "golden runs of the campaign's scenarios execute.",
     )
     in_: list[str] | None = Field(
         None,
         alias="in",
         min_length=1,
-        description="With operators: where, `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders.",
+        description="Only with `operators`: where to mutate. Give `PATH` or `PATH::FUNCTION`; `*` is a "
+        "wildcard, and `**` also matches across folders.",
     )
     sample: int | None = Field(
         None,
         ge=1,
-        description="With operators: how many mutants, drawn by operator and function; without it, all.",
+        description="Only with `operators`: how many mutants to draw, spread over operators and functions. "
+        "Default: all.",
     )
     when: list[Annotated[When, Field(strict=False)]] | None = Field(
         None,
         min_length=1,
-        description="With operators: `permanent` (under the trigger `always`), `transient` (under the "
-        "campaign's other triggers) or, without it, both.",
+        description="Only with `operators`: `permanent` (under the trigger `always`) or `transient` (under "
+        "the campaign's other triggers). Default: both.",
     )
 
     @model_validator(mode="after")
@@ -71,34 +74,35 @@ class _CanaryModel(StrictModel, title="The canary"):
     """A fault known to be harmful. The campaign starts only if it reaches its hazard."""
 
     spec: str = Field(
-        description="A variant's whole name, `<module>/<fault_type>/<variant>`; its largest value is taken, "
-        "then the others until one does harm."
+        description="The full name of a variant, `<module>/<fault_type>/<variant>`. Its largest value runs "
+        "first; the other values follow until one causes the hazard."
     )
     scenario: str = Field(description="The scenario.")
-    hazard: str = Field(description="The hazard that it must reach.")
+    hazard: str = Field(description="The hazard that the fault must reach.")
     at_s: float = Field(ge=0.0, allow_inf_nan=False, description="The time from which the fault is active.")
 
 
 class _LimitsModel(StrictModel, title="Limits"):
-    """What one run may use before it is stopped."""
+    """The resources that one run may use before it is stopped."""
 
-    cpu_s: int = Field(default=60, ge=1, le=MOST, description="Seconds of CPU.")
-    wall_s: int = Field(default=300, ge=1, le=MOST, description="Seconds of wall time.")
-    memory_mb: int = Field(default=4096, ge=256, le=MOST, description="MiB of address space.")
-    steps: int = Field(default=20_000, ge=1, le=MOST, description="Steps of simulation.")
+    cpu_s: int = Field(default=60, ge=1, le=MOST, description="CPU time in seconds.")
+    wall_s: int = Field(default=300, ge=1, le=MOST, description="Wall time in seconds.")
+    memory_mb: int = Field(default=4096, ge=256, le=MOST, description="Address space in MiB.")
+    steps: int = Field(default=20_000, ge=1, le=MOST, description="Number of simulation steps.")
     disk_mb: int = Field(
         default=1024,
         ge=1,
         le=MOST,
-        description="MiB in its output folder and TMPDIR together, and in any single file that it writes.",
+        description="MiB in the run's output folder and TMPDIR together. It also limits each single file "
+        "that the run writes.",
     )
 
 
 class SeedsModel(StrictModel, title="Seeds"):
-    """The campaign is repeated with each of these seeds."""
+    """The seeds with which the campaign is repeated."""
 
     from_: int = Field(alias="from", ge=0, lt=2**63, description="The first seed.")
-    to: int = Field(ge=0, lt=2**63, description="The last seed (included).")
+    to: int = Field(ge=0, lt=2**63, description="The last seed, included.")
 
     @model_validator(mode="after")
     def _check(self) -> "SeedsModel":
@@ -108,43 +112,45 @@ class SeedsModel(StrictModel, title="Seeds"):
 
 
 class CampaignModel(StrictModel, title="The file"):
-    """What to run, and what each run may use."""
+    """What a campaign runs, and what each run may use."""
 
-    name: str = Field(pattern=r"^[a-z0-9_]+$", description="Its name: small letters, digits and `_`.")
-    about: str = Field(description="What it is for.")
+    name: str = Field(pattern=r"^[a-z0-9_]+$", description="The name: lowercase letters, digits and `_`.")
+    about: str = Field(description="The purpose of the campaign.")
     study: str | None = Field(
         None, description="The [study](../how-to/add-a-study.md) that its reports compare the results with."
     )
-    target: str = Field(description="The target, by the name of its manifest.")
-    scenarios: list[str] = Field(min_length=1, description="Names of scenarios, each once.")
+    target: str = Field(description="The target, named by its manifest.")
+    scenarios: list[str] = Field(min_length=1, description="The scenarios by name, each once.")
     setting: Annotated[
         dict[str, list[str]], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_NAMES))
     ] = Field(
         {EVERY_READING: []},
-        description="Changes of the manifest for every run, including fault-free ones: one "
-        "list, or one for each reading by its name.",
+        description="Manifest changes that apply to every run, including fault-free runs. Give one list, or "
+        "one list for each reading by its name.",
     )
-    faults: list[SelectionModel] = Field(min_length=1, description="Which faults; each selection adds some.")
+    faults: list[SelectionModel] = Field(
+        min_length=1, description="The selections of faults. The campaign runs the faults of all of them."
+    )
     reading: str | None = Field(
         None,
-        description="One of the library's [readings](fault-spec.md#readings); without it, the first. "
+        description="One of the library's [readings](fault-spec.md#readings). Default: the first. "
         "`--reading` overrides it.",
     )
     methods: list[Annotated[Method, Field(strict=False)]] = Field(
         default_factory=lambda: [Method.GUIDED],
         min_length=1,
-        description="`guided`, `random` or both; without it, `guided`.",
+        description="`guided`, `random` or both. Default: `guided`.",
     )
     triggers: Triggers = Field(description="When faults become active.")
     sample: int | None = Field(
         None,
         ge=1,
-        description="How many experiments are taken, equally per variant; without it, all.",
+        description="How many experiments to take, equally per variant. Default: all.",
     )
     proportional: bool = Field(
         False,
-        description="The sample takes each fault type in each scenario in proportion to its number, guided "
-        "and random ones in pairs.",
+        description="Take each fault type in each scenario in proportion to its number of experiments, and "
+        "guided and random experiments in pairs.",
     )
     seed: int | None = Field(
         None,
@@ -154,16 +160,17 @@ class CampaignModel(StrictModel, title="The file"):
     )
     seeds: SeedsModel | None = Field(
         None,
-        description="Several seeds: the campaign is repeated with each, `sample` included. `--seed` takes "
+        description="The seeds; the campaign, including its `sample`, is repeated with each. `--seed` runs "
         "one seed instead.",
     )
-    canary: _CanaryModel = Field(description="The check that a known fault causes a hazard.")
+    canary: _CanaryModel = Field(description="A check that a known fault causes a hazard.")
     after_hazard: Annotated[AfterHazard, Field(strict=False)] = Field(
         AfterHazard.GO_ON,
-        description="`stop` ends each faulty run at its first [terminal hazard](../explanation/verdicts.md"
-        "#the-end-of-the-drive), which saves time; later hazards and alerts are then not observed.",
+        description="`stop` ends each faulty run at its first [terminal "
+        "hazard](../explanation/verdicts.md#the-end-of-the-drive). This saves time, but later "
+        "hazards and alerts are not observed.",
     )
-    limits: _LimitsModel = Field(_LimitsModel(), description="What one run may use.")
+    limits: _LimitsModel = Field(_LimitsModel(), description="The resources that one run may use.")
     chunk: int = Field(
         20,
         ge=1,

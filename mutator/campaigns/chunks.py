@@ -1,4 +1,4 @@
-"""Chunks: the work of one pytest item. They are cut when a plan is frozen."""
+"""Chunks: the experiments that one pytest item runs. Freezing a plan cuts it into chunks."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from mutator.store.run_folder import RunFolder
 
 
 def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
-    """Lengths of a plan's chunks: at most `size` experiments each, within one of the neighbouring groups.
+    """The lengths of a plan's chunks: at most `size` experiments each; no chunk spans two groups.
 
-    A group shares a golden run, so an engine can share work within a chunk.
+    The experiments of a group share a golden run, so an engine can share work within a chunk.
     """
     lengths: list[int] = []
     for i, group in enumerate(groups):
@@ -25,7 +25,9 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
 
 
 def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
-    """Experiments per chunk, for chunks of at most `size` runs; a shared run stays whole."""
+    """Cut chunks of at most `size` runs, and return the number of experiments in each. A shared run is never
+    split.
+    """
     lengths = iter([len(same) for same in runs])
     counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
     return tuple(sum(islice(lengths, count)) for count in counts)
@@ -33,15 +35,15 @@ def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """The rest of one chunk: its index, and the positions in it without a record."""
+    """The unfinished part of a chunk: the chunk's index, and the positions in it that have no record."""
 
     chunk: int
     places: tuple[int, ...]
 
 
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
-    """Chunks of the folder's share with experiments that have no record or a harness error, which is tried
-    again.
+    """Yield the chunks of this folder's share in which experiments have no record, or a harness error, which
+    is retried.
     """
     done = {one.experiment_id for one in endings(records) if one.counts}
     names = plan_file.ids(folder.path) if done else None

@@ -1,4 +1,4 @@
-"""From a campaign to its experiments: select and expand faults, make triggers, draw random times."""
+"""Turn a campaign into experiments: select and expand faults, create triggers, draw random times."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -28,7 +28,7 @@ _Numbered = tuple[int, Fault]  # a fault and its position among its variant's va
 
 
 class Expansion:
-    """Everything that a campaign's experiments are made from, for one seed and one reading."""
+    """Everything from which a campaign's experiments are created, for one seed and one reading."""
 
     def __init__(
         self, workspace: Workspace, campaign: Campaign, manifest: TargetManifest, seed: int, reading: str
@@ -46,18 +46,18 @@ class Expansion:
         self._operators = OperatorFaults(manifest, self._models, campaign.limits)
 
     def with_seed(self, seed: int) -> "Expansion":
-        """The same with another seed, without reading files again."""
+        """The same expansion with another seed, without reading files again."""
         other = copy(self)
         other.seed = seed
         return other
 
     @property
     def told(self) -> tuple[str, ...]:
-        """How many mutants of operators there were, and what was left out."""
+        """How many mutants the operators produced, and what was left out."""
         return tuple(self._operators.told)
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """All experiments; those with the same scenario and changes are adjacent, as they share a golden
+        """All experiments. Those with the same scenario and changes are adjacent, because they share a golden
         run.
         """
         self._check_setting()
@@ -76,7 +76,7 @@ class Expansion:
         return tuple(experiment for _, experiment in made)
 
     def canary(self) -> Experiment:
-        """The canary: the variant's largest value from a given time on."""
+        """The canary: the variant's largest value, active from a given time."""
         canary = self.campaign.canary
         if canary.hazard not in self.manifest.hazards:
             raise self.campaign.error(
@@ -105,7 +105,7 @@ class Expansion:
                 )
 
     def _library(self) -> list[_Numbered]:
-        """Every fault of the library with its number within its variant."""
+        """Every fault of the library, with its position within its variant."""
         if not self._specs:
             self._specs.append(self.workspace.specs())
         return self._expanded(self._specs[0])
@@ -116,7 +116,7 @@ class Expansion:
         return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
 
     def _spec_of_file(self, keys: Keys, file: Path) -> FaultSpec:
-        """The spec in a file; its name must differ from those of the library."""
+        """Read the spec in a file; its name must differ from all names in the library."""
         if not file.is_file():
             raise self.campaign.error(
                 keys,
@@ -163,7 +163,9 @@ class Expansion:
         return list(selected.values())
 
     def _mutants(self) -> list[OperatorFault]:
-        """The mutants of operators without duplicates; active whenever one of several selections says so."""
+        """The mutants of operators, without duplicates. A mutant in several selections is active whenever one
+        of them requires it.
+        """
         found: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.faults):
             if selection.operators is not None:
@@ -175,7 +177,7 @@ class Expansion:
         return list(found.values())
 
     def _drives(self) -> dict[str, GoldenDrive]:
-        """The golden run of each scenario, for the lines that it executes."""
+        """The golden run of each scenario, used to find the lines that it executes."""
         return {
             name: GoldenDrive(
                 scenario=self._scenario_file(name),
@@ -196,8 +198,8 @@ class Expansion:
         )
 
     def _triggers(self) -> tuple[Trigger, ...]:
-        """The triggers of the context table or the list; random times are drawn for the same ones, as
-        pairs.
+        """The triggers of the context table or the list. Random times are drawn for the same triggers, which
+        forms pairs.
         """
         if self.campaign.table is None:
             return listed_triggers(
@@ -227,8 +229,8 @@ class Expansion:
     def _of_operators(
         self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
-        """Permanent mutants always, transient ones under the other triggers, in scenarios that execute
-        them.
+        """Experiments with mutants, in scenarios that execute them. Permanent mutants are always active;
+        transient ones follow the other triggers.
         """
         permanent = always(armed_after_s=self.armed_after_s)
         for one in mutants:
@@ -248,10 +250,10 @@ class Expansion:
         return row
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
-        """The random partner of a row's trigger, the same in every reading except for the first possible
+        """The random partner of a row's trigger. It depends on the reading only through the earliest possible
         time.
         """
-        assert self.campaign.random_until_s is not None  # the file requires it for random times
+        assert self.campaign.random_until_s is not None  # the schema requires it for random times
         time = draw_time(
             self.seed,
             f"{scenario}/{fault.spec}/{number}/{row.name}",
@@ -280,7 +282,7 @@ class Expansion:
 
     def _scenario_file(self, scenario: str) -> Path:
         known = self.workspace.scenarios
-        if scenario not in known:  # a file elsewhere could change or differ on another machine
+        if scenario not in known:  # a file outside the library could change, or differ on another machine
             raise self.campaign.error(
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
@@ -291,7 +293,7 @@ class Expansion:
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Report an unknown name at the campaign's `keys`; mistakes in other files keep their place."""
+        """Report an unknown name at the campaign's `keys`. Mistakes in other files keep their own place."""
         try:
             yield
         except MutatorError as err:

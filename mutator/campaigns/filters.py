@@ -31,9 +31,9 @@ _ALLOWED = (
 def compile_filter(text: str, columns: Collection[str]) -> Predicate:
     """Compile a filter into a predicate over rows.
 
-    Allowed: columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`, and/or/not,
-    parentheses, `match(column, "glob*")`. An empty cell equals only `None`, and is neither less nor greater
-    than anything. MutatorError shows the text, the mistake and the known columns.
+    A filter may contain columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`,
+    and/or/not, parentheses, and `match(column, "glob*")`. An empty cell equals only `None`, and is neither
+    less nor greater than any value. MutatorError shows the text, the mistake and the known columns.
     """
     if len(text) > _LONGEST:
         raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")

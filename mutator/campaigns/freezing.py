@@ -34,20 +34,20 @@ from mutator.store.run_head import CAMPAIGN, HEAD, SCHEMA
 from mutator.workspace import Workspace
 
 CSV = "plan.csv"
-_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # left by a killed freeze
+_OURS = ("owner.lock", "workers", "plan", CSV, CAMPAIGN, digests.FILE)  # a killed freeze may have left files
 
 
 def freeze(plan: Plan | Planning, out: Path, workspace: Workspace) -> RunFolder:
-    """Write the plan (and plan.csv) into the run folder `out`, made if missing.
+    """Write the plan and plan.csv into the run folder `out`, which is created if missing.
 
-    A folder with the same plan is left unchanged. MutatorError for another plan, changed sources, a folder in
-    use, or other content.
+    A folder with the same plan is left unchanged. MutatorError if the folder has another plan, changed
+    sources or other content, or is in use.
     """
     return freeze_and_tell(plan, out, workspace)[0]
 
 
 def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
-    """As `freeze`; also returns the plan's totals."""
+    """Like `freeze`, but also return the plan's totals."""
     is_new = not out.exists()
     make_run_folder(out)
     try:
@@ -60,7 +60,7 @@ def freeze_and_tell(plan: Plan | Planning, out: Path, workspace: Workspace) -> t
 
 
 def make_run_folder(out: Path) -> None:
-    """Make `out` unless it is a run folder; MutatorError if it holds anything else."""
+    """Create `out` unless it is a run folder; MutatorError if it contains anything else."""
     if out.exists() and not RunFolder.exists(out):
         names = [path.name for path in out.iterdir()] if out.is_dir() else [out.name]
         strangers = [name for name in names if name not in _OURS and not is_half_written(name)]
@@ -76,7 +76,7 @@ def make_run_folder(out: Path) -> None:
 
 
 def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tuple[RunFolder, Tally]:
-    """As `freeze_and_tell`, for the folder's owner."""
+    """Like `freeze_and_tell`, for a caller that owns the folder."""
     if RunFolder.exists(out):
         folder = RunFolder.open(out)
         tally, found = _counted(plan)
@@ -93,7 +93,7 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
     tally, found, places, files = _written(plan, out)
     head = json_bytes(_head(plan, tally, found, workspace, places))
     digests.write(out, Ledger(files=files | {HEAD: Digest.of(head)}))
-    write_atomic(out / HEAD, head)  # last: this makes it a run folder
+    write_atomic(out / HEAD, head)  # last, because this file makes the folder a run folder
     return RunFolder.open(out), tally
 
 
@@ -109,7 +109,7 @@ def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: 
 
 
 def _written(plan: Plan | Planning, out: Path) -> tuple[Tally, str, list[plan_file.Chunk], dict[str, Digest]]:
-    """Write the plan's files part by part; returns totals, digest, chunk positions and file digests."""
+    """Write the plan's files part by part; return totals, digest, chunk positions and file digests."""
     plan_file.make_folder(out)
     write_atomic(out / CAMPAIGN, plan.campaign.source)
     with ExitStack() as stack:
@@ -183,7 +183,7 @@ def _head(
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
-    """The rows of experiments in plan.csv, with or without column names."""
+    """The rows of plan.csv for these experiments, with or without column names."""
     writer = csv.writer(text := io.StringIO(), lineterminator="\n")
     if head:
         writer.writerow(PLAN_COLUMNS)

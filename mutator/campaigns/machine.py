@@ -1,4 +1,4 @@
-"""What a run computes with: Python, operating system, processor, BLAS, packages; and the state of git
+"""Find what a run computes with: Python, operating system, processor, BLAS, packages and the state of git
 clones.
 """
 
@@ -25,7 +25,7 @@ _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threa
 
 
 def surroundings() -> list[Any]:
-    """Everything except its sources that may change what a target computes, including all installed
+    """Everything outside the target's sources that may change what it computes, including all installed
     packages.
     """
     return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
@@ -36,7 +36,7 @@ def python() -> str:
 
 
 def cpu() -> str | None:
-    """The processor's model."""
+    """The processor model."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -71,8 +71,8 @@ def blas() -> tuple[dict[str, Any], ...]:
 
 @lru_cache(maxsize=1)
 def _installed() -> dict[str, tuple[str, list[str]]]:
-    """Version and requirements of each installed package; of one installed twice, those of the imported
-    one.
+    """The version and requirements of each installed package. If a package is installed twice, these are of
+    the imported one.
     """
     found: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
@@ -84,16 +84,18 @@ def _installed() -> dict[str, tuple[str, list[str]]]:
 
 
 def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
-    """The version of each of these packages (default: all), sorted; None: not installed."""
+    """The version of each of these packages (default: all installed), sorted; None if a package is not
+    installed.
+    """
     installed = _installed()
     wanted = installed if names is None else names
     return {name: installed.get(name, (None,))[0] for name in sorted(wanted)}
 
 
 def required() -> frozenset[str]:
-    """The packages that mutator needs, with their dependencies.
+    """The packages that mutator requires, and their dependencies.
 
-    If mutator is not installed, so that its needs are unknown, all installed packages.
+    If mutator is not installed, its requirements are unknown, and all installed packages are returned.
     """
     installed = _installed()
     seen: set[tuple[str, str]] = set()
@@ -110,16 +112,18 @@ def required() -> frozenset[str]:
 
 
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
-    """The packages that provide these top-level modules, sorted; others are left out."""
+    """The packages that provide these top-level modules, sorted. Modules that no package provides are
+    omitted.
+    """
     providers = metadata.packages_distributions()
-    # a package installed as a link to its sources may be known only by its own name
+    # a package installed as a link to its sources may be listed only under its own name
     names = (name for module in modules for name in providers.get(module, [module]))
     return tuple(sorted({canonicalize_name(name) for name in names} & _installed().keys()))
 
 
 def clone_state(folder: Path) -> dict[str, Any] | None:
-    """`commit` of the git clone of this folder, and whether the folder has `changed` since; None if
-    unknown.
+    """The state of the git clone at this folder: its `commit`, and whether the folder has `changed` since.
+    None if unknown.
     """
     head = git(folder, "rev-parse", "HEAD", "HEAD:./")
     changes = git(folder, "status", "--porcelain", "--", ".")

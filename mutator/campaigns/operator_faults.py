@@ -17,7 +17,7 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorFault:
-    """A fault of such a selection, and the scenarios whose golden runs execute its line."""
+    """A fault created by an operator, and the scenarios whose golden runs execute its line."""
 
     fault: Fault
     when: tuple[When, ...]
@@ -25,17 +25,17 @@ class OperatorFault:
 
 
 class OperatorFaults:
-    """The faults of selections, for any seed; enumerations are kept for the next seed."""
+    """The faults of selections, for any seed. Enumerations are kept for the next seed."""
 
     def __init__(self, manifest: TargetManifest, models: FaultModels, limits: Limits) -> None:
         self._manifest, self._models, self._limits = manifest, models, limits
         self._found: dict[tuple[OperatorSelection, frozenset[tuple[str, frozenset[int]]]], Found] = {}
-        self.told: dict[str, None] = {}  # how many there were and what was left out, without duplicates
+        self.told: dict[str, None] = {}  # what was found and left out, without duplicate lines
 
     def of(
         self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str
     ) -> list[OperatorFault]:
-        """The faults of a selection in these scenarios. MutatorError if there are none."""
+        """The faults of a selection in these scenarios; MutatorError if there are none."""
         executed = dict(
             zip(drives, lines_of(self._manifest, list(drives.values()), self._limits), strict=True)
         )

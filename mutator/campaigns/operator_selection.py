@@ -9,13 +9,13 @@ from mutator.operators.names import Operator
 class When(StrEnum):
     """When a mutant of an operator is active."""
 
-    PERMANENT = "permanent"  # from when triggers are armed to the end
-    TRANSIENT = "transient"  # as the campaign's triggers and methods say
+    PERMANENT = "permanent"  # from the time at which triggers are armed, to the end
+    TRANSIENT = "transient"  # as the campaign's triggers and methods specify
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorSelection:
-    """Mutants of operators in places of the source; `sample` is how many (None: all)."""
+    """Select mutants of operators in places of the source; `sample` is their number (None: all)."""
 
     operators: tuple[Operator, ...]
     places: tuple[str, ...]

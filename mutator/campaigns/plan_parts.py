@@ -10,7 +10,7 @@ from mutator.campaigns.campaign_files import Campaign
 from mutator.model import Experiment, Fault
 from mutator.store.run_folder import GoldenRun
 
-# Start of every plan digest. Digests are cited, so this text never changes, whatever the run schema.
+# The start of every plan digest. Publications cite digests, so this text must never change.
 _DIGEST_PREFIX = "run/1"
 
 Group = tuple[str, str, str]  # module, fault type, method
@@ -18,7 +18,7 @@ Group = tuple[str, str, str]  # module, fault type, method
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """Experiments in run order, the lengths of their chunks, and the number of runs; scenarios may share a
+    """Experiments in run order, the lengths of their chunks, and the number of runs. Scenarios may share a
     run.
     """
 
@@ -29,9 +29,9 @@ class Part:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """Totals of a plan once all its parts were added.
+    """The totals of a plan, once all its parts have been added.
 
-    With `several_seeds` each seed has its own golden runs. `variants` has one fault per variant.
+    With `several_seeds`, each seed has its own golden runs. `variants` has one fault per variant.
     """
 
     canary: Experiment
@@ -54,7 +54,7 @@ class Tally:
             self.variants[fault.spec] = fault
 
     def needed(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run needed, including the canary's."""
+        """Every fault-free run that the plan needs, including the canary's."""
         own = GoldenRun.of(self.canary, several_seeds=self.several_seeds)
         return tuple(dict.fromkeys((*self.goldens, own)))
 
@@ -73,7 +73,7 @@ class PlanDigest:
             self._joint = ","
 
     def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-        """The digest, once all ids were added."""
+        """The digest, once all ids have been added."""
         rest = [chunks, canary, plain(campaign.canary), plain(campaign.limits)]
         self._hash.update(f"],{canonical(rest)[1:]}".encode())
         return self._hash.hexdigest()

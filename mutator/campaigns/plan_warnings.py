@@ -1,4 +1,4 @@
-"""Warn of experiments that can show nothing."""
+"""Warn about experiments whose fault changes nothing."""
 
 import warnings
 from collections.abc import Sequence
@@ -8,11 +8,11 @@ from mutator.errors import MutatorWarning
 from mutator.faults.fault_models import FaultModels
 from mutator.model import Experiment, Fault
 
-_NAMED = 3  # faults that a warning names
+_NAMED = 3  # how many faults a warning names
 
 
 class IdleValues:
-    """Faults whose value changes nothing, with the number of their experiments."""
+    """Collects the faults whose value changes nothing, and counts their experiments."""
 
     def __init__(self, models: FaultModels) -> None:
         self._models = models
@@ -28,7 +28,7 @@ class IdleValues:
         self._of += len(experiments)
 
     def warn(self) -> None:
-        """Issue a MutatorWarning if there are any."""
+        """Issue a MutatorWarning if there are such faults."""
         if labels := list(dict.fromkeys(self._labels)):
             more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
             warnings.warn(

@@ -1,4 +1,4 @@
-"""Plans: the frozen, ordered list of a campaign's experiments, and the cost of running them."""
+"""Plans: the frozen, ordered list of a campaign's experiments, and the expected cost of running them."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -34,28 +34,28 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     import pandas as pd
 
-RUNS_PER_GOLDEN = 3  # golden twice and the null mutant, for each scenario with its changes
+RUNS_PER_GOLDEN = 3  # two golden runs and the null mutant, for each scenario with its changes
 _DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter start
-_START_S = 3.0  # of a campaign, before and after its runs
-_BYTES_PER_EXPERIMENT = 9_000  # its series, patch, record and rows
+_START_S = 3.0  # time of a campaign outside its runs
+_BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
 _BYTES_PER_GOLDEN = 1_200_000
-_IN_MEMORY = 50_000  # the largest plan that is read as a whole
+_IN_MEMORY = 50_000  # the most experiments for which a plan is read as a whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Choices:
-    """Options on top of the campaign file; None: as in the file.
+    """Options that override the campaign file; None: as in the file.
 
-    Filters (`mutator.campaigns.filters`) use the columns known before running.
+    Filters (`mutator.campaigns.filters`) use the columns that are known before an experiment runs.
     """
 
-    seed: int | None = None  #: seed of the sample, of drawn values and of random triggers
-    reading: str | None = None  #: reading of the fault specs
-    only: str | None = None  #: filter: keep the experiments that fit
-    exclude: str | None = None  #: filter: drop the experiments that fit
-    limit: int | None = None  #: how many experiments to keep, spread as a sample is
-    shard: str | None = None  #: share of the plan to run, `k/n`
-    series_mb: int | None = None  #: budget of the series in MiB; 0: none
+    seed: int | None = None  #: the seed of the sample, of drawn values and of random triggers
+    reading: str | None = None  #: the reading of the fault specs
+    only: str | None = None  #: filter: keep the experiments that match
+    exclude: str | None = None  #: filter: drop the experiments that match
+    limit: int | None = None  #: how many experiments to keep, spread like a sample
+    shard: str | None = None  #: the share of the plan to run, `k/n`
+    series_mb: int | None = None  #: the budget of the series in MiB; 0: no series
 
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("limit", 1), ("series_mb", 0)):
@@ -70,9 +70,9 @@ class Choices:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """Expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk.
+    """The expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk.
 
-    `measured` says whether the rate was measured by this run folder's golden runs or is a default.
+    `measured` says whether the rate comes from this run folder's golden runs; otherwise it is a default.
     """
 
     cpu_s: float
@@ -86,17 +86,17 @@ class Cost:
 class Plan:
     """Experiments in run order, cut into chunks."""
 
-    campaign: Campaign  #: the campaign file, read
-    choices: Choices  #: what overrides the file
-    seed: int  #: seed of the plan
-    reading: str  #: reading of the fault specs
-    experiments: Sequence[Experiment]  #: the experiments, in the order they are run
-    chunks: tuple[int, ...]  #: how many experiments each chunk has, in order
-    canary: Experiment  #: a fault that must do harm; the checks before the campaign run it
-    runs: int  #: number of runs; one that several scenarios share counts once
-    digest: str  #: same campaign, choices, library and scenarios: same digest on every machine
-    run_cpu_s: float | None = None  #: measured CPU time of one run in s; None: not measured
-    told: tuple[str, ...] = ()  #: for mutants of operators: how many there were, and what was left out
+    campaign: Campaign  #: the campaign file as read
+    choices: Choices  #: the options that override the file
+    seed: int  #: the seed of the plan
+    reading: str  #: the reading of the fault specs
+    experiments: Sequence[Experiment]  #: the experiments in run order
+    chunks: tuple[int, ...]  #: the number of experiments in each chunk, in order
+    canary: Experiment  #: a fault that must cause its hazard; the checks before the campaign run it
+    runs: int  #: the number of runs; a run that several scenarios share counts once
+    digest: str  #: the digest: equal on every machine for the same campaign, choices, library and scenarios
+    run_cpu_s: float | None = None  #: the measured CPU time of one run in s; None: not measured
+    told: tuple[str, ...] = ()  #: how many mutants the operators produced, and what was left out
 
     def __repr__(self) -> str:
         count = counted(len(self.experiments), "experiment")
@@ -109,7 +109,7 @@ class Plan:
 
     @cached_property
     def tally(self) -> Tally:
-        """Its totals."""
+        """The plan's totals."""
         found = self.empty_tally()
         for part in self.parts():
             found.add(part)
@@ -120,7 +120,7 @@ class Plan:
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[Part]:
-        """The plan as one part."""
+        """Yield the plan as one part."""
         yield Part(experiments=self.experiments, chunks=self.chunks, runs=self.runs)
 
     def _repr_html_(self) -> str:
@@ -131,7 +131,7 @@ class Plan:
         return f"<p>{escape(repr(self))}</p>{table}"
 
     def frame(self) -> "pd.DataFrame":
-        """A pandas frame of the planned experiments: the columns of `rows`, by experiment id."""
+        """The planned experiments as a pandas frame: the columns of `rows`, indexed by experiment id."""
         import pandas as pd
 
         return pd.DataFrame(self.rows()).set_index("experiment_id")
@@ -141,15 +141,15 @@ class Plan:
         return self.tally.groups
 
     def rows(self) -> list[dict[str, object]]:
-        """One dict per experiment: the result columns known before running."""
+        """Yield one dict per experiment: the result columns that are known before it runs."""
         return [plan_row(experiment) for experiment in self.experiments]
 
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run needed, including the canary's."""
+        """Every fault-free run that the plan needs, including the canary's."""
         return self.tally.needed()
 
     def cost(self, workers: int = 2) -> Cost:
-        """Expected time and disk space."""
+        """The expected time and disk space."""
         goldens = len(self.goldens())
         runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
@@ -165,7 +165,7 @@ class Plan:
 class Planning:
     """A campaign with checked choices, expanded seed by seed.
 
-    MutatorError for a choice that does not fit the campaign.
+    MutatorError for a choice that is invalid in this campaign.
     """
 
     def __init__(self, workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> None:
@@ -181,7 +181,7 @@ class Planning:
             readings.check(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
         if self.campaign.after_hazard is AfterHazard.STOP:
-            stop_source(self._manifest)  # refused here, not by each run
+            stop_source(self._manifest)  # rejected here, before any run starts
         self._expansion = Expansion(workspace, self.campaign, self._manifest, self.seeds[0], self.reading)
         self.canary = self._expansion.canary()
 
@@ -192,7 +192,7 @@ class Planning:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """How many mutants of operators there were, and what was left out; known after making the parts."""
+        """How many mutants the operators produced, and what was left out; known once the parts exist."""
         return self._expansion.told
 
     def empty_tally(self) -> Tally:
@@ -202,8 +202,8 @@ class Planning:
     def parts(self) -> Iterator[Part]:
         """Yield the experiments of each seed that has any.
 
-        MutatorError if no seed has any, and for more shards than chunks; MutatorWarning for values that
-        change nothing.
+        MutatorError if no seed has an experiment, or if there are more shards than chunks; MutatorWarning for
+        values that change nothing.
         """
         idle, chunks = IdleValues(self._workspace.fault_models()), 0
         limit = self.choices.limit
@@ -254,8 +254,8 @@ def _seeds(campaign: Campaign, choices: Choices) -> range:
 def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a library name or a file) into its plan, without writing or running anything.
 
-    MutatorError for a choice that does not fit the campaign, and if no experiment is left; MutatorWarning for
-    values that change nothing.
+    MutatorError for a choice that is invalid in this campaign, and if no experiment is left; MutatorWarning
+    for values that change nothing.
     """
     planning = Planning(workspace, campaign, choices)
     parts = tuple(planning.parts())
@@ -279,7 +279,7 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
 def _choose(
     experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
 ) -> tuple[Experiment, ...]:
-    """Select from a seed's experiments, at most `most`."""
+    """Choose at most `most` of a seed's experiments."""
     if campaign.sample is not None:
         experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
@@ -303,9 +303,9 @@ def _sample(
 
 
 def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
-    """The frozen plan of a run folder; `tally` has its totals, if known.
+    """Load the frozen plan of a run folder; `tally` has its totals, if known.
 
-    Of a very large plan no experiment is kept in memory. Workers read single chunks instead.
+    The experiments of a very large plan are not kept in memory. Workers read single chunks instead.
     """
     head = folder.head
     large = head["experiments"] > _IN_MEMORY
@@ -325,5 +325,5 @@ def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
         told=tuple(head.get("operators", ())),
     )
     if tally is not None:
-        vars(plan)["tally"] = tally  # sets the cached property, which would read every experiment
+        vars(plan)["tally"] = tally  # set the cached property; computing it would read every experiment
     return plan

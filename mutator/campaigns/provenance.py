@@ -1,4 +1,4 @@
-"""What a run depends on: digests of its sources, versions of its software."""
+"""Record what a run depends on: digests of its sources and versions of its software."""
 
 import platform
 from collections.abc import Iterable, Mapping
@@ -25,7 +25,7 @@ _OWN = Path(__file__).parents[1]  # the harness
 
 
 def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
-    """Digest by name of everything outside the plan that a result depends on."""
+    """The digest, by name, of everything outside the plan that affects results."""
     return {
         "target": manifest.tree.digest,
         "manifest": digest(manifest.path.read_bytes()),
@@ -47,9 +47,9 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
 
 
 def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None:
-    """Raise MutatorError for a run folder of another schema or mutator version.
+    """Raise MutatorError for a run folder with another schema or mutator version.
 
-    Such a folder can be read but not resumed, since all its results must come from one program.
+    Such a folder can be read but not resumed, because one program must produce all its results.
     """
     if (schema, provenance["mutator"]) != (SCHEMA, VERSION):
         raise MutatorError(
@@ -61,7 +61,7 @@ def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None
 
 
 def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...]:
-    """How Python and packages differ from the folder's last session; empty if nothing has run yet.
+    """List how Python and packages differ from the folder's last session; empty if nothing has run yet.
 
     MutatorError for any difference that is not accepted.
     """
@@ -74,7 +74,7 @@ def check_versions(folder: RunFolder, *, accept: bool = False) -> tuple[str, ...
 
 
 def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
-    """An error (not raised) about different versions; `what` begins it."""
+    """Return an error, not raised, about different versions; its text begins with `what`."""
     return MutatorError(
         f"{what} other versions: {'; '.join(found)}",
         where=run,
@@ -85,15 +85,18 @@ def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
 
 
 def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
-    """Versions of the harness's requirements, of what a folder's golden runs loaded, and of `more`."""
+    """The versions of the harness's requirements, of the packages that a folder's golden runs loaded, and of
+    `more`.
+    """
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
 def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
-    """Record in run.json what this session runs with, after its checks and before its first experiment.
+    """Record the software and machine of this session in run.json, after its checks and before its first
+    experiment.
 
-    `records` is the glob of its files. MutatorError as in `check_versions`.
+    `records` is the glob of the session's files. MutatorError as in `check_versions`.
     """
     manifest = workspace.manifest(folder.head["target"])
     places = {"library": workspace.library, "templates": workspace.templates, "target": manifest.root}
@@ -117,12 +120,12 @@ def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, acce
 
 
 def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
-    """Append a stretch of work to run.json of a folder that the caller owns."""
+    """Append a stretch of work to run.json in a folder that the caller owns."""
     _write_stretches(folder, [*folder.head.get("stretches", ()), plain(stretch)])
 
 
 def add_machine(folder: RunFolder, machine: Mapping[str, Any]) -> None:
-    """Add a machine to the last stretch of work in run.json of a folder that the caller owns."""
+    """Add a machine to the last stretch of work in run.json, in a folder that the caller owns."""
     *before, last = folder.head["stretches"]
     _write_stretches(
         folder, [*before, last | {"machines": [*last.get("machines", ()), plain(dict(machine))]}]

@@ -12,24 +12,24 @@ _Cell = tuple[str, str, str, str]  # variant, method or methods, scenario, trigg
 
 
 def spread(count: int, wanted: int) -> list[int]:
-    """`wanted` of the indices 0 ... count-1, evenly spread."""
+    """Return `wanted` of the indices 0 ... count-1, evenly spread."""
     if wanted >= count:
         return list(range(count))
     return [(2 * i + 1) * count // (2 * wanted) for i in range(wanted)]
 
 
 def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """`count` of the experiments, in order, balanced over variants, then over method, scenario and trigger.
+    """Draw `count` of the experiments, balanced over variants first, then over method, scenario and trigger.
 
-    A hash of seed and id selects values and breaks ties.
+    The result keeps the order of the experiments. A hash of seed and id selects values and breaks ties.
     """
     return _pick(experiments, [[experiment] for experiment in experiments], count, seed)
 
 
 def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """As `pick`, but guided experiments are taken with their random partners if both are present.
+    """Like `pick`, but take a guided experiment together with its random partner if both are present.
 
-    If whole pairs do not add up to `count`, the last one is split.
+    If `count` does not fit whole pairs, the last pair is split.
     """
     pairs: dict[Hashable, list[Experiment]] = defaultdict(list)
     for experiment in experiments:
@@ -41,7 +41,7 @@ def pick_pairs(experiments: Sequence[Experiment], count: int, seed: int) -> tupl
 def _pick(
     experiments: Sequence[Experiment], units: Iterable[list[Experiment]], count: int, seed: int
 ) -> tuple[Experiment, ...]:
-    """As `pick`, from units that stay whole."""
+    """Like `pick`, but draw units, which are not split."""
     if count >= len(experiments):
         return tuple(experiments)
     cells: dict[str, dict[_Cell, deque[list[Experiment]]]] = defaultdict(dict)
@@ -64,7 +64,7 @@ def _pick(
 
 
 def _whole(experiment: Experiment) -> Experiment:
-    """The experiment without `after_hazard`, so that campaigns that stop their runs draw the same sample."""
+    """The experiment without `after_hazard`, so that campaigns with and without it draw the same sample."""
     goes_on = experiment.after_hazard is AfterHazard.GO_ON
     return experiment if goes_on else replace(experiment, after_hazard=AfterHazard.GO_ON)
 
@@ -76,7 +76,7 @@ def _cell(unit: Sequence[Experiment]) -> _Cell:
 
 
 def _marks(cell: _Cell) -> Iterable[Hashable]:
-    """What is counted for a cell, the most important first."""
+    """The properties whose counts are balanced, the most important first."""
     variant, method, scenario, trigger = cell
     yield variant
     yield variant, method
@@ -93,10 +93,10 @@ def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
 
 
 def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """`count` of the experiments, in order, guided and random ones in pairs.
+    """Draw `count` of the experiments in proportion, in order, guided and random ones in pairs.
 
-    Each fault type and scenario is represented in proportion to its number by a systematic sample of at least
-    one pair. ValueError for a count that is too small or not a whole number of pairs.
+    A systematic sample represents each fault type and scenario in proportion to its number, with at least one
+    pair each. ValueError if the count is too small or not a whole number of pairs.
     """
     if count >= len(experiments):
         return tuple(experiments)
@@ -123,14 +123,14 @@ _Pair = tuple[str, str, str]  # variant, row of the context table, fault
 
 
 def _pair(experiment: Experiment) -> _Pair:
-    """What a guided experiment and its random partner share within a scenario."""
+    """What a guided experiment and its random partner have in common within a scenario."""
     row = experiment.trigger.name.removeprefix("random/")
     return (experiment.fault.spec, row, experiment.fault.id)
 
 
 def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
-    """Allot `total` seats to strata: one each, then by the Sainte-Lague method (1910) for parliamentary
-    seats.
+    """Distribute `total` seats over strata: one each, then by the Sainte-Lague method (1910) for
+    parliamentary seats.
     """
     seats = dict.fromkeys(sizes, 1)
     while sum(seats.values()) < total:

@@ -1,4 +1,4 @@
-"""Runs that several scenarios share: planned together, run once, counted in each."""
+"""Runs that several scenarios share: planned together, run once, counted in each scenario."""
 
 from collections.abc import Hashable, Iterable, Sequence
 
@@ -8,10 +8,10 @@ from mutator.triggers.kinds import time_of
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
-    """A key that is equal for experiments that are the same run.
+    """A key that is equal for experiments that share a run.
 
-    They differ only in scenarios that a change makes the same (`same_in` of the manifest, proved by
-    preflight).
+    Such experiments differ only in scenarios that a change makes identical. The manifest lists them in
+    `same_in`, and the preflight checks them.
     """
     scenarios = same_in(manifest, experiment.changes)
     place: Hashable = scenarios if experiment.scenario in scenarios else experiment.scenario
@@ -19,12 +19,12 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
 
 
 def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
-    """The scenarios that these changes make the same; empty if none."""
+    """The scenarios that these changes make identical; empty if none."""
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
 
 
 def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
-    """Order runs to share the most work: by golden run, then the same trigger, then by time."""
+    """Order runs to share the most work: by golden run, then by trigger, then by time."""
 
     def turn(run: list[Experiment]) -> tuple[str, tuple[str, ...], float, str]:
         first = run[0]
@@ -34,7 +34,7 @@ def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
 
 
 def runs(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:
-    """The experiments of each run, ordered by the first of each."""
+    """The experiments of each run, in the order of each run's first experiment."""
     found: dict[Hashable, list[Experiment]] = {}
     for experiment in experiments:
         found.setdefault(run_key(manifest, experiment), []).append(experiment)

@@ -1,7 +1,7 @@
-"""Installed studies: published work that a campaign may reproduce, each in its own package.
+"""Installed studies: published works that a campaign may reproduce, each in a separate package.
 
-A package registers its study as an entry point of the group `mutator.studies`; a campaign names it
-(`study:`). `mutator.report.studies` has what a study adds to a report.
+A package registers its study as an entry point of the group `mutator.studies`; a campaign names it with
+`study:`. `mutator.report.studies` defines what a study adds to a report.
 """
 
 from collections.abc import Iterable
@@ -20,15 +20,15 @@ layer may not import.
 
 
 class Study(Protocol):
-    """What every study can do."""
+    """The interface of a study."""
 
     def check(self, workspace: Workspace) -> Iterable[MutatorError]:
-        """Problems of the study's data in a fault library."""
+        """The problems of the study's data in a fault library."""
         ...
 
 
 def study_names() -> tuple[str, ...]:
-    """The studies installed here, sorted."""
+    """The names of the installed studies, sorted."""
     return tuple(sorted(entry_points(group=GROUP).names))
 
 
@@ -51,8 +51,8 @@ def find_study(name: str) -> Study:
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
-    """The problems that a study finds in its data in a fault library; a check that fails is a problem,
-    too.
+    """The problems that a study finds in its data in a fault library. A check that raises an exception is
+    also a problem.
     """
     try:
         problems = list(study.check(workspace))
@@ -76,7 +76,7 @@ def _bad_check(name: str, what: str) -> MutatorError:
 
 
 def _wrong(loaded: Any) -> str:
-    """Why an object cannot be used as a study; empty if it can."""
+    """Why an object cannot be used as a study; empty if it can be."""
     if missing := [part for part in PARTS if not hasattr(loaded, part)]:
         return f"is a {type(loaded).__name__} without {', '.join(missing)}"
     if isinstance(loaded, type):

@@ -12,8 +12,8 @@ from mutator.targets.manifest import TargetManifest
 from mutator.triggers.conditions import check_condition
 from mutator.triggers.kinds import always, at_time
 
-EVERY_READING = "*"  # all readings, if a file does not distinguish them
-MOST = 1_000_000_000  # of a limit or a time, beyond any machine or run
+EVERY_READING = "*"  # key of a value that applies to all readings
+MOST = 1_000_000_000  # largest number of a limit or a time, more than any machine or run needs
 _LIST: Keys = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
@@ -21,7 +21,7 @@ _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListedTrigger:
-    """A trigger of a campaign's list: at a time (s), while a condition holds, or (neither) always."""
+    """A trigger of a campaign's list: at a time (s), while a condition holds, or, with neither, always."""
 
     at_s: float | None
     when: str | None
@@ -34,21 +34,25 @@ def by_reading(given: object) -> object:
 
 
 def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of a value that may be given by reading."""
+    """The JSON schema of a value that may be given for each reading."""
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
 class _ListedModel(StrictModel, title="A trigger"):
-    """One of `always`, `at_s` and `when`; the text `always` is enough."""
+    """Exactly one of `always`, `at_s` and `when`. The text `always` stands for `always: true`."""
 
-    always: bool = Field(False, description="`true`: from when triggers are armed to the end.")
-    at_s: Seconds | None = Field(None, description="From that time to the end, in s.")
+    always: bool = Field(False, description="`true`: from the time at which triggers are armed, to the end.")
+    at_s: Seconds | None = Field(None, description="Active from this time (s) to the end.")
     when: str | None = Field(
         None,
-        description="While this condition holds, over `t` (s) and the values that the target observes.",
+        description="Active while this condition holds. It may use `t` (s) and the values that the target "
+        "observes.",
     )
     hold_s: float | None = Field(
-        None, gt=0.0, allow_inf_nan=False, description="The maximum duration, once triggered."
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The longest time that the fault stays active once triggered, in s.",
     )
 
     @model_validator(mode="after")
@@ -70,22 +74,24 @@ _Listed = Annotated[_ListedModel, BeforeValidator(_in_words, json_schema_input_t
 
 class TriggersModel(StrictModel, title="Triggers"):
     """When faults become active. Guided experiments wait for the contexts of a table or the triggers of a
-    list, random ones for a drawn time. `triggers` may be the list itself: `triggers: [always, {at_s: 3},
-    {when: speed > 5}]`.
+    list; random experiments start at a drawn time. `triggers` may be the list itself: `triggers: [always,
+    {at_s: 3}, {when: speed > 5}]`.
     """
 
-    table: str | None = Field(None, description="A context table, by its name.")
-    rows: list[str] | None = Field(None, min_length=1, description="Which of its contexts; without it, all.")
+    table: str | None = Field(None, description="The context table, by its name.")
+    rows: list[str] | None = Field(
+        None, min_length=1, description="The contexts of the table to use. Default: all."
+    )
     listed: list[_Listed] | None = Field(
-        None, alias="list", min_length=1, description="Instead of a table: the triggers, each once."
+        None, alias="list", min_length=1, description="Instead of `table`: the triggers, each once."
     )
     armed_after_s: Annotated[
         dict[str, Seconds], BeforeValidator(by_reading), WithJsonSchema(or_by_reading(_SECONDS))
     ] = Field(
         default_factory=dict,
         min_length=1,
-        description="Before that time no trigger fires and no random time is drawn, in s since the start "
-        "of a run: one number, or one for each reading by its name. Without it, that of the target's "
+        description="The time in s before which no trigger fires and no random time is drawn. Give one "
+        "number, or one for each reading by its name. Default: the time in the target's "
         "manifest. It does not delay an `at_s`.",
     )
     random_until_s: float | None = Field(
@@ -93,15 +99,15 @@ class TriggersModel(StrictModel, title="Triggers"):
         gt=0.0,
         le=MOST,
         allow_inf_nan=False,
-        description="The latest random time, needed for `random` ones. One past the end of a scenario never "
-        "comes.",
+        description="The latest random time in s, required for `random` experiments. A fault whose time is "
+        "past the end of its scenario is never active.",
     )
     hold_s: float | None = Field(
         None,
         gt=0.0,
         allow_inf_nan=False,
-        description="How long a fault stays active once triggered; without it, while its context holds, or "
-        "from its random time to the end.",
+        description="How long a fault stays active once triggered, in s. Default: while its context holds, "
+        "or from its random time to the end.",
     )
 
     @model_validator(mode="after")
@@ -124,14 +130,14 @@ def _as_it_is(given: object) -> object:
     return given
 
 
-# a list was converted to the mapping before this check, so that errors have its lines
+# the list has become a mapping before this check, so that errors have its lines
 Triggers = Annotated[
     TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Written])
 ]
 
 
 def with_list(source: Source) -> Source:
-    """Convert a campaign whose `triggers` are a list to one with that list under `list`."""
+    """Convert a campaign whose `triggers` is a list into one with that list under `list`."""
     given = source.data.get("triggers")
     if not isinstance(given, list):
         return source
@@ -148,9 +154,9 @@ def listed_triggers(
     armed_after_s: float,
     hold_s: float | None,
 ) -> tuple[Trigger, ...]:
-    """The triggers of a campaign's list in `source`; `hold_s` is the default hold.
+    """The triggers of a campaign's list in `source`; `hold_s` is how long they hold by default.
 
-    MutatorError at its line for a condition over unobserved values, and for a duplicate trigger.
+    MutatorError with the line for a condition over unobserved values, and for a duplicate trigger.
     """
     found: dict[str, Trigger] = {}
     for i, one in enumerate(listed):

@@ -9,12 +9,14 @@ from pydantic import Field
 from mutator.config.yaml_files import Source, StrictModel
 from mutator.triggers.conditions import RESERVED
 
-ROUNDING = 1e-9  # of a channel's unit: less comes from the order of sums and has no physical meaning
+ROUNDING = 1e-9  # of a channel's unit; smaller differences can come from the order of sums
 SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 
 class Role(StrEnum):
-    """A channel's role in a verdict: a fault manifests when an `actuator` differs from golden."""
+    """A channel's role in a verdict: a fault has manifested if an `actuator` channel differs from the golden
+    run.
+    """
 
     ACTUATOR = "actuator"
     TRUTH = "truth"
@@ -31,10 +33,10 @@ class Channel:
     """A recorded channel.
 
     * `unit`: for axis labels, `-` for none
-    * `tolerance`: how much it may differ from golden (0: exact)
-    * `component`: the part of the controller it belongs to
-    * `time`: the channel with its times, if it is not recorded in each step
-    * `source`: its name in the trace, if different
+    * `tolerance`: how much the channel may differ from the golden run (0: must be equal)
+    * `component`: the part of the controller to which the channel belongs
+    * `time`: the channel that holds its times, if it is not recorded in each step
+    * `source`: its name in the trace, if that differs
     """
 
     name: str
@@ -48,22 +50,25 @@ class Channel:
 
     @property
     def in_trace(self) -> str:
-        """Its name in the trace."""
+        """The channel's name in the trace."""
         return self.source or self.name
 
 
 class ChannelModel(StrictModel, title="A channel"):
-    """A channel, by the name that conditions, tables and plots use."""
+    """A channel. Conditions, tables and plots use its name."""
 
-    unit: str = Field(description="Its unit, for tables and axes; `-` for none.")
+    unit: str = Field(description="The unit, for tables and axes; `-` for none.")
     role: Role = Field(
         Role.INTERNAL,
         strict=False,
-        description="`actuator`: what the controller commands; if it differs from golden, the "
-        "fault manifested. `truth`: the state of the world. `internal`: what the controller believes.",
+        description="`actuator`: what the controller commands; if it differs from the golden run, the fault "
+        "has manifested. `truth`: the state of the world. `internal`: what the controller "
+        "believes.",
     )
     component: str = Field(
-        "", description="The component that it belongs to, from the control structure if there is one."
+        "",
+        description="The component of the controller to which the channel belongs; it must be in the "
+        "control structure, if there is one.",
     )
     tolerance: float | None = Field(
         None,
@@ -73,17 +78,17 @@ class ChannelModel(StrictModel, title="A channel"):
         "it has manifested; a fault has reached a component if a channel of it does so. Default: 0 for "
         f"actuators, {ROUNDING:g} of the unit for others, so that rounding does not count.",
     )
-    about: str = Field("", description="What it is.")
+    about: str = Field("", description="What the channel contains.")
     time: str = Field(
         "",
-        description="For a channel that is not recorded in each step: the channel that holds its times. In a "
-        "table (`.csv`, `.parquet`) its empty cells are skipped.",
+        description="For a channel that is not recorded in each step: the channel that holds its times. If "
+        "the trace is a table (`.csv`, `.parquet`), its empty cells are skipped.",
     )
     from_: str = Field(
         "",
         alias="from",
-        description="Its name in the trace, if different. In an `.mcap` file: the topic and the "
-        "field of its JSON messages, `/car/state:speed`.",
+        description="The name in the trace, if it differs. In an `.mcap` file: the topic and the field of "
+        "its JSON messages, `/car/state:speed`.",
     )
 
 
@@ -92,13 +97,14 @@ class TraceModel(StrictModel, title="The trace"):
 
     file: str = Field(
         "trace.npz",
-        description="Its name in `{out}`: an `.npz` with an array for each channel, a `.csv` or `.parquet` "
-        "with a column for each, or an `.mcap` with JSON messages (`pip install mcap`).",
+        description="The file name in `{out}`: an `.npz` with an array for each channel, a `.csv` or "
+        "`.parquet` with a column for each, or an `.mcap` with JSON messages (`pip install "
+        "mcap`).",
     )
     time: str = Field(
         "t",
-        description="The channel that holds the time in s of each step. In an `.mcap` file the topic with a "
-        "message for each step, whose log times are simulated time.",
+        description="The channel that holds the time in s of each step. In an `.mcap` file: the topic that "
+        "has a message for each step; its log times are simulated time.",
     )
 
 

@@ -1,4 +1,4 @@
-"""How a manifest says to run and film a target: modules, arguments, changes of a scenario."""
+"""How a manifest runs and films a target: modules, arguments, changes of a scenario."""
 
 from collections.abc import Collection
 
@@ -10,25 +10,25 @@ from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, chec
 
 
 class ChangeModel(StrictModel, title="A change"):
-    """A change is a list of further arguments, or this, if it makes scenarios identical."""
+    """Further arguments and, with them, the scenarios that the change makes identical."""
 
     args: list[str] = Field(description="Further arguments.")
     same_in: list[str] = Field(
-        min_length=2, description="Scenarios that the change makes identical: they share one run."
+        min_length=2, description="The scenarios that the change makes identical. They share one run."
     )
 
 
 class EntryModel(StrictModel, title="The entry"):
-    """In an argument, `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the folder for trace
-    and record. `{cache}` is a folder that all runs of the target share. It may be missing, unwritable or
-    damaged, and `mutator cache` deletes from it; results must not depend on it. `{root}` is the target's
-    root, from which a run may read other files, but never write.
+    """Arguments may contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
+    folder for trace and record. `{cache}` is a folder that all runs of the target share. It may be
+    missing, unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it.
+    `{root}` is the target's root. A run may read other files from it, but must never write to it.
     """
 
-    module: str = Field(description="Run as `python -m`, from the root.")
+    module: str = Field(description="The module, which is run as `python -m` from the root.")
     args: list[str] = Field(
         default_factory=lambda: ["--scenario", "{scenario}", "--seed", "{seed}", "--out", "{out}"],
-        description="Its arguments; without them `--scenario {scenario} --seed {seed} --out {out}`.",
+        description="The module's arguments. Default: `--scenario {scenario} --seed {seed} --out {out}`.",
     )
     stepwise: str | None = Field(
         None,
@@ -37,33 +37,33 @@ class EntryModel(StrictModel, title="The entry"):
     )
     independent: list[str] = Field(
         default_factory=list,
-        description="More arguments, for a run that uses nothing that other runs left: those of "
-        "the equivalence check, and of mutants of a file in `reads_itself`.",
+        description="Extra arguments for runs that must not use data left by other runs. These are the "
+        "equivalence check's runs and the mutants of files in `reads_itself`.",
     )
     changes: dict[str, list[str] | ChangeModel] = Field(
-        default_factory=dict, description="Name of a change of the scenario -> its arguments."
+        default_factory=dict, description="Name of a scenario change -> its arguments."
     )
 
 
 class FilmModel(StrictModel, title="Films"):
-    """What `mutator show --video` and `--still` need. In `run`, `{film}` is the folder for the film. In
-    `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events, `{out}`
-    the file to write, and `{t}` the time of a still in s.
+    """The commands for `mutator show --video` and `--still`. In `run`, `{film}` is the folder for the film.
+    In `args` and `still`, `{golden}` and `{faulty}` are two films, `{events}` is a JSON file of events,
+    `{out}` the file to write, and `{t}` the time of a still in s.
     """
 
-    run: list[str] = Field(description="More arguments of the entry, with which a run writes a film.")
-    module: str = Field(description="Run as `python -m` to show two films.")
+    run: list[str] = Field(description="Extra arguments of the entry that make a run write a film.")
+    module: str = Field(description="The module that shows two films, which is run as `python -m`.")
     args: list[str] = Field(description="Its arguments.")
-    still: list[str] = Field(description="More arguments for a still.")
+    still: list[str] = Field(description="Extra arguments for a still.")
     pictures: list[str] = Field(
         default_factory=list,
-        description="Changes with which the controller uses the camera's images: after a run, the "
-        "worst of its experiments with one of these get stills automatically.",
+        description="Changes with which the controller uses the camera's images. After a run, stills are "
+        "made automatically for the worst experiments that have one of these changes.",
     )
 
 
 def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) -> None:
-    """Raise MutatorError with the line of an invalid module, placeholder or change."""
+    """Raise MutatorError, with the line, for an invalid module, placeholder or change."""
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -112,7 +112,7 @@ def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> N
 
 
 def read_film(model: FilmModel | None) -> Film | None:
-    """Convert the film of a manifest; None without one."""
+    """The film commands of a manifest as a `Film`; None if it has none."""
     if model is None:
         return None
     return Film(

@@ -1,4 +1,6 @@
-"""The environment of a target's processes: what the harness sets, and what a manifest adds."""
+"""The environment of a target's processes: the variables that the harness sets, and those that a manifest
+adds.
+"""
 
 import re
 from collections.abc import Mapping
@@ -6,7 +8,7 @@ from collections.abc import Mapping
 from mutator.config.yaml_files import Source
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's, needed to start Python
+KEPT = ("PATH", "LD_LIBRARY_PATH", "HOME")  # the user's own values, needed to start Python
 FIXED = {
     "LC_ALL": "C.UTF-8",
     "PYTHONUTF8": "1",
@@ -15,14 +17,14 @@ FIXED = {
     # pyarrow, imported by pandas, starts a thread for its allocator, which prevents forking
     "JE_ARROW_MALLOC_CONF": "background_thread:false",
 }
-_PREFIXES = ("PYTHON", "LD_")  # of variables that change the interpreter or what it loads
+_PREFIXES = ("PYTHON", "LD_")  # prefixes of variables that change the interpreter or what it loads
 _OWN = ("TMPDIR", *KEPT, *FIXED)
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
 def check_environment(env: Mapping[str, str], source: Source) -> None:
-    """Check a manifest's `env`; MutatorError for a variable that cannot be set or that the harness sets
-    otherwise.
+    """Check a manifest's `env`. MutatorError for a variable that cannot be set, or that the harness sets to
+    another value.
     """
     for name, value in env.items():
         if FIXED.get(name) == value:

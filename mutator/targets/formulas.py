@@ -7,8 +7,8 @@ from mutator.triggers.conditions import check_condition, check_formula
 
 
 def condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """A condition over the names `known` in canonical text ('' for none); MutatorError at `keys` of the
-    manifest.
+    """The condition in canonical text ('' for none). It may use the names `known`; MutatorError at `keys` of
+    the manifest.
     """
     if text is None:
         return ""
@@ -17,7 +17,7 @@ def condition(text: str | None, known: Collection[str], source: Source, keys: Ke
 
 
 def formula(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
-    """A formula, like `condition`."""
+    """The formula in canonical text; otherwise like `condition`."""
     if text is None:
         return ""
     with source.placing(keys):

@@ -1,4 +1,4 @@
-"""Hazards and metrics as data: what a run must avoid, and numbers for how bad it was."""
+"""Hazards and metrics as data: what a run must avoid, and numbers that measure how bad it was."""
 
 import ast
 from collections.abc import Collection
@@ -19,9 +19,9 @@ _WORSE = Literal["higher", "lower"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """A number for each run: an aggregate of `formula` over the steps where `where` holds.
+    """A number for each run: an aggregate of `formula` over the steps in which `where` holds.
 
-    Steps after the end of the drive (the first terminal hazard) do not count.
+    Steps after the end of the drive, the first terminal hazard, do not count.
     """
 
     name: str
@@ -36,12 +36,12 @@ class Metric:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Hazard:
-    """A hazard and how to find it in a trace. Without `when` and `stl` the record reports it.
+    """A hazard, and how to find it in a trace. Without `when` and `stl`, the target's record reports it.
 
-    It occurs when `when` has held for `for_s` seconds, or when the STL formula `stl` is violated and
-    everything it looks at is known. `margin` is how far a step is from it, in `unit` (for `stl`, the
-    robustness). Once `terminal` holds, the drive is over: later steps are in no metric ('' never; `True`:
-    from the hazard on). Later hazards still count.
+    It occurs when `when` has held for `for_s` seconds, or when the STL formula `stl` is violated and all
+    values that the formula needs are known. `margin` is a step's distance from the hazard, in `unit`; for
+    `stl` it is the robustness. Once `terminal` holds, the drive is over, and metrics ignore later steps ('':
+    never; `True`: from the hazard on). Later hazards still count.
     """
 
     name: str
@@ -55,12 +55,12 @@ class Hazard:
 
     @property
     def recorded(self) -> bool:
-        """Whether the target judges it."""
+        """Whether the target's record, not the trace, reports the hazard."""
         return not (self.when or self.stl)
 
     @property
     def metric(self) -> Metric | None:
-        """The least margin of a run, as the metric `margin_<hazard>`; None without margins."""
+        """The metric `margin_<hazard>`: a run's smallest margin; None without margins."""
         if not (self.margin or self.stl):
             return None
         return Metric(
@@ -74,53 +74,58 @@ class Hazard:
 
 
 class HazardModel(StrictModel, title="A hazard"):
-    """A hazard by its name. Without `when` and `stl` it is taken from the record."""
+    """A hazard, by its name. Without `when` and `stl` it is taken from the record."""
 
-    about: str = Field("", description="What it is.")
+    about: str = Field("", description="What the hazard is.")
     when: str | None = Field(
         None,
-        description="The condition of the hazard, over channels and derived values: as in triggers, "
-        "plus `ever(CONDITION)` (it has held so far) and `rate(x)` (change per second).",
+        description="The condition of the hazard, over channels and derived values. The syntax is that of "
+        "triggers, plus `ever(CONDITION)` (true once the condition has held) and `rate(x)` "
+        "(change per second).",
     )
     stl: str | None = Field(
         None,
-        description="Instead of `when`: a formula of signal temporal logic that must hold, as rtamt reads it "
-        "(`pip install rtamt`), with even steps. The hazard comes at the first step where it does not; with "
-        "a formula that looks ahead, as long after that step as it looks ahead.",
+        description="Instead of `when`: a formula of signal temporal logic that must hold. rtamt evaluates "
+        "it (`pip install rtamt`), and steps must be evenly spaced. The hazard occurs at the "
+        "first step at which the formula does not hold. If the formula looks ahead, the hazard "
+        "occurs later, by the time that it looks ahead.",
     )
     for_s: float = Field(
-        0.0, ge=0.0, allow_inf_nan=False, description="How long it must last to be a hazard."
+        0.0,
+        ge=0.0,
+        allow_inf_nan=False,
+        description="How long the condition must hold to count as a hazard, in s.",
     )
     margin: str | None = Field(
         None,
-        description="How far a step is from the hazard, in `unit`; negative in it. Where `when` is one "
-        "comparison, the default is the difference of its two sides.",
+        description="The distance of a step from the hazard, in `unit`; negative in the hazard. If `when` "
+        "is a single comparison, the default is the difference of its two sides.",
     )
     unit: str = Field("-", description="The unit of the margin.")
     terminal: bool | str = Field(
         False,
-        description="Whether the hazard ends the drive, like a collision; or the condition that ends it.",
+        description="Whether the hazard ends the drive, as a collision does; or the condition that ends it.",
     )
 
 
 class MetricModel(StrictModel, title="A metric"):
     """A column of the results, by its name. Give exactly one of the aggregates. They cover the drive up to
-    the first terminal hazard, and skip steps whose value is infinite or NaN.
+    the first terminal hazard, and skip steps in which the value is infinite or NaN.
     """
 
     min: str | None = Field(None, description="The minimum of this formula over channels.")
     max: str | None = Field(None, description="Its maximum.")
-    mean: str | None = Field(None, description="Its mean over the steps.")
-    last: str | None = Field(None, description="Its value in the last step.")
-    integral: str | None = Field(None, description="Its integral over time.")
-    duration: str | None = Field(None, description="How many seconds this condition holds.")
+    mean: str | None = Field(None, description="The mean over the steps.")
+    last: str | None = Field(None, description="The value in the last step.")
+    integral: str | None = Field(None, description="The integral over time.")
+    duration: str | None = Field(None, description="The number of seconds in which this condition holds.")
     at_end: str | None = Field(
-        None, description="Its value in the step of the first terminal hazard; empty if there is none."
+        None, description="The value in the step of the first terminal hazard; empty if there is none."
     )
-    where: str | None = Field(None, description="Only steps in which this condition holds count.")
-    unit: str = Field(description="Its unit; `-` for none.")
-    worse: _WORSE = Field(description="Whether a `higher` or a `lower` value is worse.")
-    about: str = Field(description="What it measures.")
+    where: str | None = Field(None, description="Count only the steps in which this condition holds.")
+    unit: str = Field(description="The unit; `-` for none.")
+    worse: _WORSE = Field(description="Which values are worse: `higher` or `lower`.")
+    about: str = Field(description="What the metric measures.")
     source: str = Field("", description="The source of the formula.")
 
 
@@ -134,8 +139,8 @@ def read_hazards(
 ) -> tuple[Hazard, ...]:
     """Read a manifest's hazards; MutatorError with the line of a mistake.
 
-    `known` are the names that formulas may use, `recorded` says that the target writes a record, a step has
-    `step_s` seconds.
+    `known` are the names that formulas may use, `recorded` says whether the target writes a record, and
+    `step_s` is the length of a step in seconds.
     """
     if isinstance(models, list):
         hazards = tuple(Hazard(name=name) for name in models)
@@ -186,7 +191,7 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
 
 
 def _margin_of(when: str) -> str:
-    """The difference of the two sides of a single comparison: positive while it does not hold."""
+    """The margin of a single comparison: the difference of its two sides, positive while it does not hold."""
     node = parse(when) if when else None
     if not isinstance(node, ast.Compare) or len(node.ops) != 1:
         return ""
@@ -201,7 +206,7 @@ def _margin_of(when: str) -> str:
 def read_metrics(
     models: dict[str, MetricModel], known: Collection[str], source: Source
 ) -> tuple[Metric, ...]:
-    """Read a manifest's metrics; arguments and errors as for `read_hazards`."""
+    """Read a manifest's metrics; the arguments and errors are those of `read_hazards`."""
     return tuple(_metric(name, model, known, source) for name, model in models.items())
 
 

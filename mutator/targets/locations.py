@@ -1,4 +1,4 @@
-"""Check where in a target a fault may be injected."""
+"""Check whether a fault may be injected at a place in a target."""
 
 from mutator.errors import MutatorError
 from mutator.model import FaultLocation
@@ -8,12 +8,12 @@ from mutator.targets.source_tree import matches
 
 
 def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
-    """Raise MutatorError (without place) unless a fault may be injected into the location's file."""
+    """Raise MutatorError, without a file position, unless faults may be injected into the location's file."""
     check_file(manifest, location.path)
 
 
 def check_file(manifest: TargetManifest, named: str) -> None:
-    """Raise MutatorError (without place) unless faults may be injected into the named file."""
+    """Raise MutatorError, without a file position, unless faults may be injected into the named file."""
     path = inside(named)
     if path != named or not path.endswith(".py") or path not in manifest.tree.files:
         raise MutatorError(

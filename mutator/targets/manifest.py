@@ -1,4 +1,4 @@
-"""The target manifest: everything the harness knows about a controller tree."""
+"""The target manifest: all that the harness knows about a controller tree."""
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -28,17 +28,17 @@ _DELTA_V = Metric(
     worse="higher",
     about="change of the own speed in the contact, from contact speed and masses",
 )
-FILM = "film"  # output folder of a filmed run
+FILM = "film"  # the output folder of a filmed run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Film:
-    """How to film a target's runs and show two films."""
+    """How to film a target's runs, and how to show two films."""
 
-    run_args: tuple[str, ...]  # of the entry module, with {film}
-    module: str  # run as `python -m`
-    args: tuple[str, ...]  # with {golden}, {faulty} (films), {events}, {out}
-    still_args: tuple[str, ...]  # more arguments for a still, with {t}
+    run_args: tuple[str, ...]  # arguments of the entry module, with {film}
+    module: str  # module, run as `python -m`
+    args: tuple[str, ...]  # its arguments, with {golden}, {faulty} (films), {events}, {out}
+    still_args: tuple[str, ...]  # extra arguments for a still, with {t}
     pictures: tuple[str, ...]  # changes with which the controller uses the camera's images
 
 
@@ -46,40 +46,40 @@ class Film:
 class TargetManifest:
     """A target: its tree, how to run it, what it records.
 
-    An instance is a snapshot: `tree` is read once, so an object never mixes two states of the sources. Load
-    the manifest again to see an edit.
+    An instance is a snapshot: `tree` is read once, so an object never mixes two states of the sources. To see
+    an edit, load the manifest again.
     """
 
     name: str
     path: Path  # the manifest file
     root: Path  # absolute source root, added to sys.path
     packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
-    files: tuple[str, ...]  # globs, relative to root: the files of the tree
-    overlay: Path | None  # absolute: a folder of glue laid over the root
-    forbid: tuple[str, ...]  # globs: no faults there
-    env: Mapping[str, str]  # variables of every process that runs the target
+    files: tuple[str, ...]  # globs, relative to the root: the files of the tree
+    overlay: Path | None  # absolute: a folder of glue files laid over the root
+    forbid: tuple[str, ...]  # globs: files in which no fault may be injected
+    env: Mapping[str, str]  # environment variables of every process that runs the target
     requires: tuple[Requirement, ...]  # installed packages that the target needs
-    entry_module: str  # run as `python -m`
+    entry_module: str  # module, run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
     stepwise: str | None  # function of the entry module: arguments -> a steppable run
-    independent: tuple[str, ...]  # more arguments, for a run that uses nothing that others left
-    reads_itself: tuple[str, ...]  # globs: files that a run reads, which must then be the mutant's
+    independent: tuple[str, ...]  # extra arguments for a run that must not use data left by other runs
+    reads_itself: tuple[str, ...]  # globs: files that a run itself reads; a mutant's run reads the mutant's
     changes: Mapping[str, tuple[str, ...]]  # scenario change -> extra arguments
     step_s: float
-    armed_after_s: float  # triggers wait until then by default: until the controller works
-    trace_file: str  # in {out}; its suffix gives the format
+    armed_after_s: float  # by default, triggers are armed at this time, when the controller works
+    trace_file: str  # the trace in {out}; its suffix gives the format
     time_channel: str
     channels: tuple[Channel, ...]
-    record_file: str | None  # a JSON in {out}, if the target writes one
+    record_file: str | None  # a JSON file in {out}, if the target writes one
     observation: Observation
     rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
     contact: Contact | None  # how severe a contact is
     scene: Scene | None
-    alerts: tuple[str, ...]  # alerts that count
+    alerts: tuple[str, ...]  # the alerts that count
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors
     film: Film | None = None
-    # change -> scenarios that it makes the same, e.g. because they only differ in the traffic that it removes
+    # change -> scenarios that it makes identical, e.g. because they differ only in traffic that it removes
     same_in: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     @property
@@ -90,7 +90,7 @@ class TargetManifest:
 
     @property
     def import_names(self) -> tuple[str, ...]:
-        """The top-level names of its modules, which a run must import from its own tree."""
+        """The top-level names of the target's modules, which a run must import from its own tree."""
         laid_over = sorted(path for path in self.tree.overlaid if path.endswith(".py"))
         names = (*self.packages, *(path.partition("/")[0] for path in laid_over))
         return tuple(dict.fromkeys(name.removesuffix(".py") for name in names))
@@ -112,7 +112,7 @@ class TargetManifest:
 
     @cached_property
     def compared(self) -> tuple[Channel, ...]:
-        """Actuator channels: a fault manifests when one differs from golden."""
+        """The actuator channels. A fault has manifested if one of them differs from the golden run."""
         return tuple(channel for channel in self.channels if channel.role is Role.ACTUATOR)
 
     @cached_property
@@ -135,7 +135,7 @@ class TargetManifest:
 
     @cached_property
     def measures(self) -> tuple[Metric, ...]:
-        """All numbers of a run: the margins of its hazards, its metrics, delta-v."""
+        """All numbers of a run: the margins of its hazards, its metrics and delta-v."""
         margins = [hazard.metric for hazard in self.rules if hazard.metric]
         return (*margins, *self.metrics, *([_DELTA_V] if self.contact else []))
 
@@ -145,7 +145,7 @@ class TargetManifest:
         return (self.trace_file, *([self.record_file] if self.record_file else []))
 
     def reads_any(self, paths: Iterable[str]) -> bool:
-        """Whether a run itself reads one of these files, so that its caches depend on them."""
+        """Whether a run itself reads one of these files, so that its caches depend on it."""
         return any(matches(path, self.reads_itself) for path in paths)
 
     def arguments(
@@ -173,7 +173,7 @@ class TargetManifest:
         return tuple(filled((*self.entry_args, *extra), values))
 
     def filming(self) -> "TargetManifest":
-        """The same target with runs that write a film; MutatorError if it cannot be filmed."""
+        """The same target, with runs that write a film; MutatorError if it cannot be filmed."""
         if self.film is None:
             raise MutatorError(
                 f"target {self.name} cannot be filmed",
@@ -185,7 +185,7 @@ class TargetManifest:
 
 
 def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
-    """The names in `known` that the formulas of hazards and metrics use."""
+    """The names from `known` that the formulas of hazards and metrics use."""
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
     in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))

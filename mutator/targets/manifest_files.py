@@ -24,46 +24,51 @@ SCHEMA = NEW
 
 
 class ManifestModel(StrictModel, title="The file"):
-    """How to find, run and observe a target, and what its runs write."""
+    """How to find, run and observe a target, and which files its runs write."""
 
-    name: str = Field(description="The name that campaigns use.")
+    name: str = Field(description="The name that campaigns use for the target.")
     about: str = Field("", description="What the target is.")
     root: str = Field(
-        description="The folder that goes on `sys.path`, relative to this file; or `shipped:target`, the "
-        "controller that ships with mutator; or `installed:NAME`, the folder where pip installed the import "
-        "package `NAME`; nothing else there is part of the tree. `--target` overrides it."
+        description="The folder to put on `sys.path`, relative to this file. Or `shipped:target`, the "
+        "controller that ships with mutator. Or `installed:NAME`, the folder into which pip "
+        "installed the import package `NAME`; nothing else there is part of the tree. "
+        "`--target` overrides it."
     )
     package: str | None = Field(
-        None, description="The import package in it. The probe is added to it as `_fi.py`."
+        None, description="The import package in the root. The probe is added to it as `_fi.py`."
     )
     packages: list[str] | None = Field(
         None,
         min_length=1,
-        description="Instead of `package`: several import packages, or modules outside of packages "
+        description="Instead of `package`: several import packages, or modules outside packages "
         "(`drive.py`). The probe is then a module next to them, `_fi.py`.",
     )
     files: list[str] | None = Field(
         None,
         min_length=1,
-        description="Globs, relative to the root: the files of the tree. `**` stands for any folders. "
-        "Default: all files of the packages, including data, and the modules. Links count as their targets.",
+        description="Globs, relative to the root: the files of the tree. `**` also matches across folders. "
+        "Default: all files of the packages, including data, and the modules. A link counts as "
+        "the file or folder to which it points.",
     )
     overlay: str | None = Field(
         None,
-        description="A folder of glue, relative to this file or to the library, laid over the root: "
-        "all its files are part of the tree, and no fault may be injected there. The entry module and the "
-        "observation may lie in it.",
+        description="A folder of glue files, relative to this file or to the library, laid over the root. "
+        "All its files are part of the tree, and no fault may be injected there. It may contain "
+        "the entry module and the observed place.",
     )
-    forbid: list[str] = Field(default_factory=list, description="Globs: no fault may be injected there.")
+    forbid: list[str] = Field(
+        default_factory=list, description="Globs: files in which no fault may be injected."
+    )
     reads_itself: list[str] = Field(
         default_factory=list,
-        description="Globs: files that a run reads, as what it caches depends on them. A "
-        "mutant of one is run by the reference engine, with the arguments of `entry.independent`.",
+        description="Globs: files that a run itself reads, because what it caches depends on them. The "
+        "reference engine runs the mutants of such a file, with the arguments of "
+        "`entry.independent`.",
     )
     env: dict[str, str] = Field(
         default_factory=dict,
-        description="Environment variables of every process that runs the target, besides the few that "
-        "the harness sets; nothing else of the user's environment is passed on.",
+        description="Environment variables of every process that runs the target, in addition to the few "
+        "that the harness sets. No other variable of the user's environment is passed on.",
     )
     requires: list[str] = Field(
         default_factory=list,
@@ -75,47 +80,49 @@ class ManifestModel(StrictModel, title="The file"):
         0.0,
         ge=0.0,
         allow_inf_nan=False,
-        description="When `mutator try` arms triggers by default.",
+        description="The time at which `mutator try` arms triggers by default, in s.",
     )
-    entry: EntryModel = Field(description="How a run is started.")
+    entry: EntryModel = Field(description="How to start a run.")
     trace: TraceModel | None = Field(None, description="The numbers that a run records.")
     record: str | None = Field(
         None,
-        description="The record's name in `{out}`: a JSON file in which the target reports hazards and "
-        "alerts, see [another controller tree](../how-to/add-a-target.md#what-a-run-leaves-behind).",
+        description="The record's file name in `{out}`: a JSON file in which the target reports hazards and "
+        "alerts, see [another controller "
+        "tree](../how-to/add-a-target.md#what-a-run-leaves-behind).",
     )
-    channels: dict[str, ChannelModel] = Field(description="What is recorded, and which part it plays.")
-    observation: ObservationModel = Field(description="Where ground truth is read.")
+    channels: dict[str, ChannelModel] = Field(description="The recorded channels and the role of each.")
+    observation: ObservationModel = Field(description="Where the harness reads ground truth.")
     hazards: list[str] | dict[str, HazardModel] = Field(
-        description="What a run must avoid: names with how to find each in the trace, or a list of names "
-        "in the record."
+        description="What a run must avoid: names, and how to find each hazard in the trace; or a list of "
+        "names in the record."
     )
     metrics: dict[str, MetricModel] = Field(
-        default_factory=dict, description="Numbers computed for each run: columns of the results."
+        default_factory=dict,
+        description="The numbers computed for each run. They are columns of the results.",
     )
     severity: SeverityModel | None = Field(
-        None, description="How severe a contact is; without it no result has a class of severity."
+        None, description="How severe a contact is. Without it, results have no severity class."
     )
-    scene: SceneModel | None = Field(None, description="How a drive looks from above.")
+    scene: SceneModel | None = Field(None, description="How to draw a drive from above.")
     alerts: list[str] = Field(
         default_factory=list,
-        description="Names of the alerts that count; others in a record are ignored.",
+        description="The names of the alerts that count; other alerts in a record are ignored.",
     )
-    film: FilmModel | None = Field(None, description="How to film runs; without it they cannot be filmed.")
+    film: FilmModel | None = Field(None, description="How to film runs. Without it, runs cannot be filmed.")
 
 
 def upgrade_manifest(path: Path) -> Upgrade | None:
-    """Upgrade a manifest of the older schema; None if it is current. MutatorError if it is neither."""
+    """Upgrade a manifest of the older schema; None if it is current. MutatorError for any other schema."""
     source = load(path)
     if not isinstance(source.data, dict) or source.data.get("schema") != OLD:
         read(path, ManifestModel, SCHEMA)
         return None
-    load_manifest(path, root=path.parent)  # its tree may be missing
+    load_manifest(path, root=path.parent)  # the target's tree may be missing
     return upgraded_text(source)
 
 
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
-    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override the file's."""
+    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override the values in the file."""
     model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
@@ -186,7 +193,7 @@ def _check_record(model: ManifestModel, source: Source) -> None:
 
 
 def _check_recorded(source: Source, hidden: Collection[str]) -> None:
-    """Check that hazards and metrics only use recorded values, since they are judged on the trace."""
+    """Check that hazards and metrics use only recorded values, because they are judged on the trace."""
     for key in ("hazards", "metrics"):
         entries = source.data.get(key)
         for name, entry in entries.items() if isinstance(entries, dict) else ():

@@ -1,4 +1,4 @@
-"""What is observed of a target: values at one place in each step, and values derived from them."""
+"""What is observed of a target: values read at one place in each step, and values derived from them."""
 
 import ast
 import keyword
@@ -15,7 +15,7 @@ from mutator.model import FIXED_ANCHORS, VALUE_ANCHORS, FaultLocation
 from mutator.targets.paths import inside
 from mutator.triggers.conditions import RESERVED, TIME, check_formula, names_in
 
-_LONGEST = 1000  # characters of an expression
+_LONGEST = 1000  # characters in an expression, at most
 _READING = (
     *(ast.BinOp, ast.UnaryOp, ast.Compare, ast.Load, ast.Subscript, ast.Call),
     *(ast.operator, ast.unaryop, ast.cmpop),
@@ -27,7 +27,8 @@ _ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  #
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
-    """An observed value: `text` is an expression at the place, or, if derived, a formula over earlier values.
+    """An observed value. `text` is an expression at the place; for a derived value it is a formula over
+    earlier values.
 
     `unit` is for tables, `-` for none.
     """
@@ -40,7 +41,9 @@ class Value:
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """Where a target is observed. `time` is an expression for the time (s) there; None: steps are counted."""
+    """Where a target is observed. `time` is an expression for the time (s) there; None: the probe counts
+    steps.
+    """
 
     location: FaultLocation
     time: str | None
@@ -49,17 +52,17 @@ class Observation:
 
     @property
     def expressions(self) -> tuple[tuple[str, str], ...]:
-        """Names and expressions that the probe evaluates at the place."""
+        """The names and expressions that the probe evaluates at the place."""
         time = () if self.time is None else ((TIME, self.time),)
         return (*time, *((value.name, value.text) for value in self.values))
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
-        """Variables for conditions: time, the observed values, the derived ones."""
+        """The variables for conditions: the time, the observed values and the derived values."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
     def inputs(self, names: Iterable[str]) -> frozenset[str]:
-        """These names, and the inputs of those that are derived values."""
+        """These names, and the inputs of those names that are derived values."""
         found = set(names)
         for value in reversed(self.derived):
             if value.name in found:
@@ -67,8 +70,8 @@ class Observation:
         return frozenset(found)
 
     def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
-        """What formulas over a trace with these channels can use: time, channels, and values derived from
-        them.
+        """The names that formulas over a trace with these channels can use: time, channels, and values
+        derived from them.
         """
         known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
         for value in self.derived:
@@ -78,21 +81,26 @@ class Observation:
 
 
 class _ValueModel(StrictModel, title="A value"):
-    is_: str = Field(alias="is", description="What it is, as an expression.")
-    unit: str = Field(description="Its unit, for tables; `-` for none.")
-    about: str = Field(description="What it means.")
+    is_: str = Field(
+        alias="is",
+        description="The derived value, as a formula over the values before it; or "
+        "the observed value, as an expression at the place.",
+    )
+    unit: str = Field(description="The unit, for tables; `-` for none.")
+    about: str = Field(description="What the value means.")
 
 
 class ObservationModel(StrictModel, title="The observation"):
-    """Where ground truth is read, once in each step. Time increases from step to step, or restarts with
-    another run.
+    """Where ground truth is read, once in each step. Time must increase from step to step; it may restart
+    when another run begins.
     """
 
-    at: AtModel = Field(description="The place; values are read there.")
+    at: AtModel = Field(description="The place in the source at which the values are read.")
     time: str | None = Field(
         None,
-        description="Time in s, as an expression like those of values. Without it steps are counted: the "
-        "n-th observation is at (n - 1) times `step_s`, and a process cannot simulate a second run.",
+        description="The time in s, as an expression like those of `values`. Without it, the probe counts "
+        "steps: the n-th observation is at (n - 1) times `step_s`, and a process cannot "
+        "simulate a second run.",
     )
     values: dict[str, _ValueModel] = Field(
         default_factory=dict,
@@ -101,13 +109,14 @@ class ObservationModel(StrictModel, title="The observation"):
     )
     derived: dict[str, _ValueModel] = Field(
         default_factory=dict,
-        description="Name -> a formula over the values before it: arithmetic, `abs`, `min`, `max`, `hypot`, "
-        "`inf`, and a choice, `a if b > 0 else c`. Division by 0 is infinite or NaN, not an error.",
+        description="Name -> a formula over the values before it. It may use arithmetic, `abs`, `min`, "
+        "`max`, `hypot`, `inf`, and a choice, `a if b > 0 else c`. Division by 0 gives infinity "
+        "or NaN, not an error.",
     )
 
 
 def read_observation(model: ObservationModel, source: Source) -> Observation:
-    """Read a manifest's observation; errors point into `source`."""
+    """Read a manifest's observation; errors give the position in `source`."""
     location = model.at.location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(
@@ -207,7 +216,7 @@ def _is_plain(node: ast.AST) -> bool:
 
 
 class _Hypot(ast.NodeTransformer):
-    """Replaces `hypot` by the probe's, as the place may not know it."""
+    """Replace `hypot` by the probe's function, because the source at the place may not import it."""
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
@@ -217,6 +226,6 @@ class _Hypot(ast.NodeTransformer):
 
 
 def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
-    """Unit and meaning of everything that a condition can use."""
+    """The unit and meaning of every name that a condition can use."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

@@ -6,10 +6,10 @@ from mutator.errors import MutatorError
 
 
 def inside(path: str) -> str:
-    """`path` as a clean relative path below a target's root; MutatorError (without place) if it leads
-    elsewhere.
+    """Return `path` as a clean relative path in a target's root; MutatorError, without a file position, if it
+    leads out of it.
 
-    Links are allowed: a target's files are read once and never written.
+    Links may lead out of the root, because a target's files are read once and never written.
     """
     pure = PurePosixPath(path)
     if not path or pure.is_absolute() or ".." in pure.parts or "\\" in path or "\0" in path:

@@ -17,7 +17,7 @@ def filled(arguments: Iterable[str], values: Mapping[str, str]) -> list[str]:
 
 
 def check_placeholders(arguments: Sequence[str], known: Sequence[str], source: Source, keys: Keys) -> None:
-    """Raise MutatorError, at the argument's line below `keys`, for an unknown placeholder."""
+    """Raise MutatorError, with the argument's line in `keys`, for an unknown placeholder."""
     for i, argument in enumerate(arguments):
         for name in _PLACEHOLDER.findall(argument):
             if name not in known:

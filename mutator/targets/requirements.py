@@ -31,8 +31,8 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
 
 
 def shortcoming(wanted: Requirement) -> str:
-    """What is wrong with a package: `not installed`, or the installed version; empty if it is fine or not
-    needed here.
+    """What is wrong with a package: `not installed`, or the installed version. Empty if it is installed as
+    required, or not needed here.
     """
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return ""
@@ -45,8 +45,8 @@ def shortcoming(wanted: Requirement) -> str:
 
 
 def check_requirements(manifest: "TargetManifest") -> None:
-    """Raise MutatorError if packages are missing or have wrong versions, with the command that installs
-    them.
+    """Raise MutatorError, with the command that installs them, if packages are missing or have wrong
+    versions.
     """
     found = {wanted: problem for wanted in manifest.requires if (problem := shortcoming(wanted))}
     if found:
@@ -60,5 +60,5 @@ def check_requirements(manifest: "TargetManifest") -> None:
 
 
 def pip_install(wanted: Iterable[Requirement | str]) -> str:
-    """The command that installs these."""
+    """The pip command that installs these requirements."""
     return " ".join(["pip install", *(f"'{one}'" for one in wanted)])

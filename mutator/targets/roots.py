@@ -15,9 +15,9 @@ INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a m
 
 
 def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
-    """The folder that `root` of a manifest means, which may not exist.
+    """Find the folder that a manifest's `root` names; it may not exist.
 
-    An installed package is located without importing it; if missing, the error says what to install.
+    An installed package is located without importing it. If it is missing, the error says what to install.
     """
     if root == SHIPPED_TARGET:
         return shipped_folder() / "target"
@@ -38,7 +38,7 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
 
 
 def find_overlay(overlay: str | None, source: Source) -> Path | None:
-    """The overlay folder, relative to the manifest or its library."""
+    """Find the overlay folder, relative to the manifest or its library."""
     path = source.path
     if overlay is None:
         return None
@@ -54,7 +54,7 @@ def find_overlay(overlay: str | None, source: Source) -> Path | None:
 
 
 def read_packages(package: str | None, packages: Sequence[str] | None, source: Source) -> tuple[str, ...]:
-    """The target's packages and modules, without duplicates."""
+    """Read the target's packages and modules, without duplicates."""
     if (package is None) == (packages is None):
         raise source.error(
             ("packages",),
@@ -87,7 +87,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
 
 
 def check_installed(root: str, packages: Sequence[str], files: Sequence[str], source: Source) -> None:
-    """Raise MutatorError if the tree would have files outside an installed package."""
+    """Raise MutatorError if the tree would contain files outside an installed package."""
     name = root.removeprefix(INSTALLED)
     if name == root:
         return
@@ -107,7 +107,7 @@ def check_installed(root: str, packages: Sequence[str], files: Sequence[str], so
 
 
 def installed_at(name: str) -> Path | None:
-    """The folder or file of an import package or module; None if there is no single place."""
+    """The folder or file of an import package or module; None if it has no single place on disk."""
     try:
         found = find_spec(name)
     except (ImportError, ValueError):

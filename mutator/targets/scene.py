@@ -1,4 +1,4 @@
-"""A scene: how to draw a drive from above. The report draws it."""
+"""A scene: data for drawing a drive from above, which the report does."""
 
 import math
 from collections.abc import Collection
@@ -15,11 +15,11 @@ Shape = Literal["box", "circle"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Actor:
-    """Something that moves, with formulas over channels: its middle (`x`, `y`) in m and `heading` (rad, left
+    """Something that moves. Formulas over channels give its centre (`x`, `y`) in m and `heading` (rad, left
     positive).
 
-    `width` is a circle's diameter. It exists while `visible` holds. A `believed` actor is where the
-    controller assumes something.
+    `width` is the diameter of a circle. The actor is drawn while `visible` holds. A `believed` actor is at
+    the place that the controller assumes.
     """
 
     name: str
@@ -46,9 +46,9 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """What can be drawn of a drive. `follow` is the actor that the view follows ('' none).
+    """What can be drawn of a drive. `follow` is the actor that the view follows ('': none).
 
-    `speed` is a formula for the speed of the origin along x (m/s).
+    `speed` is a formula for the speed (m/s) at which the origin moves along x.
     """
 
     actors: tuple[Actor, ...]
@@ -58,44 +58,55 @@ class Scene:
 
 
 class _ActorModel(StrictModel, title="An actor"):
-    shape: Shape = Field("box", description="`box` or `circle`.")
-    length_m: float = Field(gt=0.0, allow_inf_nan=False, description="Along its heading, or across a circle.")
+    shape: Shape = Field("box", description="The shape: `box` or `circle`.")
+    length_m: float = Field(
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The length along the heading in m; the diameter of a circle.",
+    )
     width_m: float | None = Field(
-        None, gt=0.0, allow_inf_nan=False, description="Across it; the length if left out."
+        None,
+        gt=0.0,
+        allow_inf_nan=False,
+        description="The width across the heading in m. Default: the length.",
     )
-    x: str = Field(description="Of its middle, m: a formula over channels and derived values.")
-    y: str = Field("0", description="Of its middle, m, left positive.")
-    heading: str = Field("0", description="rad, left positive.")
-    visible: str = Field("True", description="The condition under which it is drawn.")
+    x: str = Field(description="The x of the centre in m: a formula over channels and derived values.")
+    y: str = Field("0", description="The y of the centre in m, left positive.")
+    heading: str = Field("0", description="The heading in rad, left positive.")
+    visible: str = Field("True", description="The condition under which the actor is drawn.")
     believed: bool = Field(
-        False, description="Whether it is where the controller assumes something: drawn as an outline."
+        False,
+        description="Whether this is where the controller assumes something. It is drawn as an outline.",
     )
-    about: str = Field("", description="What it is.")
+    about: str = Field("", description="What the actor is.")
 
 
 class _LineModel(StrictModel, title="A line"):
     points_m: list[list[float]] | None = Field(
-        None, min_length=2, description="The points [x, y] that it joins; alternatively `y`."
+        None, min_length=2, description="The points [x, y] that the line joins. Give these or `y`."
     )
-    y: str | None = Field(None, description="Of a line along x, m: a formula over channels.")
-    dashed: bool = Field(False, description="Whether it is drawn dashed.")
+    y: str | None = Field(None, description="For a line along x: its y in m, a formula over channels.")
+    dashed: bool = Field(False, description="Whether the line is dashed.")
 
 
 class SceneModel(StrictModel, title="The scene"):
     """How a drive looks from above: SI units, x ahead, y to the left."""
 
-    actors: dict[str, _ActorModel] = Field(min_length=1, description="What moves, by name.")
-    lines: dict[str, _LineModel] = Field(default_factory=dict, description="Lines on the ground, by name.")
+    actors: dict[str, _ActorModel] = Field(min_length=1, description="The things that move, by name.")
+    lines: dict[str, _LineModel] = Field(
+        default_factory=dict, description="The lines on the ground, by name."
+    )
     follow: str | None = Field(None, description="The actor that the view follows.")
     speed: str = Field(
         "0",
-        description="The speed of the origin along x in m/s: a formula, for a drive whose poses are relative "
-        "to the car. The road then moves, and a car that falls behind the golden run visibly does so.",
+        description="The speed of the origin along x in m/s: a formula, for a drive in which poses are "
+        "relative to the car. With it, the road moves, and a car that falls behind the golden "
+        "run visibly does so.",
     )
 
 
 def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
-    """Read a manifest's scene; formulas may use the names `known`. MutatorError with the line."""
+    """Read a manifest's scene; formulas may use the names `known`. MutatorError with the mistake's line."""
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),

@@ -1,4 +1,4 @@
-"""Severity of a contact: delta-v of the ego car, and its class on a scale."""
+"""The severity of a contact: delta-v of the ego car, and its class on a scale."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,8 +12,8 @@ from mutator.config.yaml_files import Source, StrictModel, read
 from mutator.targets.judging import Hazard, Metric
 
 SCHEMA = "severity/1"
-CLASSES = ("S0", "S1", "S2", "S3")  # of ISO 26262-3, the mildest first
-DELTA_V = "delta_v"  # the metric
+CLASSES = ("S0", "S1", "S2", "S3")  # from ISO 26262-3, the mildest first
+DELTA_V = "delta_v"  # name of the metric
 _KPH = UNITS["kph"].factor
 
 
@@ -21,8 +21,8 @@ _KPH = UNITS["kph"].factor
 class Contact:
     """How severe a contact is.
 
-    It occurs with the terminal hazard `hazard`, at the closing speed in the metric `speed` (m/s), between
-    masses in kg; `scale` names the scale that classifies it.
+    A contact is the terminal hazard `hazard`. The metric `speed` is the closing speed (m/s), masses are in
+    kg, and `scale` names the scale of the classes.
     """
 
     hazard: str
@@ -32,7 +32,7 @@ class Contact:
     scale: str
 
     def delta_v(self, closing: float) -> float:
-        """Change of the ego speed in m/s, in an inelastic collision along the line of travel.
+        """The change of the ego car's speed in m/s, in an inelastic collision along the line of travel.
 
         It is 0 if the closing speed is not positive.
         """
@@ -41,8 +41,8 @@ class Contact:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
-    """Classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, from 0; `source` cites
-    the bounds.
+    """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, from 0; `source`
+    cites the bounds.
     """
 
     name: str
@@ -52,7 +52,7 @@ class Scale:
 
     @classmethod
     def from_plain(cls, data: Mapping[str, Any]) -> "Scale":
-        """The scale that `plain` returned."""
+        """Create the scale from what `plain` returned."""
         classes = tuple((name, float(least), about) for name, least, about in data["classes"])
         return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
 
@@ -67,39 +67,44 @@ class Scale:
 
 
 class SeverityModel(StrictModel, title="Severity"):
-    """How severe a contact is. Delta-v of the own car, `contact_speed * other_mass_kg / (mass_kg +
-    other_mass_kg)`, is the metric `delta_v`; the scale classifies it.
+    """How severe a contact is. The metric `delta_v` is the delta-v of the ego car, `contact_speed *
+    other_mass_kg / (mass_kg + other_mass_kg)`; the scale assigns its class.
     """
 
     contact: str = Field(description="The terminal hazard that is a contact with another vehicle.")
     contact_speed: str = Field(
-        description="The metric with the closing speed there: one with `at_end`, in m/s. Below 0 the cars "
-        "separate, and delta-v is 0."
+        description="The metric that holds the closing speed at the contact: one with `at_end`, in m/s. If "
+        "it is negative, the cars separate, and delta-v is 0."
     )
-    mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the own car.")
-    other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="Of the other vehicle.")
+    mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the ego car.")
+    other_mass_kg: float = Field(gt=0.0, allow_inf_nan=False, description="The mass of the other vehicle.")
     scale: str = Field(
-        description="A file of the library's `severity/`, without `.yaml`; or `collision`, which ships."
+        description="The name of a file in the library's `severity/`, without `.yaml`; or `collision`, "
+        "which ships with mutator."
     )
 
 
 class _ClassModel(StrictModel, title="A class"):
-    from_kph: float = Field(ge=0.0, allow_inf_nan=False, description="The least delta-v in it; S0 has 0.")
-    about: str = Field(description="What harm it stands for.")
+    from_kph: float = Field(
+        ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
+    )
+    about: str = Field(description="The harm that the class stands for.")
 
 
 class ScaleModel(StrictModel, title="severity/*.yaml"):
-    """The bounds of each class. A library can define several scales."""
+    """The bounds of each class. A library can contain several scales."""
 
-    about: str = Field("", description="What it is for.")
+    about: str = Field("", description="The purpose of the scale.")
     source: str = Field(description="The source of the bounds.")
-    classes: dict[str, _ClassModel] = Field(description="S0, S1, S2 and S3, each from a higher delta-v.")
+    classes: dict[str, _ClassModel] = Field(
+        description="The classes S0, S1, S2 and S3; each begins at a higher delta-v than the one before."
+    )
 
 
 def read_contact(
     model: SeverityModel, hazards: Sequence[Hazard], metrics: Sequence[Metric], source: Source
 ) -> Contact:
-    """Read a manifest's severity; MutatorError with the line of an unsuitable hazard or metric."""
+    """Read a manifest's severity; MutatorError, with the line, for an unsuitable hazard or metric."""
     terminal = [hazard.name for hazard in hazards if hazard.terminal]
     if model.contact not in terminal:
         raise source.error(
@@ -126,7 +131,7 @@ def read_contact(
 
 
 def load_scale(path: Path) -> Scale:
-    """Read a scale of a library; MutatorError with the line for classes that are not S0 to S3 in order."""
+    """Read a scale of a library; MutatorError, with the line, unless the classes are S0 to S3 in order."""
     model, source = read(path, ScaleModel, SCHEMA)
     if tuple(model.classes) != CLASSES:
         raise source.error(

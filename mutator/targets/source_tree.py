@@ -1,4 +1,4 @@
-"""A target's files in memory: read once, digested once, with cached derived data."""
+"""A target's files in memory: read once, hashed once, with a cache of data derived from them."""
 
 import os
 import re
@@ -13,14 +13,14 @@ from mutator._common.hashing import canonical, digest
 from mutator.errors import MutatorError
 
 T = TypeVar("T")
-_SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # in a glob
+_SPECIAL = re.compile(r"(\*\*/|\*\*|\*|\?)")  # special characters in a glob
 
 
 @dataclass(frozen=True)
 class SourceTree:
-    """Snapshot of a target: path relative to the root -> bytes; `digest` identifies it.
+    """A snapshot of a target: path relative to the root -> bytes; `digest` identifies it.
 
-    Files of the folder `overlay` are laid over those of the root: `overlaid` has their paths.
+    The files of the folder `overlay` are laid over those of the root; `overlaid` has their paths.
     """
 
     root: Path
@@ -53,7 +53,7 @@ class SourceTree:
         return cast("T", self._derived[key])
 
     def named(self, where: str) -> str:
-        """A path in the target's folders as specs write it, relative to them."""
+        """The path, relative to the target's folders, of a file that a spec names."""
         for folder in (self.root, self.overlay or self.root):
             where = where.removeprefix(f"{folder}{os.sep}")
         return where
@@ -64,7 +64,7 @@ class SourceTree:
         return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
-        """Digest of the tree with `changed` put in."""
+        """The digest of the tree with the files `changed` replaced."""
         return _digest({**self._entries, **_entries(changed)})
 
 
@@ -74,14 +74,15 @@ def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _digest(entries: Mapping[str, str]) -> str:
-    """Digest of a tree: of the canonical text of its sorted [path, digest] entries, joined from its parts."""
+    """The digest of a tree, from the canonical text of its sorted [path, digest] entries."""
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
 def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
-    """Read the files of `root` that match, and all of `overlay`, but no bytecode.
+    """Read the files of `root` that match and all of `overlay`, except bytecode.
 
-    Links count as their targets. MutatorError for a dangling link, and for a path that both folders have.
+    A link counts as the file or folder to which it points. MutatorError for a dangling link, and for a path
+    that is in both folders.
     """
     files = _read(root, tuple(globs))
     laid_over = _read(overlay, ("**",)) if overlay else {}

@@ -37,8 +37,8 @@ _DERIVED = {
 
 
 def upgraded(source: Source) -> Source:
-    """The manifest as target/2; its values keep their lines. MutatorError if it lacks what target/1
-    required.
+    """The manifest as target/2; its values keep their line numbers. MutatorError if a key that target/1
+    requires is missing.
     """
     data, lines = dict(source.data), dict(source.lines)
     _check_complete(data, _REQUIRED, source, ())
@@ -76,9 +76,9 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
-    """Convert `compare` and `plot`, which are removed from `data`: actuators, and channels without a role.
+    """Convert `compare` and `plot`, and remove them from `data`. They become actuators and internal channels.
 
-    A channel in both was compared.
+    A channel in both becomes an actuator.
     """
     channels = dict[str, Any]()
     for key, role in (("compare", "actuator"), ("plot", "internal")):
@@ -94,16 +94,16 @@ def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Upgrade:
-    """A manifest as text of target/2; `lost` are comments within rewritten parts."""
+    """A manifest as text of target/2; `lost` are the comments in the rewritten parts, which are dropped."""
 
     text: str
     lost: tuple[str, ...]
 
 
 def upgraded_text(source: Source) -> Upgrade:
-    """The file of a target/1 manifest with only the changed keys rewritten, checked against `upgraded`.
+    """Rewrite only the changed keys of a target/1 manifest, and check the text against `upgraded`.
 
-    Everything is rewritten if keys do not stand on their own lines. MutatorError if the text would not match.
+    If a key does not have its own lines, everything is rewritten. MutatorError if the text would not match.
     """
     text = no_pipe(source.path).read_bytes().decode()
     new = upgraded(source).data
@@ -154,7 +154,7 @@ def _line_by_line(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
 
 
 def _comments(text: str) -> list[tuple[int, str]]:
-    """Line (from 0) and text of each comment; a `#` in a value does not count."""
+    """The line (from 0) and text of each comment; a `#` in a value does not count."""
     masked = list(text)
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
         if isinstance(token, yaml.ScalarToken):
@@ -165,7 +165,7 @@ def _comments(text: str) -> list[tuple[int, str]]:
 
 
 def _end_of(lines: list[str], begin: int) -> int:
-    """The end of the part before line `begin`: comments directly above a key belong to the key."""
+    """The end of the part before line `begin`. Comments directly above a key belong to that key."""
     while begin and lines[begin - 1].startswith("#"):
         begin -= 1
     return begin
