@@ -1,4 +1,4 @@
-"""Location and content of caches, and the order of deletion."""
+"""The location, the content and the deletion order of caches."""
 
 import os
 from pathlib import Path
@@ -10,9 +10,8 @@ from mutator._common import caches
 
 @pytest.fixture
 def filled() -> Path:
-    """A cache with passed checks of two files, used last, and three files of a target, used at different
-    times.
-    """
+    """A cache with two files of passed checks, which were used last, and three files of a target, used at
+    different times."""
     checks = caches.of_checks() / "ab12" / "golden" / "A"
     checks.mkdir(parents=True)
     (checks / "trace.npz").write_bytes(b"1" * 5000)
@@ -29,7 +28,8 @@ def filled() -> Path:
 def test_the_home_has_the_cache_unless_a_folder_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str
 ) -> None:
-    """An absolute XDG_CACHE_HOME counts, as its specification says; otherwise ~/.cache."""
+    """XDG_CACHE_HOME is used if its path is absolute, as its specification requires; otherwise the cache
+    is in ~/.cache."""
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert caches.folder() == tmp_path / "mutator"
@@ -58,7 +58,7 @@ def test_any_name_of_a_target_is_one_folder(name: str) -> None:
 
 
 def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
-    """Checks are listed as a whole, a target's files one by one; sizes are those on the disk."""
+    """Passed checks are one entry; each file of a target is a separate entry. Sizes are those on disk."""
     found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in caches.entries()]
     files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
     assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]
@@ -66,7 +66,7 @@ def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
 
 
 def test_a_table_with_holes_counts_as_what_it_takes() -> None:
-    """A sparse file of 800 MB that holds nothing yet does not cause the rest of the cache to be deleted."""
+    """A sparse file of 800 MB counts with its size on disk, so pruning keeps the other entries."""
     place = caches.of_target("car")
     place.mkdir(parents=True)
     with (place / "table").open("wb") as file:
@@ -76,7 +76,7 @@ def test_a_table_with_holes_counts_as_what_it_takes() -> None:
 
 
 def test_the_least_recently_used_go_first(filled: Path) -> None:
-    """Pruning deletes the oldest entries until the rest is small enough."""
+    """Pruning deletes the oldest entries until the rest fits the limit."""
     sizes = {entry.path.name: entry.size for entry in caches.entries()}
     kept = sizes["ab12"] + sizes["a.npy"]
     assert [entry.path.name for entry in caches.prune(kept)] == ["hog.so", "b.npy"]
@@ -85,7 +85,7 @@ def test_the_least_recently_used_go_first(filled: Path) -> None:
 
 
 def test_clearing_leaves_no_file(filled: Path) -> None:
-    """Clearing deletes everything in the cache: a link goes, its target stays."""
+    """Clearing deletes everything in the cache. A link is deleted, and its target stays."""
     outside = filled.parent / "outside"
     outside.mkdir()
     (outside / "kept").write_text("kept")
@@ -98,7 +98,7 @@ def test_clearing_leaves_no_file(filled: Path) -> None:
 def test_a_target_that_is_driven_with_many_seeds_keeps_what_it_used_last(
     filled: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only the least recently used files go, and none while there is room."""
+    """Only the least recently used files are deleted, and only if space is short."""
     assert caches.make_room("car") == []
     monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)
     assert [entry.path.name for entry in caches.make_room("car")] == ["hog.so"]

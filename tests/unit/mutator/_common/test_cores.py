@@ -22,9 +22,8 @@ from mutator._common import cores
 def test_a_quota_counts(
     quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The number is that of the process's affinity, less if a container has a smaller quota, and at least
-    one.
-    """
+    """The number of usable cores follows the process's affinity. A container's quota can lower it, but not
+    below one."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
     monkeypatch.setattr(cores, "_QUOTA", tmp_path / "cpu.max")
     if quota is not None:

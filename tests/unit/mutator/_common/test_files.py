@@ -1,4 +1,4 @@
-"""The harness's own files: schema versions, atomic writes, a full disk."""
+"""The harness's own files: schema versions, atomic writes and full disks."""
 
 import errno
 import os
@@ -41,7 +41,7 @@ def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
-    """A pipe in the place of a file is refused without waiting; a regular file is read."""
+    """A pipe in place of a file is refused without waiting; a regular file is read."""
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(MutatorError, match=r"a\.json: not a file"):
         read_json(tmp_path / "a.json", "a/1")
@@ -50,16 +50,15 @@ def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
 
 
 def test_newer_schema_is_refused() -> None:
-    """A newer version is refused with a remedy; an older one is read."""
+    """A newer schema version is refused with a remedy; an older one is read."""
     check_schema("run/1", "run/2", Path("run.json"))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
         check_schema("run/3", "run/2", Path("run.json"))
 
 
 def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
-    """Deep, locked and unusual folders are deleted; the targets of links stay, as does a link in place of the
-    folder.
-    """
+    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link in place
+    of the folder."""
     kept, folder = tmp_path / "kept", tmp_path / "folder"
     kept.mkdir()
     (kept / "x").touch()
@@ -82,7 +81,7 @@ def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
 
 
 def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The folder is deleted after its `with` block, or with the object."""
+    """A scratch folder is deleted at the end of its `with` block, or together with its object."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()
@@ -95,9 +94,7 @@ def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 @pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
 def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
-    """A pipe or device, or a link to one, is refused without waiting; opening a folder gives the
-    usual error.
-    """
+    """A pipe, a device, or a link to one is refused without waiting. A folder causes the usual error."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match="No such device") as refused:
@@ -107,7 +104,7 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
 
 
 def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a full disk the old file stays whole, no temporary file is left, and the error has a remedy."""
+    """On a full disk, the old file stays complete, no temporary file is left, and the error has a remedy."""
     path = tmp_path / "results.csv"
     path.write_bytes(b"old")
 
@@ -123,7 +120,8 @@ def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_several_write_one_file_at_once(tmp_path: Path) -> None:
-    """While threads or processes write, readers get one writer's content, and no temporary file is left."""
+    """While threads or processes write a file, readers always get the complete content of one writer. No
+    temporary file is left."""
     path = tmp_path / "file"
     texts = [bytes([number]) * 100_000 for number in range(4)]
     write_atomic(path, texts[0])
@@ -146,7 +144,8 @@ def no_room(*_: object, **__: object) -> None:
 
 
 def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk or quota is recognized inside `shutil`'s list of texts and behind a library's own error."""
+    """A full disk or quota is recognized in the list of texts that `shutil` raises, and behind a library's
+    own error."""
     (tmp_path / "from").mkdir()
     (tmp_path / "from" / "file").touch()
     monkeypatch.setattr(shutil, "copyfile", no_room)

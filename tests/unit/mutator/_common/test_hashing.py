@@ -1,4 +1,4 @@
-"""Ids stay the same when records get new fields."""
+"""The ids of records stay the same when records get new fields."""
 
 import json
 from dataclasses import dataclass, replace
@@ -45,7 +45,7 @@ class Experiment(model.Experiment):
 
 
 def fault(kind: type[model.Fault], injection: type[model.Injection], **more: object) -> model.Fault:
-    """A chaff of 40 m, of these classes."""
+    """A chaff fault of 40 m, built from the given classes."""
     injections = (injection(location=LOCATION, model="offset", params=PARAMS),)
     return kind("radar/chaff/d", "radar", "chaff", "as_described", 40.0, "m", "H1", injections, **more)
 
@@ -53,7 +53,7 @@ def fault(kind: type[model.Fault], injection: type[model.Injection], **more: obj
 def experiment(
     kind: type[model.Experiment], trigger: type[model.Trigger], of: model.Fault, **more: object
 ) -> model.Experiment:
-    """That fault in S1 under C1, of these classes."""
+    """The chaff fault in S1 under C1, built from the given classes."""
     return kind(of, "S1", "d" * 64, Method.GUIDED, trigger(name="C1", condition=CONDITION), 7, **more)
 
 
@@ -62,7 +62,7 @@ OLD = experiment(model.Experiment, model.Trigger, OLD_FAULT)
 
 
 def test_ids_are_those_of_the_first_release() -> None:
-    """Published results cite these ids, so every version computes the same ones."""
+    """Every version computes the same ids, because published results cite them."""
     assert (OLD_FAULT.id, OLD.id) == ("a128796d71e1fdf8", "876900fefe457b38")
     assert content_id([OLD_FAULT.injections[0], OLD.trigger]) == "f51174baeee5206c"
 
@@ -77,7 +77,7 @@ def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
 
 
 def test_an_added_field_that_says_something_changes_the_id() -> None:
-    """Any value except the default makes another fault and another experiment, at any level."""
+    """A value other than the default, at any level, changes the id of the fault and of the experiment."""
     tagged = fault(Fault, Injection, tags=("wet",))
     injection = Injection(location=LOCATION, model="offset", params=PARAMS, every=2)
     rarer = replace(fault(Fault, Injection), injections=(injection,))
@@ -91,12 +91,12 @@ def test_an_added_field_that_says_something_changes_the_id() -> None:
 
 
 def test_a_field_that_is_not_added_counts_also_with_its_default() -> None:
-    """The first release hashed every field, so these fields are always hashed."""
+    """These fields are always part of the hash, because the first release hashed every field."""
     assert plain(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
 
 
 def test_digests_tell_kinds_of_values_apart() -> None:
-    """A number, its text, its truth value, and lists of these have different digests."""
+    """A number, its text, its truth value, and lists of these all have different digests."""
     values = [1.0, 1, True, "1", None, [1], [[1]], {"a": 1}, b"1 "]
     assert len({digest(value) for value in values}) == len(values)
 
@@ -106,7 +106,8 @@ def test_digests_tell_kinds_of_values_apart() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """Also values that the faster reader refuses: NaN, infinities, lone surrogates."""
+    """JSON is read as `json.loads` reads it, including values that the faster reader refuses: NaN,
+    infinities and lone surrogates."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end a command cleanly, and wait for running native code."""
+"""Ctrl-C and SIGTERM end a command cleanly, after running native code has returned."""
 
 import signal
 

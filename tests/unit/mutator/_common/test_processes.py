@@ -1,4 +1,4 @@
-"""Work shared among processes."""
+"""Work that several processes share."""
 
 import os
 import signal
@@ -12,19 +12,19 @@ from mutator.errors import MutatorError
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_results_come_in_the_order_of_the_work(processes: int) -> None:
-    """Results keep the order of the work, whichever process does it, in any amount."""
+    """Results keep the order of the work for any number of processes and any amount of work."""
     for count in (0, 1, 7):
         assert list(shared(lambda n: n * n, range(count), processes)) == [n * n for n in range(count)]
 
 
 def test_the_work_is_done_by_others() -> None:
-    """Two other processes do the work."""
+    """Two processes do the work, neither of which is this one."""
     found = list(shared(lambda _: os.getpid(), range(6), 2))
     assert found == found[:2] * 3 and len({*found, os.getpid()}) == 3
 
 
 def test_what_goes_wrong_is_raised_here() -> None:
-    """An error is raised unchanged, after the results before it; a killed process is reported."""
+    """An error is raised unchanged after all results before it. A killed process is reported."""
 
     def fails(n: int) -> int:
         if n == 3:
@@ -40,7 +40,7 @@ def test_what_goes_wrong_is_raised_here() -> None:
 
 
 def test_no_process_is_left_behind() -> None:
-    """When the consumer stops taking results, no process is left."""
+    """When the consumer stops taking results, no process is left running."""
     found = shared(lambda n: (os.getpid(), b"x" * 1_000_000), range(50), 2)
     pids = [next(found)[0], next(found)[0]]
     found.close()  # type: ignore[attr-defined]
@@ -51,7 +51,8 @@ def test_no_process_is_left_behind() -> None:
 
 @pytest.mark.parametrize("processes", [1, 2])
 def test_work_is_done_beside(processes: int) -> None:
-    """Another process does it, if allowed; its result or error arrives on request."""
+    """`beside` runs the function in another process if two are allowed. The call returns its result or
+    raises its error."""
     with beside(os.getpid, processes) as found:
         assert (found() == os.getpid()) is (processes == 1)
 

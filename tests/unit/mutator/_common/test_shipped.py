@@ -1,4 +1,5 @@
-"""What ships with the harness: the clone's folders, or an archive that is unpacked and kept unchanged."""
+"""The files that ship with the harness: the folders of a clone, or an archive that is unpacked and kept
+unchanged."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +21,7 @@ FILES = {"target/selfdrive/a.py": b"A = 1\n", "fault_library/b.yaml": b"b: 1\n",
 
 @pytest.fixture
 def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """What a wheel installation ships, and an empty data folder."""
+    """The files of a wheel installation, with an empty data folder."""
     path = tmp_path / "shipped.zip"
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
@@ -41,7 +42,8 @@ def test_a_clone_ships_its_own_folders() -> None:
 
 
 def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
-    """Exactly its files are unpacked into the user's data folder and stay there."""
+    """The archive is unpacked into the user's data folder once: exactly its files, which then stay
+    unchanged."""
     folder = shipped_folder()
     assert folder.is_relative_to(tmp_path / "data" / "mutator")
     found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
@@ -78,7 +80,7 @@ def delete(folder: Path) -> None:
     ("change", "named"), [(edit, "selfdrive/a.py"), (add, "selfdrive/extra.py"), (delete, "templates/c.j2")]
 )
 def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
-    """A copy that was edited is refused: the error names the file and the remedy."""
+    """An edited copy is refused. The error names the file and the remedy."""
     change(shipped_folder())
     with pytest.raises(
         MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"
@@ -87,7 +89,7 @@ def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None]
 
 
 def test_bytecode_is_no_change(archive: Path) -> None:
-    """Bytecode is never part of a tree, so bytecode of an import does no harm."""
+    """Bytecode is never part of a tree, so bytecode that an import writes does no harm."""
     folder = shipped_folder()
     (folder / "target/selfdrive/__pycache__").mkdir()
     (folder / "target/selfdrive/__pycache__/a.cpython-311.pyc").touch()
@@ -97,7 +99,7 @@ def test_bytecode_is_no_change(archive: Path) -> None:
 def test_a_folder_that_cannot_be_written(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error names the folder and how to choose another."""
+    """The error names the folder and says how to choose another one."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "file"))
     with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_DATA_HOME"):
@@ -105,7 +107,7 @@ def test_a_folder_that_cannot_be_written(
 
 
 def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If another process has unpacked it first, its folder is used, and no files are left over."""
+    """If another process has unpacked the archive first, its folder is used, and no files are left over."""
     folder = shipped_folder()
     monkeypatch.setattr(Path, "is_dir", lambda path, **_: path.exists() and not _first(seen, path))
     seen: set[Path] = set()
@@ -115,14 +117,14 @@ def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def _first(seen: set[Path], path: Path) -> bool:
-    """True the first time: the folder does not exist yet when it is checked."""
+    """True for the first check of a path, so that the folder seems not to exist yet."""
     new = path not in seen
     seen.add(path)
     return new
 
 
 def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
-    """The harness refuses to write to files of the unpacked library, but not to others."""
+    """The harness refuses to write to the unpacked library's files, and writes to others."""
     refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
     with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
         refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
@@ -131,7 +133,8 @@ def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
 def test_a_new_library_is_a_copy_that_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Only the manifest's `root` differs from the shipped library, and the folder can be moved."""
+    """A new library differs from the shipped one only in the manifest's `root`, and its folder can be
+    moved."""
     write_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
@@ -149,7 +152,7 @@ def test_a_new_library_is_a_copy_that_finds_the_controller(
 
 
 def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
-    """The mutant's diff shows an edited template and an edited spec."""
+    """After edits of a template and a spec in the new library, the mutant's diff shows both."""
     write_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))
@@ -164,7 +167,7 @@ def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ["file", "full", "below a file"])
 def test_only_an_empty_folder_becomes_a_library(tmp_path: Path, kind: str) -> None:
-    """A new library is never mixed with existing files and overwrites none."""
+    """A new library is not mixed with existing files and does not overwrite any."""
     place = tmp_path / "place"
     if kind == "full":
         place.mkdir()

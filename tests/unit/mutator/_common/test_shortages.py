@@ -1,4 +1,4 @@
-"""Errors for exhausted machine resources."""
+"""Errors that mean that the machine has run out of a resource."""
 
 import errno
 import os
@@ -22,7 +22,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_shortages(error: Exception, said: str) -> None:
-    """Each shortage is reported with a remedy, also as the cause of another error."""
+    """Each shortage is reported with a remedy, even if it is the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)

@@ -1,4 +1,4 @@
-"""One table, three ways to show it."""
+"""Tables, shown in three ways."""
 
 from markupsafe import Markup
 
@@ -12,7 +12,7 @@ def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
 
 
 def test_a_table_without_rows_is_its_heads() -> None:
-    """An empty table still prints its heads."""
+    """An empty table is printed with its column heads."""
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
     assert table.as_markdown() == "| a | b |\n|---|---|"
@@ -20,7 +20,7 @@ def test_a_table_without_rows_is_its_heads() -> None:
 
 
 def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
-    """Line breaks and characters that Markdown would interpret stay text in a cell."""
+    """Line breaks and characters with a meaning in Markdown stay text in a cell."""
     lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
     assert Table(heads=["said"], rows=lines).as_markdown().splitlines()[2:] == [
         "| a b c |",
@@ -32,14 +32,15 @@ def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
 
 
 def test_a_bar_in_a_cell_does_not_end_it() -> None:
-    """A bar is escaped, unless the cells are Markdown already."""
+    """A vertical bar is escaped, unless the cells are already Markdown."""
     table = Table(heads=["x"], rows=[["a|b *c*"]])
     assert table.as_markdown().endswith(r"| a\|b \*c\* |")
     assert table.as_markdown(escape=False).endswith("| a|b *c* |")
 
 
 def test_html_escapes_texts_and_marks_continued_rows() -> None:
-    """Text is never an element, braces are text, and a row with an empty first cell has a class."""
+    """Text never becomes an HTML element, braces stay text, and a row with an empty first cell has a
+    class."""
     html = Table(heads=["<b>"], rows=[["<i> & {0}"], [""]]).as_html("plain")
     assert '<table class="plain">' in html
     assert '<th scope="col">&lt;b&gt;</th>' in html
@@ -48,14 +49,14 @@ def test_html_escapes_texts_and_marks_continued_rows() -> None:
 
 
 def test_html_shows_markup_as_it_is() -> None:
-    """A cell may be a link; text that the caller did not mark as markup is escaped."""
+    """A cell may be a link. Text is escaped unless the caller marks it as markup."""
     link = Markup('<a href="#e=1">{}</a>').format("<1>")
     html = Table(heads=["id", "said"], rows=[[link, "<b>"]]).as_html()
     assert '<tr><td><a href="#e=1">&lt;1&gt;</a></td><td>&lt;b&gt;</td></tr>' in html
 
 
 def test_html_has_heads_of_rows_and_columns_of_numbers() -> None:
-    """Tables of facts have row heads and optional column heads; numbers have their own class."""
+    """Tables of facts have row heads and optional column heads. Numbers have a class."""
     html = Table(heads=("", ""), rows=[("runs", "7")], right=(1,), named=True).as_html()
     assert '<tr><th scope="row">runs</th><td class="number">7</td></tr>' in html
     assert "<thead>" not in html

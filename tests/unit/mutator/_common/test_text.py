@@ -1,4 +1,4 @@
-"""Texts for the user."""
+"""Texts shown to the user."""
 
 import pytest
 
@@ -19,13 +19,13 @@ from mutator.triggers.conditions import check_condition
     ],
 )
 def test_operators_of_other_languages(text: str, hint: str) -> None:
-    """Each operator of another language gets one hint; valid or quoted ones get none."""
+    """An operator of another language gets one hint. Valid or quoted operators get none."""
     assert operator_hint(text) == hint
 
 
 @pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
 def test_conditions_and_filters_give_the_hint(text: str) -> None:
-    """A condition or a filter with such an operator gets an error that says what to write."""
+    """The error for such an operator in a condition or a filter says what to write."""
     for refused in (check_condition, lambda text: compile_filter(text, ("t", "v"))):
         with pytest.raises(MutatorError) as caught:
             refused(text)

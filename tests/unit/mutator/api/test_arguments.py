@@ -1,4 +1,4 @@
-"""Wrong arguments of the Python API."""
+"""Invalid arguments of the Python API."""
 
 from collections.abc import Callable
 from math import nan
@@ -49,7 +49,7 @@ def drive(workspace: Workspace, **given: Any) -> mutator.Trial:
 def test_a_wrong_argument_is_named(
     toycar: Workspace, tmp_path: Path, call: Callable[[Any, Path], Any], argument: str
 ) -> None:
-    """An invalid argument is a MutatorError that names the argument, and no option of the command line."""
+    """An invalid argument raises a MutatorError that names the argument, not a command-line option."""
     out = tmp_path / "out"
     with pytest.raises(MutatorError) as caught:
         call(toycar, out)
@@ -60,7 +60,7 @@ def test_a_wrong_argument_is_named(
 
 
 def test_an_id_is_text(toycar: Workspace, tmp_path: Path) -> None:
-    """A number is refused as the start of an experiment's id."""
+    """A number is refused as the beginning of an experiment's id."""
     mutator.plan("toy", tmp_path / "p", workspace=toycar)
     wrong: Any = 3
     with pytest.raises(MutatorError, match=r"^id: 3; expected the id of an experiment"):

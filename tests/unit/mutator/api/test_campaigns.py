@@ -1,4 +1,4 @@
-"""Campaigns planned, run and compared from Python."""
+"""Plan, run and compare campaigns from Python."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +16,8 @@ TWO = mutator.Choices(only='fault_type == "lane"', limit=2)
 
 
 def test_a_plan_is_a_frame(toycar: Workspace, tmp_path: Path) -> None:
-    """A plan prints as a line or a table, and becomes a frame by experiment id; nothing is written."""
+    """A plan prints as a line or a table and converts to a frame with experiment ids as its index.
+    Planning writes no files."""
     plan = mutator.plan("toy", workspace=toycar)
     assert repr(plan) == "<Plan of toy, as_described: 24 experiments, seed 7>"
     assert "sensor/lane" in plan._repr_html_()
@@ -29,9 +30,7 @@ def test_a_plan_is_a_frame(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Path) -> None:
-    """A run reports its progress and summary, repeats nothing when resumed, and can be compared with another
-    one.
-    """
+    """A run reports progress and a summary. A resumed run repeats nothing, and two runs can be compared."""
     seen: list[mutator.Progress] = []
     first = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar, progress=seen.append)
     assert first.summary is not None
@@ -60,7 +59,7 @@ def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Pa
 def test_harness_errors_are_not_silent(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with harness errors warns, names them, and retries them in the same call."""
+    """A run with harness errors names them in a warning and retries them in the same call."""
 
     def run_campaign(*args: Any, **kwargs: Any) -> mutator.Summary:
         return replace(running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1)

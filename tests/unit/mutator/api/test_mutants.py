@@ -1,4 +1,4 @@
-"""Mutants without running them."""
+"""Build mutants without running them."""
 
 import csv
 import subprocess
@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_mutant_is_built(toycar: Workspace, tmp_path: Path) -> None:
-    """The mutant has diff, patch and files, and its written tree is the patched target."""
+    """A mutant has a diff, a patch and files. Its written tree is the patched target."""
     mutant = mutator.build_mutant("sensor/distance/longer", "near", value=12.5, workspace=toycar)
     assert "gap = gap + 12.5" in mutant.diff
     assert set(mutant.files) == {"toycar/_fi.py", "toycar/go.py", "toycar/sensing.py"}
@@ -29,7 +29,7 @@ def test_a_mutant_is_built(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_same_input_gives_the_same_id(toycar: Workspace) -> None:
-    """A fault under a trigger gives the same mutant by name and as records."""
+    """A fault under a trigger gives the same mutant, whether both are given by name or as records."""
     [fault, *_] = toycar.faults("sensor/distance/longer")
     by_record = mutator.build_mutant(fault, "near", workspace=toycar)
     assert isinstance(fault.value, int)
@@ -42,7 +42,8 @@ def test_the_same_input_gives_the_same_id(toycar: Workspace) -> None:
 
 
 def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) -> None:
-    """Each mutant of a campaign is a patch, named by the index; `step` counts the pairs."""
+    """Each mutant of a campaign is written as a patch that the index names. `step` is called once for each
+    mutant."""
     steps: list[int] = []
     bench, pairs = pairs_of_campaign(toycar, "small", Choices(limit=4))
     index = write_mutants(bench, pairs, tmp_path / "m", step=lambda: steps.append(1))
@@ -53,7 +54,7 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
 
 
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
-    """Without triggers every context is used; a glob without a match is an error."""
+    """Without triggers, every context is used. A glob that matches nothing is an error."""
     bench = Bench.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])
     assert {trigger.name for _, trigger in pairs} == {"near", "far"}

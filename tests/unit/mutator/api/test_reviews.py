@@ -10,7 +10,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
-    """An approval is stored and found again, and the page is written."""
+    """An approval is stored and can be read again, and the review page is written."""
     found = mutator.load_review(specs=["sensor/lane"], workspace=toycar)
     group = found.undecided[0]
     assert found.find([group.id[:8]]) == [group]
@@ -23,6 +23,6 @@ def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_campaign_or_specs(toycar: Workspace) -> None:
-    """A campaign plus specs is refused; the error names the argument."""
+    """A campaign together with specs is refused, and the error names the argument."""
     with pytest.raises(MutatorError, match=r"^campaign: together with specs"):
         mutator.load_review(campaign="small", specs=["sensor/lane"], workspace=toycar)

@@ -1,4 +1,4 @@
-"""Runs in notebooks."""
+"""Runs as shown in notebooks."""
 
 import dataclasses
 import os
@@ -36,7 +36,7 @@ PAGE = Path(__file__).parents[4] / "docs" / "how-to" / "use-in-a-notebook.md"
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """Lane faults are hazardous, silence crashes the controller, the rest is masked."""
+    """Lane faults are hazardous, silence crashes the controller, and all other faults are masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0), ("H1", 4.5))}
@@ -56,9 +56,8 @@ def run(
 
 
 def test_propagation_as_frames(run: Run) -> None:
-    """A run's frame has a row for each channel that left golden, an experiment's its channels by time; for
-    older runs an error says that it is missing.
-    """
+    """A run's frame has a row for each channel that left golden. An experiment's frame has its channels by
+    time. For older runs, an error says that the data are missing."""
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)
@@ -73,7 +72,7 @@ def test_propagation_as_frames(run: Run) -> None:
 
 
 def test_the_frame_is_typed(run: Run) -> None:
-    """Names are categories, flags are nullable, times are floats with their unit."""
+    """In the frame, names are categories, flags are nullable, and times are floats with a unit."""
     frame = run.results
     assert len(frame) == 24
     assert frame.index.name == "experiment_id"
@@ -89,7 +88,7 @@ def test_the_frame_is_typed(run: Run) -> None:
 
 
 def test_hazards_of_the_frame(run: Run) -> None:
-    """The frame has any hazard and the first one; for a crash the hazard is unknown."""
+    """The frame says whether a hazard occurred and which came first. For a crash, this is unknown."""
     frame = run.results
     lane, silence = (frame[frame["fault_type"] == name] for name in ("lane", "silence"))
     assert lane["hazard"].all()
@@ -99,7 +98,7 @@ def test_hazards_of_the_frame(run: Run) -> None:
 
 
 def test_it_says_what_it_is(run: Run) -> None:
-    """A run prints as one line, with access to its faults and provenance."""
+    """A run prints as one line and gives access to its faults and provenance."""
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
@@ -113,7 +112,7 @@ def driven_once(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """A run of one simulated experiment, with golden run, patch and record, and no trace."""
+    """A run of one simulated experiment with its golden run, patch and record, but without a trace."""
     root = tmp_path_factory.mktemp("driven")
     toycar = copy_toycar(root)
     folder = RunFolder.open(
@@ -137,16 +136,16 @@ def driven_once(
 
 @pytest.fixture
 def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
-    """A copy of it in runs/first that a test may add to."""
+    """A copy of that run in runs/first, which a test may extend."""
     run = shutil.copytree(driven_once, tmp_path / "runs" / "first")
     return mutator.load_run(run, workspace=toycar)
 
 
 def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
-    """Golden and faulty run are frames by time with units.
+    """The golden run and the faulty run are frames by time, with units.
 
-    Without a series the experiment is rerun once; exact traces are rerun each time, and have all channels in
-    double precision.
+    Without a stored series, the experiment is rerun once. Exact traces are rerun each time and have all
+    channels in double precision.
     """
     [name] = driven.results.index
     golden = driven.golden("A")
@@ -186,9 +185,10 @@ def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
 
 
 def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
-    """A rerun says whether its record equals the campaign's, and leaves no files unless requested.
+    """A rerun says whether its record equals the campaign's. It leaves no files unless the caller requests
+    them.
 
-    The series of a differing one is not kept.
+    The series of a rerun that differs is not kept.
     """
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
@@ -207,7 +207,7 @@ def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
 
 
 def test_two_processes_may_want_one_series(driven: Run) -> None:
-    """Both rerun the experiment, one after the other, and each has the whole series."""
+    """If two processes want the traces of one experiment at once, each gets the complete series."""
     [name] = driven.results.index
     library = driven.workspace.library
     look = (
@@ -229,7 +229,7 @@ def test_two_processes_may_want_one_series(driven: Run) -> None:
 
 
 def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The page's code runs as printed, block by block, on a run in runs/first."""
+    """The code of the documentation page runs as printed, block by block, on a run in runs/first."""
     library = driven.workspace.library
     monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
     small = (library / "campaigns" / "small.yaml").read_text()
@@ -248,7 +248,7 @@ def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pyte
 
 
 def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
-    """An error about missing data lists what the run has."""
+    """The error for missing data lists the data that the run has."""
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
@@ -260,7 +260,8 @@ def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
 def test_a_planned_experiment_has_a_diff_and_no_traces(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """A planned experiment's mutant is built on request; asking for its traces is an error with a remedy."""
+    """The mutant of a planned experiment is built on request. Its traces do not exist, and the error has a
+    remedy."""
     run = mutator.load_run(write_run(toycar, tmp_path / "r", lambda e: None), workspace=toycar)
     experiment = run.experiment(next(iter(run.experiments)))
     assert "# fi:" in experiment.diff
@@ -271,7 +272,7 @@ def test_a_planned_experiment_has_a_diff_and_no_traces(
 
 
 def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> None:
-    """A run with harness errors says so in its display and names the experiments."""
+    """A run with harness errors reports them when displayed and names the experiments."""
     run = mutator.load_run(
         write_run(
             toycar,

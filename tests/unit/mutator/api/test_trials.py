@@ -1,4 +1,4 @@
-"""One fault tried."""
+"""Try one fault."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_fault_is_tried(toycar: Workspace) -> None:
-    """A fault by name, at a time, has diff, verdict, frames by time, and a figure for notebooks."""
+    """A fault tried by name, at a time, has a diff, a verdict, frames by time, and a figure for notebooks."""
     trial = mutator.try_fault("sensor/lane/shifted", "A", 1.0, workspace=toycar)
     assert (trial.outcome, trial.status) == (Outcome.HAZARD, Status.OK)
     assert "H3" in trial.verdict["hazards_s"]
@@ -29,7 +29,7 @@ def test_a_fault_is_tried(toycar: Workspace) -> None:
 
 
 def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
-    """`value` replaces the drawn ones; `out` keeps all files."""
+    """`value` replaces the drawn values, and `out` keeps all files."""
     trial = mutator.try_fault(
         "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"
     )
@@ -42,7 +42,8 @@ def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
-    """A Fault record is tried unchanged; a crash of the controller is a result, with the data up to it."""
+    """A Fault record is tried unchanged. A crash of the controller is a result, with the data recorded
+    before it."""
     [fault] = toycar.faults("hostile/crash")
     trial = mutator.try_fault(fault, "A", workspace=toycar)
     assert trial.fault is fault
@@ -53,7 +54,7 @@ def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
 
 
 def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
-    """Without `out` the temporary folder is deleted with the trial."""
+    """Without `out`, the temporary folder is deleted together with the trial."""
     trial = mutator.try_fault("sensor/lane/shifted", "A", 5.0, workspace=toycar)
     folder = trial.folder
     assert folder.is_dir()
@@ -62,7 +63,7 @@ def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
 
 
 def test_a_trial_that_deletes_its_output(toycar: Workspace) -> None:
-    """A faulty run without an output folder is a result like any other."""
+    """A faulty run that deletes its output folder is a valid result, a crash."""
     driver = toycar.library.parent / "tree" / "toycar" / "driver.py"
     lost = "        if gap > 500.0:\n            import os, shutil\n            shutil.rmtree(os.getcwd())\n"
     old = "        wanted ="
@@ -82,6 +83,6 @@ def test_a_trial_that_deletes_its_output(toycar: Workspace) -> None:
     ],
 )
 def test_mistakes_are_told(toycar: Workspace, fault: str, scenario: str, trigger: str, said: str) -> None:
-    """An unknown name gets an error with the known names."""
+    """The error for an unknown name lists the known names."""
     with pytest.raises(MutatorError, match=said):
         mutator.try_fault(fault, scenario, trigger, workspace=toycar)

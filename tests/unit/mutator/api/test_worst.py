@@ -1,4 +1,4 @@
-"""The worst results of a run: filtered, in the order of severity, limited in number."""
+"""The worst results of a run: filtered, sorted by severity, and limited in number."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 def test_the_worst_that_a_filter_leaves(
     toycar: Workspace, tmp_path: Path, record: Callable[..., Record], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Hazards come first, for any batches; a limit cuts the list, not the count."""
+    """Hazards come first for any batch size. A limit shortens the list and leaves the count unchanged."""
     plan = make_plan(toycar, "toy")
     run = freeze(plan, tmp_path / "run", toycar).path
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H3", 5.0),)}

@@ -1,4 +1,4 @@
-"""Campaign files: what is read, and how mistakes are reported."""
+"""Campaign files: which keys are read, and how mistakes are reported."""
 
 import re
 from pathlib import Path
@@ -32,7 +32,7 @@ canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}
 
 
 def test_a_campaign_is_read(tmp_path: Path) -> None:
-    """Every key is read; missing ones have their defaults."""
+    """Every key is read, and a missing key has its default."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
     campaign = load_campaign(path)
@@ -73,7 +73,7 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
 def test_mistakes_are_told_with_their_line(
     tmp_path: Path, old: str, new: str, line: int | None, told: str
 ) -> None:
-    """A mistake is reported with file, line, and the text found."""
+    """A mistake is reported with the file, the line, and the text found."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT.replace(old, new))
     with pytest.raises(MutatorError, match=re.escape(told)) as error:
@@ -84,7 +84,7 @@ def test_mistakes_are_told_with_their_line(
 
 
 def test_the_campaigns_that_ship_are_read(clone: Workspace) -> None:
-    """Every campaign of the shipped library loads and has its file's name."""
+    """Every campaign of the shipped library loads, and its name is that of its file."""
     names = clone.campaigns
     assert "quickstart" in names
     for name in names:
@@ -95,7 +95,7 @@ KNOWN = "reading 'as_built'; expected one of as_described, as_coded"
 
 
 def in_library(toycar: Workspace, old: str, new: str) -> Path:
-    """A campaign of the toy car's library with one change."""
+    """Write a campaign of the toy car's library with one change; return its path."""
     path = toycar.library / "campaigns" / "mine.yaml"
     text = TEXT.replace(old, new)
     assert new in text
@@ -104,7 +104,7 @@ def in_library(toycar: Workspace, old: str, new: str) -> Path:
 
 
 def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
-    """A number means the same as a mapping with that number for each reading."""
+    """One arming time means the same as a mapping that gives that time for each reading."""
     path = in_library(toycar, "{as_described: 1.5, as_coded: 0.0}", "1.25")
     campaign = load_campaign(path)
     check_readings(campaign, toycar.readings())
@@ -112,7 +112,8 @@ def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
 
 
 def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
-    """A list applies to every reading; the default is none; an entry may not appear in two lists."""
+    """A setting that is a list applies to every reading; the default is an empty list. An entry that is
+    listed twice is refused."""
     for text, expected in (
         ("", {"as_described": (), "as_coded": ()}),
         ("setting: [alone]\n", {"as_described": ("alone",), "as_coded": ("alone",)}),
@@ -152,7 +153,7 @@ def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
 def test_readings_are_those_of_the_library(
     toycar: Workspace, old: str, new: str, line: int, told: str
 ) -> None:
-    """An undeclared or missing reading is reported with its line and the declared ones."""
+    """An undeclared or missing reading is reported with its line and with the declared readings."""
     path = in_library(toycar, old, new)
     with pytest.raises(MutatorError) as error:
         make_plan(toycar, path)
@@ -161,7 +162,7 @@ def test_readings_are_those_of_the_library(
 
 
 def test_a_setting_that_is_none_is_told_by_its_reading(toycar: Workspace) -> None:
-    """A plan looks up changes in the manifest for its own reading only."""
+    """For each reading, a plan looks up only that reading's changes in the manifest."""
     text = "setting: {as_described: [], as_coded: [upside_down]}\nmethods:"
     path = in_library(toycar, "methods:", text)
     make_plan(toycar, path)
@@ -170,7 +171,8 @@ def test_a_setting_that_is_none_is_told_by_its_reading(toycar: Workspace) -> Non
 
 
 def test_a_study_that_is_not_installed_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """An unknown study is refused with its line and the available ones; by default a campaign has none."""
+    """An unknown study is refused with its line and the available studies. By default, a campaign has no
+    study."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
     assert make_plan(toycar, path).campaign.study is None

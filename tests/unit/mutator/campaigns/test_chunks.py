@@ -1,4 +1,4 @@
-"""Chunks: how a plan is cut, and what remains to run."""
+"""Chunks: how a plan is divided, and which experiments remain to run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +25,7 @@ from mutator.workspace import Workspace
     ],
 )
 def test_cut(groups: str, size: int, lengths: tuple[int, ...]) -> None:
-    """Chunks have at most their size and never two groups."""
+    """No chunk exceeds its size or contains two groups."""
     assert cut(groups, size) == lengths
 
 
@@ -35,14 +35,15 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def test_everything_is_pending_at_first(folder: RunFolder) -> None:
-    """Without records, every place of every chunk is pending."""
+    """Without records, every experiment of every chunk is pending."""
     left = pending(folder, {})
     assert [item.chunk for item in left] == list(range(8))
     assert sum(len(item.places) for item in left) == 24
 
 
 def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Record]) -> None:
-    """An experiment with a record is not pending, except after a harness error; complete chunks disappear."""
+    """An experiment with a record is not pending, unless the record is a harness error. Complete chunks
+    are left out."""
     faults = read_faults(folder.path)
     chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
@@ -55,7 +56,7 @@ def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Recor
 
 
 def test_a_chunk_is_read_alone(folder: RunFolder) -> None:
-    """Each chunk's bytes give its experiments; together they are the plan."""
+    """The bytes of each chunk hold its experiments, and all chunks together hold the plan."""
     faults = read_faults(folder.path)
     found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24

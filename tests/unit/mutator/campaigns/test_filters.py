@@ -1,4 +1,4 @@
-"""Filter expressions: what they accept and refuse, and that they are never run as code."""
+"""Filter expressions: valid and invalid ones, and that they never run as code."""
 
 import pytest
 
@@ -30,7 +30,8 @@ ROW = {"fault_type": "ghost_vehicle", "scenario": "S2", "value": 120, "unit": No
     ],
 )
 def test_expressions(text: str, expected: bool) -> None:
-    """Comparisons, membership, globs and logic work as in Python; an empty cell compares false."""
+    """Comparisons, membership, globs and logic work as in Python. A comparison with an empty cell is
+    false."""
     assert compile_filter(text, ROW)(ROW) is expected
 
 
@@ -66,7 +67,7 @@ def test_anything_else_is_refused(text: str) -> None:
 
 
 def test_unknown_column_lists_the_known_ones() -> None:
-    """An error for a misspelt column lists the existing columns."""
+    """The error for a misspelt column lists the existing columns."""
     with pytest.raises(MutatorError, match=r"unknown column `speed`.*fault_type.*value"):
         compile_filter("speed > 1", ROW)
 

@@ -1,4 +1,4 @@
-"""Freezing a plan: the run folder's content, and its stability."""
+"""Freezing a plan: the content of the run folder, and when it may change."""
 
 import csv
 from pathlib import Path
@@ -12,7 +12,7 @@ from mutator.workspace import Workspace
 
 
 def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> None:
-    """A frozen plan is read back equal, with plan.csv next to it."""
+    """A frozen plan is read back equal, and plan.csv is written next to it."""
     plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
     back = load_plan(folder)
@@ -24,7 +24,7 @@ def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> N
 
 
 def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> None:
-    """The same plan may be frozen again; another one is refused."""
+    """The same plan may be frozen again; a different plan is refused."""
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*") if p.name != "owner.lock"}
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
@@ -35,7 +35,7 @@ def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> No
 
 @pytest.mark.parametrize("path", ["tree/toycar/driver.py", "templates/offset.py.j2"])
 def test_changed_sources_are_refused(toycar: Workspace, tmp_path: Path, path: str) -> None:
-    """A run planned with another target or other templates does not resume."""
+    """A run does not resume if its plan was made with another target or other templates."""
     plan = make_plan(toycar, "toy")
     freeze(plan, tmp_path / "run", toycar)
     with (toycar.library.parent / path).open("a") as file:
@@ -45,7 +45,7 @@ def test_changed_sources_are_refused(toycar: Workspace, tmp_path: Path, path: st
 
 
 def test_a_folder_with_other_things_is_left_alone(toycar: Workspace, tmp_path: Path) -> None:
-    """A non-empty folder that is no run folder is refused, and so is a file."""
+    """A file is refused, and so is a non-empty folder that is not a run folder."""
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").touch()
     for place in ("full", "full/thesis.tex"):
@@ -55,7 +55,7 @@ def test_a_folder_with_other_things_is_left_alone(toycar: Workspace, tmp_path: P
 
 
 def test_a_freeze_that_was_killed_is_done_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A folder with an unfinished freeze accepts the plan."""
+    """A folder in which freezing was interrupted accepts the plan."""
     plan = make_plan(toycar, "toy")
     freeze(plan, tmp_path / "run", toycar)
     (tmp_path / "run" / "run.json").rename(tmp_path / "run" / ".run.json.4711")
@@ -65,7 +65,7 @@ def test_a_freeze_that_was_killed_is_done_again(toycar: Workspace, tmp_path: Pat
 def test_a_limit_of_space_is_part_of_a_plan_where_it_is_not_the_default(
     toycar: Workspace, tmp_path: Path
 ) -> None:
-    """With its default, `disk_mb` changes neither a plan's digest nor its head."""
+    """The default of `disk_mb`, written out, changes neither the plan's digest nor its head."""
     path = toycar.campaign("small")
     text = path.read_text()
     before = freeze(make_plan(toycar, "small"), tmp_path / "0", toycar)

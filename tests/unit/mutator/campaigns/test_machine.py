@@ -1,4 +1,4 @@
-"""The machine's description in run folders."""
+"""The description of the machine in a run folder."""
 
 import os
 import subprocess
@@ -18,16 +18,15 @@ def git(folder: Path, *words: str) -> None:
 
 
 def test_required_packages_are_those_of_the_harness_and_theirs() -> None:
-    """The list has mutator's requirements and theirs, by canonical name; neither its extras nor mutator
-    itself.
-    """
+    """The list has mutator's requirements and their requirements, by canonical name. It has neither
+    mutator's extras nor mutator."""
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
 
 
 def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package needed only on Windows, or by an unused extra, is no requirement."""
+    """A package needed only on Windows, or only by an unused extra, is not a requirement."""
     told = {
         "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
@@ -44,18 +43,19 @@ def test_where_mutator_is_not_installed_every_package_counts(monkeypatch: pytest
 
 
 def test_versions_are_those_installed() -> None:
-    """The version is that of Python's metadata; missing packages have none."""
+    """The version is the one in the package's metadata. A missing package has no version."""
     found = machine.versions(["numpy", "no-such-package"])
     assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
 
 
 def test_modules_are_named_by_their_packages() -> None:
-    """A module may have another name than its package; modules without a package are left out."""
+    """A module's name may differ from its package's name. Modules without a package are left out."""
     assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
 
 
 def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """BLAS has one thread, whatever the user's environment says: the target's process gets its own."""
+    """BLAS uses one thread regardless of the user's environment, because the target's process gets a fixed
+    environment."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     machine.blas.cache_clear()
     (library,) = machine.blas()
@@ -64,14 +64,15 @@ def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_the_processor_is_named() -> None:
-    """The model from /proc/cpuinfo, if it has one."""
+    """The processor's model is read from /proc/cpuinfo, if the file has one."""
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
     assert not models or machine.cpu() in models
 
 
 def test_the_state_of_a_clone(tmp_path: Path) -> None:
-    """The commit, and whether that folder has changes; changes elsewhere in the clone do not count."""
+    """The commit is reported with whether that folder has changes. Changes elsewhere in the clone do not
+    count."""
     library, other = tmp_path / "library", tmp_path / "other"
     for folder in (library, other):
         folder.mkdir()
@@ -83,12 +84,12 @@ def test_the_state_of_a_clone(tmp_path: Path) -> None:
     git(tmp_path, "commit", "-qm", "one")
     found = machine.clone_state(library)
     assert found is not None and len(found["commit"]) == 40 and found["changed"] is False
-    assert machine.clone_state(other) is None  # in the clone's folder, but in no commit
+    assert machine.clone_state(other) is None  # inside the clone, but not in any commit
     (library / "b.yaml").write_text("new")
     assert machine.clone_state(library) == found | {"changed": True}
 
 
 def test_without_git_nothing_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Without git no commit is reported."""
+    """Without git, no commit is reported."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert machine.clone_state(Path(__file__).parent) is None

@@ -1,4 +1,4 @@
-"""Campaigns with operators' mutants: the plan, the times of activity, the refusals."""
+"""Campaigns with mutants of operators: plans, active times and refusals."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 
 @pytest.fixture(autouse=True)
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The executed lines of a golden run, without running one: the driver's lines up to the gas."""
+    """Replace the executed lines of a golden run by the driver's lines 1 to 16, so that nothing is run."""
 
     def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
@@ -50,9 +50,8 @@ def _edited(campaign: Path, old: str, new: str) -> Path:
 
 
 def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) -> None:
-    """Each drawn mutant is planned under `always` and at a random time; ids, order and digest are
-    reproducible, and the plan lists what was left out.
-    """
+    """Each drawn mutant is planned under `always` and at a random time. Ids, order and digest are
+    reproducible, and the plan lists what was left out."""
     plan = make_plan(toycar, campaign)
     assert len({one.fault.id for one in plan.experiments}) == 12 == len(plan.experiments) / 2
     found = Counter((one.method, one.trigger.hold) for one in plan.experiments)
@@ -66,7 +65,8 @@ def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) 
 
 
 def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    """The frozen plan keeps the list of what was left out; other plans have no such key."""
+    """The frozen plan stores the list of what was left out. A plan without operators does not have this
+    key."""
     plan = make_plan(toycar, campaign)
     folder = freeze(plan, tmp_path / "run", toycar)
     assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])
@@ -74,7 +74,7 @@ def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path,
 
 
 def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
-    """`when` selects only permanent or only transient ones, in addition to context rows and specs."""
+    """`when` selects only permanent or only transient mutants; context rows and specs are planned as well."""
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
     kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
@@ -86,7 +86,7 @@ def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
 
 
 def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaign: Path) -> None:
-    """Mutants that one selection takes as permanent and another as transient run both ways."""
+    """A mutant that is permanent in one selection and transient in another runs both ways."""
     both = {one.id for one in make_plan(toycar, campaign).experiments}
     entry = ENTRY.removesuffix("}")
     _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
@@ -103,7 +103,7 @@ def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
 
 
 def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
-    """There is one group for each operator in each function, whichever mutants were drawn."""
+    """Each operator has one group for each function, regardless of which mutants were drawn."""
 
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
@@ -145,7 +145,7 @@ def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: 
     ],
 )
 def test_a_place_without_mutants_is_refused(toycar: Workspace, campaign: Path, place: str, said: str) -> None:
-    """A missing place, or one that no golden run reaches, is reported at the selection's line."""
+    """A place that does not exist, or that no golden run reaches, is reported at the selection's line."""
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
         make_plan(toycar, campaign)

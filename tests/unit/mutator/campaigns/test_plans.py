@@ -1,4 +1,4 @@
-"""Plans: their content and reproducibility."""
+"""The content of plans, and that they are reproducible."""
 
 import shutil
 from collections import Counter
@@ -16,7 +16,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def whole(toycar: Workspace) -> Workspace:
-    """A workspace whose campaign `toy` has everything."""
+    """A workspace with a campaign `toy` that uses every feature."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("sample: 24\n", ""))
     return toycar
@@ -27,9 +27,8 @@ def pair_key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
-    """Every guided experiment has exactly one random partner of the same scenario, fault and row, and the
-    reverse.
-    """
+    """Every guided experiment has exactly one random partner with the same scenario, fault and row, and
+    vice versa."""
     experiments = make_plan(whole, "toy").experiments
     guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
     random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
@@ -39,7 +38,8 @@ def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
 
 
 def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
-    """Guided triggers wait until they are armed; random times lie on steps from then to the last."""
+    """Guided triggers wait until they are armed. Random times are starts of steps, from the arming time to
+    the last step."""
     for reading, armed in (("as_described", 1.0), ("as_coded", 0.0)):
         times = set()
         for experiment in make_plan(whole, "toy", Choices(reading=reading)).experiments:
@@ -55,14 +55,15 @@ def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
 
 
 def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> None:
-    """A fault's random times are drawn separately for each scenario and row."""
+    """The random times of a fault are drawn separately for each scenario and row."""
     experiments = [e for e in make_plan(whole, "toy").experiments if e.method is Method.RANDOM]
     silent = [e for e in experiments if e.fault.fault_type == "silence"]
     assert len({e.trigger.condition for e in silent}) == len(silent) == 4
 
 
 def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    """Ids, order, chunks and digest depend on campaign, library and seed, not on the location."""
+    """Ids, order, chunks and digest depend on the campaign, the library and the seed, and not on the
+    location."""
     plan = make_plan(toycar, "toy")
     elsewhere = make_plan(copy_toycar(tmp_path / "elsewhere"), "toy")
     assert (plan.experiments, plan.chunks, plan.digest) == (
@@ -76,7 +77,7 @@ def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_p
 
 
 def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
-    """An experiment's id covers the scenario's content."""
+    """The id of an experiment depends on the scenario's content."""
     before = make_plan(toycar, "toy")
     with toycar.scenario("A").open("a") as file:
         file.write("\n")
@@ -86,7 +87,7 @@ def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
 
 
 def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
-    """Experiments with a common golden run are neighbours, and no chunk spans two golden runs."""
+    """Experiments with the same golden run are adjacent, and no chunk has two golden runs."""
     plan = make_plan(whole, "toy")
     keys = [(e.scenario, e.fault.changes) for e in plan.experiments]
     assert len(dict.fromkeys(keys)) == 1 + sum(a != b for a, b in pairwise(keys))
@@ -99,9 +100,8 @@ def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
 
 
 def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
-    """A campaign's setting joins every run's changes once, including canary and goldens, and enters their
-    ids.
-    """
+    """A campaign's setting applies to every run once, including the canary and the golden runs, and
+    changes the ids."""
     before = make_plan(whole, "toy")
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
@@ -116,7 +116,7 @@ def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
 
 
 def test_filters_and_limit(whole: Workspace) -> None:
-    """--only keeps, --exclude drops, --limit takes an even part of the rest."""
+    """`--only` keeps experiments, `--exclude` drops them, and `--limit` takes an even sample of the rest."""
     plan = make_plan(
         whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
@@ -128,7 +128,7 @@ def test_filters_and_limit(whole: Workspace) -> None:
 
 
 def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
-    """A limited plan of both methods consists of whole pairs, which paired statistics can use."""
+    """A limited plan of both methods has complete pairs, as paired statistics require."""
     plan = make_plan(whole, "toy", Choices(limit=10))
     keys = Counter(
         (e.fault.id, e.scenario, e.trigger.name.removeprefix("random/"), e.seed) for e in plan.experiments
@@ -147,7 +147,7 @@ def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
     ],
 )
 def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> None:
-    """Impossible options are errors before anything is expanded."""
+    """Invalid options are reported before any fault is expanded."""
     with pytest.raises(MutatorError, match=told):
         make_plan(toycar, "toy", Choices(**choices))
 
@@ -178,7 +178,8 @@ def test_names_that_do_not_exist_are_told(
 
 
 def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
-    """A campaign cannot use a scenario file from outside the library; a subfolder of the library is fine."""
+    """A campaign cannot use a scenario file from outside the library. A file in a subfolder of the library
+    is allowed."""
     path, file = toycar.campaign("toy"), toycar.scenario("A")
     text = path.read_text()
     path.write_text(text.replace("[A, B]", f"[A, {file}]"))
@@ -199,7 +200,7 @@ def test_faults_for_a_time(toycar: Workspace) -> None:
 
 
 def test_some_values_of_a_variant(whole: Workspace) -> None:
-    """`values` takes that many values of each variant."""
+    """`values` sets how many values of each variant are taken."""
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
     faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
@@ -212,7 +213,7 @@ def test_some_values_of_a_variant(whole: Workspace) -> None:
 
 
 def test_cost_is_stated(toycar: Workspace) -> None:
-    """Expected time falls with workers; a measured rate replaces the default one."""
+    """The expected time falls with the number of workers. A measured rate replaces the default one."""
     plan = make_plan(toycar, "toy")
     one, two = plan.cost(1), plan.cost(2)
     assert one.cpu_s == two.cpu_s > 0
@@ -228,7 +229,8 @@ BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 
 def test_quickstart_shows_everything(clone: Workspace) -> None:
-    """60 experiments: every published variant in guided and random, every scenario and context."""
+    """The plan has 60 experiments: every published variant, guided and random, in every scenario and
+    context."""
     plan = make_plan(clone, "quickstart")
     experiments = plan.experiments
     variants = {f"{spec.name}/{v.name}" for spec in clone.specs() if spec.module not in BEYOND for v in spec}
@@ -247,7 +249,8 @@ def plan_of(clone: Workspace, tmp_path: Path, **choices: str) -> Plan:
 
 
 def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp_path: Path) -> None:
-    """Without a sample they are the 11,280 published ones: each value in each scenario and context."""
+    """Without a sample, the plan has the 11,280 published experiments: each value in each scenario and
+    context."""
     described, coded = (plan_of(clone, tmp_path, reading=r) for r in ("as_described", "as_coded"))
     assert len(described.experiments) == len(coded.experiments) == 282 * 5 * 4 * 2
     assert len({e.id for e in described.experiments}) == len(described.experiments)
@@ -271,7 +274,8 @@ def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp
 def test_published_plans_keep_their_digests(
     clone: Workspace, campaign: str, reading: str, promised: str
 ) -> None:
-    """The digest of a cited plan, and so all its experiments' ids, is the same in every version."""
+    """Every version computes the same digest of a cited plan, so the ids of its experiments are the same,
+    too."""
     assert make_plan(clone, campaign, Choices(reading=reading)).digest == promised
 
 

@@ -1,4 +1,4 @@
-"""What a session records about itself in run.json, and when it is refused."""
+"""What a session records about itself in run.json, and when a session is refused."""
 
 import json
 from collections.abc import Iterable
@@ -18,7 +18,8 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    """A planned run with checks that list `iniconfig` and `hypothesis` as loaded by its golden runs."""
+    """A planned run with checks that list `iniconfig` and `hypothesis` as packages that its golden runs
+    loaded."""
     planned = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     said = {"schema": SCHEMA, "packages": ["hypothesis", "iniconfig"]}
     (planned.path / "checks.json").write_text(json.dumps(said))
@@ -26,7 +27,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
-    """Pretend other versions of some packages; None: not installed."""
+    """Replace the versions of some packages; None means not installed."""
     real = machine.versions
 
     def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
@@ -37,9 +38,8 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -> None:
-    """A stretch has Python, platform, processor, BLAS, threads, and the packages of harness and
-    golden runs.
-    """
+    """A stretch stores Python, platform, processor, BLAS, threads, and the packages of the harness and of
+    golden runs."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
@@ -50,13 +50,13 @@ def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -
 
 
 def _clone() -> dict[str, object] | None:
-    """Of a stretch's paths only the harness may lie in a clone: the toy is a copy."""
+    """Of the paths in a stretch, only the harness's may be in a clone, because the toy is a copy."""
     state = machine.clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
 
 def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
-    """A later session appends its stretch and changes nothing else in run.json."""
+    """A later session appends its stretch to run.json and changes nothing else in it."""
     before = json.loads((folder.path / "run.json").read_text())
     for session in ("0001-*", "0002-*"):
         begin_stretch(RunFolder.open(folder.path), toycar, records=session, accept=False)
@@ -68,7 +68,7 @@ def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
 def test_before_anything_was_driven_any_version_will_do(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Any version may freeze a plan, so a plan binds no versions."""
+    """A plan without records can be run with any versions."""
     use(monkeypatch, numpy="2.1.0")
     assert check_versions(folder) == ()
 
@@ -89,9 +89,8 @@ def test_other_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    """The error lists the differences as the user's to resolve; if accepted, they are recorded in the
-    stretch.
-    """
+    """The error lists the differences, which the user must resolve. If the user accepts them, the stretch
+    records them."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
@@ -100,13 +99,13 @@ def test_other_versions_are_refused_unless_accepted(
     assert caught.value.got == f"run with other versions: {told}"
     begin_stretch(folder, toycar, records="0002-*", accept=True)
     assert [list(stretch.accepted) for stretch in folder.stretches] == [[], [told]]
-    assert check_versions(folder) == ()  # from now on these are the versions of the run
+    assert check_versions(folder) == ()  # the run's versions from now on
 
 
 def test_another_python_is_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both versions are named."""
+    """The error gives both versions of Python."""
     monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     monkeypatch.setattr("platform.python_version", lambda: "3.12.1")
@@ -118,7 +117,8 @@ def test_another_python_is_refused(
 def test_another_machine_is_noted_and_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    """Processor, kernel and threads are only recorded: golden runs decide whether machines compute alike."""
+    """Processor, kernel and threads are only recorded. Golden runs show whether two machines compute the
+    same."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"

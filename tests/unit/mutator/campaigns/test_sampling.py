@@ -1,4 +1,4 @@
-"""Sampling: even, deterministic, and in the plan's order."""
+"""Samples are even and deterministic, and keep the plan's order."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -14,7 +14,7 @@ SPECS = ("radar/chaff/distance", "radar/jamming/no_data", "car/speed/slower")
 
 @pytest.fixture
 def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
-    """Three variants (with 10, 1 and 3 values) in two scenarios, two methods, two triggers."""
+    """Three variants with 10, 1 and 3 values, in two scenarios, with two methods and two triggers."""
     made = []
     for spec, values in zip(SPECS, (10, 1, 3), strict=True):
         for scenario in ("S1", "S2"):
@@ -27,9 +27,8 @@ def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
 
 @pytest.mark.parametrize("count", [6, 12, 24])
 def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count: int) -> None:
-    """A sample has equal numbers of each variant, method, scenario and trigger, however many values
-    each has.
-    """
+    """A sample has equal numbers of each variant, method, scenario and trigger, regardless of the number
+    of values."""
     picked = pick(many, count, seed=1)
     assert len(picked) == count
     assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
@@ -39,7 +38,8 @@ def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count
 
 
 def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
-    """If a variant runs out of experiments, the others fill up, and no experiment is picked twice."""
+    """If a variant has no experiments left, the other variants fill its share. No experiment is picked
+    twice."""
     picked = pick(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
     assert counts["radar/jamming/no_data"] == 8
@@ -47,7 +47,7 @@ def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
 
 
 def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> None:
-    """A seed picks the same experiments in their original order; another seed picks others."""
+    """A seed always picks the same experiments in their original order. Another seed picks others."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
@@ -58,16 +58,15 @@ def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> 
 def test_runs_that_stop_are_a_sample_of_the_same_faults(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
-    """A campaign that stops runs at a hazard draws the same sample as one that does not, so they can be
-    compared.
-    """
+    """A campaign that stops runs at a hazard has the same sample as one that does not, so that they can be
+    compared."""
     stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
     picked = [many.index(e) for e in draw(many, 11, seed=1)]
     assert [stopping.index(e) for e in draw(stopping, 11, seed=1)] == picked
 
 
 def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
-    """A sample as large as the whole is the whole."""
+    """A sample as large as the plan is the whole plan."""
     assert pick(many, 1000, seed=1) == tuple(many)
 
 
@@ -76,14 +75,13 @@ def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
     [(10, 1, [5]), (10, 2, [2, 7]), (3, 3, [0, 1, 2]), (2, 5, [0, 1]), (1, 1, [0])],
 )
 def test_values_are_spread(count: int, wanted: int, indices: list[int]) -> None:
-    """Values are taken evenly from a variant's range, none twice."""
+    """Values are taken evenly from a variant's range, each at most once."""
     assert spread(count, wanted) == indices
 
 
 def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experiment]) -> None:
-    """Half of all means half of each fault type in each scenario, and every guided experiment with its
-    partner.
-    """
+    """A sample of half has half of each fault type in each scenario, and every guided experiment with its
+    partner."""
     picked = pick_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
@@ -95,9 +93,8 @@ def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experi
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
 def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    """Every guided experiment has its random partner, variants, scenarios and rows are evenly spread, and a
-    seed picks the same in any input order.
-    """
+    """Every guided experiment has its random partner. Variants, scenarios and rows are evenly spread, and
+    a seed picks the same experiments for any input order."""
     picked = pick_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
@@ -112,14 +109,14 @@ def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
 
 @pytest.mark.parametrize("count", [1, 11, 55])
 def test_an_odd_number_cuts_one_pair(many: list[Experiment], count: int) -> None:
-    """With an odd number, one guided experiment has no partner."""
+    """In a sample of odd size, one guided experiment has no partner."""
     picked = pick_pairs(many, count, seed=1)
     guided, random = ({key(e) for e in picked if e.method is m} for m in (Method.GUIDED, Method.RANDOM))
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
 def test_without_partners_pairs_are_single_experiments(many: list[Experiment]) -> None:
-    """For guided experiments alone the result is that of `pick`."""
+    """A sample of guided experiments only equals the result of `pick`."""
     guided = [e for e in many if e.method is Method.GUIDED]
     assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
 
@@ -130,6 +127,6 @@ def key(experiment: Experiment) -> tuple[str, str, str]:
 
 @pytest.mark.parametrize("count", [10, 57])
 def test_in_proportion_refuses_what_does_not_come_out(many: list[Experiment], count: int) -> None:
-    """An odd number, or one too small for a pair of each type in each scenario, is refused."""
+    """A sample is refused if its size is odd, or too small for a pair of each type in each scenario."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
         pick_in_proportion(many, count, seed=1)

@@ -1,4 +1,4 @@
-"""Campaigns repeated with several seeds."""
+"""Campaigns that are repeated with several seeds."""
 
 import re
 from collections.abc import Callable
@@ -39,7 +39,7 @@ def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
 def test_each_seed_plans_what_it_plans_alone(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
-    """Experiments, chunks and runs are those of the single seeds in order; `--seed` takes one."""
+    """Experiments, chunks and runs are those of the single seeds in order. `--seed` selects one seed."""
     path = campaign(**more)
     plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)
@@ -51,7 +51,7 @@ def test_each_seed_plans_what_it_plans_alone(
 
 
 def test_a_limit_is_of_all_seeds(toycar: Workspace, campaign: Callable[..., Path]) -> None:
-    """A limit keeps that many experiments in total, spread over the seeds."""
+    """A limit is the total number of experiments, spread over the seeds."""
     plan = make_plan(toycar, campaign(), Choices(limit=7))
     assert [sum(e.seed == seed for e in plan.experiments) for seed in (3, 4, 5)] == [3, 2, 2]
     assert {e.seed for e in make_plan(toycar, campaign(), Choices(limit=2)).experiments} == {3, 4}
@@ -60,7 +60,7 @@ def test_a_limit_is_of_all_seeds(toycar: Workspace, campaign: Callable[..., Path
 def test_a_filter_may_leave_a_seed_without_experiments(
     toycar: Workspace, campaign: Callable[..., Path]
 ) -> None:
-    """Only a plan without any experiment is refused."""
+    """A filter may leave out whole seeds. It is an error only if no experiment is left."""
     plan = make_plan(toycar, campaign(), Choices(only="seed == 4"))
     assert plan.experiments == alone(toycar, campaign(), 4).experiments
     with pytest.raises(MutatorError, match="no experiment is left"):
@@ -70,7 +70,7 @@ def test_a_filter_may_leave_a_seed_without_experiments(
 def test_each_seed_has_golden_runs_of_its_own(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Each seed has its own golden runs, because a run draws from the seed even without a fault."""
+    """Each seed has separate golden runs, because a run draws from the seed even without a fault."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     assert folder.seeds == range(3, 6)
     keys = {one.key for one in folder.goldens}
@@ -81,7 +81,7 @@ def test_each_seed_has_golden_runs_of_its_own(
 def test_a_plan_that_is_written_part_by_part_is_the_one_in_memory(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A plan written part by part has the same bytes in each file, and can be read back."""
+    """A plan that is written part by part has the same bytes in each file and can be read back."""
     path = campaign()
     parts, whole = tmp_path / "parts", tmp_path / "whole"
     freeze(Planning(toycar, path), parts, toycar)
@@ -99,7 +99,7 @@ def test_a_plan_that_is_written_part_by_part_is_the_one_in_memory(
 def test_experiments_are_read_when_asked_for(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A large plan loads its experiments on access, as a sequence."""
+    """A large plan is a sequence that loads experiments when they are accessed."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     planned = plan_file.ExperimentsInOrder(folder.path, folder.head["chunks"])
     every = plan_file.read_all(folder.path)
@@ -125,7 +125,7 @@ def test_experiments_are_read_when_asked_for(
 def test_wrong_seeds_are_told(
     toycar: Workspace, campaign: Callable[..., Path], lines: str, said: str
 ) -> None:
-    """Wrong seeds are reported with file and line."""
+    """Invalid seeds are reported with file and line."""
     with pytest.raises(MutatorError) as told:
         make_plan(toycar, campaign(lines))
     assert re.search(said, str(told.value)) and "small.yaml:" in str(told.value)

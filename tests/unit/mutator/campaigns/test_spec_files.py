@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def mine(toycar: Workspace, tmp_path: Path) -> Path:
-    """A campaign outside the library, with a spec file in a folder next to it."""
+    """A campaign outside the library, and a spec file in a folder next to it."""
     spec = (toycar.library / "faults" / "sensor" / "lane.yaml").read_text()
     (tmp_path / "specs").mkdir()
     spec = spec.replace("fault_type: lane", "fault_type: drifting")
@@ -28,9 +28,8 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
 def test_a_spec_file_is_found_from_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Faults of a named spec file join those of the library, from any current folder; the canary may come
-    from one, too. Random times need a latest time, guided triggers do not.
-    """
+    """Faults of a named spec file are added to the library's faults, from any current folder. The canary
+    may come from a spec file, too. Random times need a latest time; guided triggers do not."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)
@@ -50,9 +49,8 @@ def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
 
 
 def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> None:
-    """Two different specs with one name are refused, since tables could not distinguish them; naming the
-    library's own file is fine.
-    """
+    """Two different specs with the same name are refused, because tables could not distinguish them.
+    Naming the library's own file is allowed."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name sensor/lane of a spec in the library"):
@@ -64,7 +62,7 @@ def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> Non
 
 
 def test_a_missing_campaign_file_is_told(toycar: Workspace) -> None:
-    """A name that ends in .yaml is a file's; without the ending it may be a campaign's."""
+    """A name that ends in .yaml is a file. A name without the ending may be a campaign."""
     with pytest.raises(MutatorError, match=r"no file nosuch\.yaml; expected a campaign: the path of a YAML"):
         toycar.campaign("nosuch.yaml")
     with pytest.raises(MutatorError, match=r"no file smal\.yaml.*did you mean 'small'\?"):

@@ -1,4 +1,4 @@
-"""Studies are found by their entry points, in any package."""
+"""Studies are found through entry points of any installed package."""
 
 import dataclasses
 import re
@@ -25,7 +25,7 @@ PAGE = CLONE / "docs" / "how-to" / "add-a-study.md"
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """The study of the how-to page, and one with a broken package."""
+    """The study of the how-to page, and a study with a broken package."""
     package = tmp_path / "site" / "crash_tests"
     package.mkdir(parents=True)
     [code] = re.findall(r"```python\n(.*?)```", PAGE.read_text(), re.S)
@@ -40,13 +40,13 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_the_study_that_ships_is_installed() -> None:
-    """The package's metadata lists it, so this test notices an outdated installation."""
+    """The package's metadata lists the study. This test fails if the installation is outdated."""
     assert "driving_agent_resilience" in study_names(), "install again: pip install -e . --no-deps"
     assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
 def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path: Path) -> None:
-    """The how-to page's example works as printed: both forms of its page have its panel and source."""
+    """The how-to page's example works as printed: both forms of its report have its panel and source."""
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
@@ -62,7 +62,8 @@ def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path
 
 
 def test_what_is_not_there_is_refused_with_what_is(installed: None) -> None:
-    """An unknown name lists the known ones; a broken package is named with the reason."""
+    """The error for an unknown name lists the known ones. The error for a broken package names it with the
+    reason."""
     with pytest.raises(MutatorError, match="'moon_landing' is not installed; expected one of broken, crash"):
         find_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' cannot be loaded: .*MISSING"):
@@ -103,7 +104,8 @@ BAD_CHECKS = {
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Entry points of an installed package, each with a different error, and one valid one."""
+    """The entry points of an installed package: one is valid, and each of the others has a different
+    error."""
     package = tmp_path / "site" / "strange_studies"
     package.mkdir(parents=True)
     (package / "raising.py").write_text("STUDY = 1 / 0")
@@ -118,7 +120,7 @@ def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def asking(toycar: Workspace, study: str) -> Path:
-    """The smallest campaign of the library, with a study in its last line."""
+    """The smallest campaign of the library, with a study on its last line."""
     path = toycar.campaign("small")
     path.write_text(f"{path.read_text()}study: {study}\n")
     return path
@@ -128,7 +130,8 @@ def asking(toycar: Workspace, study: str) -> Path:
 def test_what_is_no_study_is_told_at_the_campaign_that_asks_for_it(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """Planning refuses it and `mutator check` lists it: line, reason, the other studies, a remedy."""
+    """Planning refuses the study, and `mutator check` lists it: line, reason, the other studies, and a
+    remedy."""
     before = [str(problem) for problem in check_library(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
@@ -148,7 +151,7 @@ def test_what_is_no_study_is_told_at_the_campaign_that_asks_for_it(
 def test_a_check_that_fails_is_a_problem_of_the_library(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """An error in a study's own check is listed at the campaign and does not end `mutator check`."""
+    """An error in a study's own check is listed at the campaign, and `mutator check` continues."""
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     problems = [str(problem) for problem in check_library(toycar, "toycar")]
@@ -176,7 +179,7 @@ def test_every_campaign_that_asks_for_a_missing_study_is_told(toycar: Workspace)
 def test_a_run_opens_without_its_study(
     installed: None, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run opens after its study was uninstalled; planning it again is refused."""
+    """A run can be opened after its study was uninstalled. Planning it again is refused."""
     asking(toycar, "crash_tests")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
     monkeypatch.setattr(studies, "entry_points", EntryPoints().select)
@@ -186,5 +189,5 @@ def test_a_run_opens_without_its_study(
 
 
 def test_the_parts_asked_for_are_those_of_a_study() -> None:
-    """Loading checks exactly the parts of a study that a report uses."""
+    """Loading checks only those parts of a study that a report uses."""
     assert set(studies.PARTS) == {field.name for field in dataclasses.fields(Study)}

@@ -1,4 +1,4 @@
-"""Campaigns with their own triggers, and libraries without a hazard analysis."""
+"""Campaigns that list their triggers, and libraries without a hazard analysis."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 
 def edit(pole: Workspace, old: str, new: str) -> Path:
-    """The pole's campaign with other text."""
+    """The pole's campaign, with some text replaced."""
     path = pole.library / "campaigns" / "upright.yaml"
     text = path.read_text()
     assert old in text
@@ -30,13 +30,13 @@ TRIGGERS = """triggers:
 
 
 def listed(pole: Workspace, triggers: str, methods: str = "[guided]") -> Path:
-    """The pole's campaign with these triggers, from its ninth line on."""
+    """The pole's campaign, with these triggers from line nine on."""
     edit(pole, "methods: [guided, random]", f"methods: {methods}")
     return edit(pole, TRIGGERS, triggers)
 
 
 def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
-    """Times, conditions and `always` are armed and held as the file says; each has a random partner."""
+    """Times, conditions and `always` are armed and held as the file says. Each has a random partner."""
     plan = make_plan(pole, "upright")
     assert len(plan.experiments) == 3 * 3 * 2
     found = {e.trigger.name: e.trigger for e in plan.experiments if e.method is Method.GUIDED}
@@ -53,7 +53,8 @@ def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
 
 
 def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
-    """A plain list needs no method, is armed as the manifest says, and equals the same list in a mapping."""
+    """A plain list of triggers needs no method and is armed as the manifest says. It equals the same list
+    in a mapping."""
     path = listed(pole, "triggers: [always, {when: angle > 0.1}]\n")
     path.write_text(path.read_text().replace("methods: [guided]\n", ""))
     manifest = pole.library / "targets" / "pole.yaml"
@@ -85,7 +86,8 @@ def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
     ],
 )
 def test_lists_that_cannot_be(pole: Workspace, triggers: str, methods: str, said: str) -> None:
-    """Each mistake is reported at the line of its item, including conditions over unobserved values."""
+    """Each mistake is reported at the line of its item. A condition over values that are not observed is
+    one."""
     path = listed(pole, triggers, methods)
     with pytest.raises(MutatorError, match=said) as caught:
         make_plan(pole, "upright")
@@ -93,7 +95,8 @@ def test_lists_that_cannot_be(pole: Workspace, triggers: str, methods: str, said
 
 
 def test_check_knows_the_conditions(pole: Workspace) -> None:
-    """A library without a hazard analysis passes; a condition unknown to its target is reported."""
+    """A library without a hazard analysis is valid. A condition that is invalid for its target is
+    reported."""
     assert check_library(pole, "pole") == []
     listed(pole, "triggers: [{when: speed > 1}]\n")
     (problem,) = check_library(pole, "pole")
@@ -101,9 +104,8 @@ def test_check_knows_the_conditions(pole: Workspace) -> None:
 
 
 def test_mutants_without_a_table(pole: Workspace) -> None:
-    """Without contexts, mutants of specs are built under `always`; an error about an unknown trigger lists no
-    rows.
-    """
+    """Without contexts, mutants of specs are built under `always`. The error for an unknown trigger lists
+    no rows."""
     triggers = {trigger.name for _, trigger in MutantSet.of_specs(["sensor/angle"], workspace=pole).pairs}
     assert triggers == {"always"}
     with pytest.raises(MutatorError, match=r"expected a time in s, `always`, or a condition"):

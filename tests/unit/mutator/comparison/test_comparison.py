@@ -1,4 +1,4 @@
-"""Two run folders are compared, and the comparison is written."""
+"""Compare two run folders, and write the comparison."""
 
 import csv
 import json
@@ -26,9 +26,8 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),
 
 
 def lane_is_left(e: Experiment) -> dict[str, Any]:
-    """Lane faults lead out of the lane, with the given message for a crash among them; the others have no
-    effect.
-    """
+    """The result of an experiment: lane faults are hazardous, except one, which crashes with a given
+    message. Other faults have no effect."""
     if e.fault.fault_type != "lane":
         return {}
     if e.fault.value == 0.8:
@@ -40,7 +39,7 @@ def lane_is_left(e: Experiment) -> dict[str, Any]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> tuple[Path, Path]:
-    """Two runs of the toy: in `before` nothing happens; `after` has a changed target and is worse."""
+    """Two runs of the toy. In `before`, nothing happens. `after` has a changed target and worse results."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     before = write_run(toycar, place / "before")
@@ -59,14 +58,14 @@ def lanes(found: Comparison) -> int:
 
 
 def test_what_differs_is_told(found: Comparison) -> None:
-    """Only changed sources differ, and the changed file is named."""
+    """Only the sources differ, and the changed file is named."""
     assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
     assert pages.files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
 
 
 def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
-    """If one run stops early, a missing alert of the pair gets a remark instead of counting as lost."""
+    """If one run of a pair stops early, its missing alert gets a remark and does not count as lost."""
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
@@ -76,7 +75,8 @@ def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
 def test_a_run_planned_before_files_were_written_down(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """Runs without a list of files in their head can be compared, with a remark that it is unknown."""
+    """Runs whose head has no list of files can be compared. A remark says that the changed files are
+    unknown."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
@@ -87,7 +87,7 @@ def test_a_run_planned_before_files_were_written_down(
 
 
 def test_gates_name_what_is_worse(found: Comparison) -> None:
-    """Each experiment that became hazardous is named once; without one the gate finds nothing."""
+    """The gate names each experiment that became hazardous once. Gates for other changes find nothing."""
     new = findings(found, [Gate.NEW_HAZARD])
     assert 0 < len(new) <= lanes(found)
     assert all("sensor/lane/shifted" in f.words and "masked -> hazard (H3 2.00 s" in f.words for f in new)
@@ -96,7 +96,7 @@ def test_gates_name_what_is_worse(found: Comparison) -> None:
 
 
 def test_the_whole_is_in_the_tables(found: Comparison) -> None:
-    """The tables agree with the pairs, and McNemar's test with the counts."""
+    """The tables agree with the pairs, and McNemar's test agrees with the counts."""
     endings, changes, rates, _, by_type, _ = found.sheets
     assert sum(sum(line[1:]) for line in endings.lines) == len(found.pairs) == 24  # type: ignore[arg-type]
     total = dict(zip(changes.heads, changes.lines[-1], strict=True))
@@ -116,7 +116,7 @@ def test_the_whole_is_in_the_tables(found: Comparison) -> None:
 
 
 def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
-    """A run compared with itself has no changes or differing facts, and passes every gate."""
+    """A run compared with itself has no changes and no differing facts, and passes every gate."""
     found = compare(runs[1], runs[1])
     assert found.changed == ()
     assert not any(fact.differs for fact in found.facts)
@@ -125,9 +125,8 @@ def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
 
 
 def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
-    """Python, processor and package versions of all stretches are compared; if a folder lists every installed
-    package, only those count that the other one lists, too.
-    """
+    """The comparison covers Python, processor and package versions of all stretches. If a folder lists
+    every installed package, only those that the other folder lists, too, are compared."""
     sides = [read_side(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
@@ -143,14 +142,14 @@ def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
 
 
 def test_only_some(runs: tuple[Path, Path]) -> None:
-    """A filter selects from the experiments of both runs."""
+    """A filter selects experiments of both runs."""
     found = compare(*runs, only='fault_type == "lane"')
     assert len(found.pairs) == lanes(found) > 0
     assert found.unmatched == ()
 
 
 def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
-    """Two runs without a pair are refused, with their numbers."""
+    """Two runs without a common experiment are refused; the error has the number of experiments of each."""
     with pytest.raises(MutatorError, match="has a partner"):
         compare(*runs, only="value == -1")
 
@@ -169,7 +168,7 @@ def test_a_failed_proof_is_not_compared(
 
 
 def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Harness errors and experiments not run are reported and enter no rate."""
+    """Harness errors and experiments that did not run are reported and do not enter any rate."""
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
     a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
     b = write_run(
@@ -186,7 +185,7 @@ def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write
 
 
 class Page(HTMLParser):
-    """A page's external resources, its texts, and its tags."""
+    """A parsed page: its external resources, texts and tags."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -201,7 +200,7 @@ class Page(HTMLParser):
 
 
 def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
-    """Page, Markdown and CSV have every pair that changed; the page is self-contained and escapes text."""
+    """Page, Markdown and CSV list every pair that changed. The page is self-contained and escapes text."""
     written = pages.write(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
@@ -219,7 +218,7 @@ def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
 
 
 def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """The same runs give the same bytes."""
+    """Comparing the same runs again gives the same bytes."""
     one, two = (pages.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b")))
     for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
         assert a.read_bytes() == b.read_bytes()
@@ -228,7 +227,7 @@ def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, P
 def test_a_page_of_many_changes_shows_the_first(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Even without scripts, the page shows at most the limit's rows and says so; it contains all of them."""
+    """Without scripts, the page shows only as many rows as the limit and says so. It contains all rows."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

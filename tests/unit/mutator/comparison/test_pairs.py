@@ -17,7 +17,7 @@ Make = Callable[..., Experiment]
 
 
 def row(experiment_id: str = "e", **given: Any) -> Row:
-    """The row of a successful run with a masked fault, with the given changes."""
+    """The row of a successful run with a masked fault, with the given changes applied."""
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
         **dict.fromkeys(("module", "fault_type", "variant", "value", "unit", "scenario"), "x"),
@@ -37,13 +37,14 @@ def row(experiment_id: str = "e", **given: Any) -> Row:
 
 
 def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side:
-    """A run of these experiments; those in `without` have not run."""
+    """A run of these experiments, except those in `without`, which have not run."""
     rows = {e.id: row(e.id) for e in experiments if e not in without}
     return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
 
 
 def test_experiments_are_matched_whatever_their_ids(experiment: Make) -> None:
-    """The same fault, scenario and trigger pair up across readings, settings, times and seeds."""
+    """Experiments with the same fault, scenario and trigger form a pair, even if reading, setting, time or
+    seed differ."""
     one = experiment(method=Method.RANDOM, trigger="random/C1")
     other = dataclasses.replace(
         one,
@@ -70,23 +71,22 @@ def test_experiments_are_matched_whatever_their_ids(experiment: Make) -> None:
     ids=str,
 )
 def test_another_experiment_is_no_partner(experiment: Make, other: dict[str, Any]) -> None:
-    """Experiments that differ in fault, value, scenario, method or trigger are reported as present in one run
-    only.
-    """
+    """An experiment whose fault, value, scenario, method or trigger has no match is reported as present in
+    one run only."""
     a, b = experiment(), experiment(**other)
     found = match(side(a), side(b))
     assert (found.pairs, found.only_a, found.only_b) == ((), (a,), (b,))
 
 
 def test_what_has_not_run_is_told(experiment: Make) -> None:
-    """An experiment planned but not run on one side is named and is in no pair."""
+    """An experiment that is planned but did not run on one side is named and forms no pair."""
     a, b = experiment(value=1.0), experiment(value=2.0)
     found = match(side(a, b, without=(a,)), side(a, b, without=(b,)))
     assert (found.pairs, found.no_result_a, found.no_result_b) == ((), (a,), (b,))
 
 
 def test_doubles_are_not_guessed_at(experiment: Make) -> None:
-    """If several experiments have one name, none is matched, except identical ones."""
+    """If several experiments share a name, none of them is matched, unless they are identical."""
     a = experiment()
     twin = dataclasses.replace(a, seed=8)
     third = dataclasses.replace(a, seed=9)
@@ -136,7 +136,7 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
     ],
 )
 def test_changes(experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str) -> None:
-    """Each kind of change is reported exactly where it occurs; times count from the activation."""
+    """Each kind of change is reported exactly where it occurs. Times count from the activation."""
     e = experiment()
     pair = Pair(e, e, row(**a), row(**b))
     assert pair.changes == {Change(name) for name in changes.split()}

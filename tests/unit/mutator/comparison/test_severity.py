@@ -1,4 +1,4 @@
-"""Severity and metrics in a comparison of two runs."""
+"""Severity and metrics in the comparison of two runs."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -43,14 +43,13 @@ def contact(delta_v: float, **more: float) -> dict[str, Any]:
 
 
 def before(e: Experiment) -> dict[str, Any]:
-    """Lane faults end in light contacts; the others have no effect."""
+    """The result before: lane faults end in light contacts, and the other faults have no effect."""
     return contact(2.0) if e.fault.fault_type == "lane" else {"metrics": (("way", 20.0),)}
 
 
 def after(e: Experiment) -> dict[str, Any]:
-    """Contacts of guided lane faults are harder, those of random ones gone; distance faults end in one and
-    cover less distance.
-    """
+    """The result after: guided lane faults end in harder contacts, and random ones in none. Distance
+    faults end in a contact and cover less distance."""
     if e.fault.fault_type == "lane":
         return contact(12.0) if e.method is Method.GUIDED else {"metrics": (("way", 30.0),)}
     return contact(5.0, way=16.0) if e.fault.fault_type == "distance" else {"metrics": (("way", 20.0),)}
@@ -62,9 +61,8 @@ def runs(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> tuple[Path, ...]:
-    """Runs of the toy with severity: before, after, and before with another scale; then one of a target
-    without severity.
-    """
+    """Three runs of the toy with severity (before, after, before with another scale), and one of a target
+    without severity."""
     place = tmp_path_factory.mktemp("runs")
     toycar = copy_toycar(place)
     without = write_run(toycar, place / "without")
@@ -89,7 +87,7 @@ def kinds(found: Comparison, change: Change) -> set[tuple[str, str]]:
 
 
 def test_each_experiment_whose_severity_changed_is_listed(found: Comparison) -> None:
-    """A higher class, or a new contact, is worse; a lower one, or a contact that disappears, is better."""
+    """A higher class or a new contact is worse. A lower class or a contact that disappears is better."""
     assert kinds(found, Change.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
     assert kinds(found, Change.LOWER_SEVERITY) == {("lane", "S1>")}
     assert "higher-severity" in summary(found)
@@ -98,7 +96,8 @@ def test_each_experiment_whose_severity_changed_is_listed(found: Comparison) -> 
 
 
 def test_the_gate_finds_new_contacts_of_a_class_or_a_worse_one(found: Comparison) -> None:
-    """S2 finds experiments that were milder before, and not those already in the class."""
+    """The gate for a class finds experiments that were milder before, and not those that already had the
+    class."""
     counts = {gate: len(findings(found, [gate])) for gate in Gate if gate.value.startswith("severity:")}
     distance = sum(p.b.fault.fault_type == "distance" for p in found.pairs)
     harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)
@@ -109,7 +108,8 @@ def test_the_gate_finds_new_contacts_of_a_class_or_a_worse_one(found: Comparison
 
 
 def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
-    """The difference is that of the medians of pairs with a value on both sides; p is by Wilcoxon."""
+    """The difference is that of the medians over pairs with a value on both sides. The p-value is
+    Wilcoxon's."""
     sheets = {sheet.name: sheet for sheet in found.sheets}
     lines = [dict(zip(sheets["metrics"].heads, line, strict=True)) for line in sheets["metrics"].lines]
     way = next(line for line in lines if line["metric"] == "way")
@@ -125,14 +125,15 @@ def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
 
 
 def test_classes_of_both_runs_in_a_table(found: Comparison) -> None:
-    """Each pair is counted once, by its class in either run."""
+    """Each pair is counted in one cell of the table, by its class before and its class after."""
     sheet = next(sheet for sheet in found.sheets if sheet.name == "severity")
     assert sheet.heads == ("before / after", "S3", "S2", "S1", "no contact")
     assert sum(sum(line[1:]) for line in sheet.lines) == len(found.pairs)  # type: ignore[arg-type]
 
 
 def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
-    """The second run's scale applies to both, and a remark says that they differ; no class has changed."""
+    """The second run's scale applies to both runs, and a remark says that the scales differ. No class has
+    changed."""
     found = compare(runs[0], runs[2])
     assert found.changed == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
@@ -142,7 +143,7 @@ def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
 
 @pytest.mark.parametrize("order", [(0, 3), (3, 0)])
 def test_a_run_without_severity_changes_nothing(runs: tuple[Path, ...], order: tuple[int, int]) -> None:
-    """If one run has no classes, there is no change of severity, and a gate on it is refused."""
+    """If one run has no classes, no change of severity is reported, and a gate on severity is refused."""
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
     assert "Severity is not compared: without has none." in found.remarks
