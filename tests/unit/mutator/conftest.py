@@ -1,6 +1,4 @@
-"""A small foreign target with its own library, copied so that a test may change it; a fork engine on the toy
-target.
-"""
+"""A small foreign target with its library, copied so that tests may change it, and a fork engine for it."""
 
 import shutil
 from collections.abc import Iterator
@@ -32,7 +30,7 @@ def clone() -> Workspace:
 
 @pytest.fixture
 def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
-    """A fork engine on the toy; files can be edited before it is first used."""
+    """A fork engine on the toy. Files can be edited before the engine is first used."""
     made = Fork(toycar, tmp_path)
     yield made
     made.close()
@@ -40,7 +38,7 @@ def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
 
 @pytest.fixture
 def edit(toycar: Workspace) -> Edit:
-    """Replace text in a file of the toy."""
+    """Replace text in one of the toy's files."""
 
     def replaced(name: str, old: str, new: str) -> None:
         path = toycar.library.parent / name

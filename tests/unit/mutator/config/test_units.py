@@ -12,7 +12,7 @@ CLONE = Path(__file__).parents[4]
 
 
 def test_a_key_gives_up_its_unit() -> None:
-    """The longest suffix that is a unit is the key's unit; otherwise the key stays whole."""
+    """The unit of a key is the longest suffix that is a unit. A key without such a suffix stays whole."""
     assert units.split("offset_m") == ("offset", units.UNITS["m"])
     assert units.split("per_step_kph") == ("per_step", units.UNITS["kph"])
     assert units.split("by_per_m") == ("by", units.UNITS["per_m"])
@@ -43,14 +43,14 @@ def test_a_key_gives_up_its_unit() -> None:
     ],
 )
 def test_conversion(number: float, source: str, target: str, expected: float) -> None:
-    """A quantity is the same in either unit, and exactly preserved in its own."""
+    """A quantity is the same in any unit, and its value in the original unit is preserved exactly."""
     result = units.convert(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)
 
 
 def test_dimensions_do_not_mix() -> None:
-    """Units of different dimensions do not convert."""
+    """Units of different dimensions cannot be converted."""
     with pytest.raises(ValueError, match="m is not a unit of speed"):
         units.convert(1, units.UNITS["m"], units.UNITS["mps"])
     with pytest.raises(ValueError, match="degC is not a unit of temperature in kelvin"):
@@ -66,7 +66,7 @@ def test_every_suffix_ends_a_key() -> None:
 
 
 def test_keys_of_the_library_are_what_they_were() -> None:
-    """Shipped keys of faults and fault models keep their unit, or their lack of one."""
+    """Each key of the shipped faults and fault models has its expected unit, or none."""
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):

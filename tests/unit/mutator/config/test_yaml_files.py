@@ -10,14 +10,14 @@ from mutator.errors import MutatorError
 
 
 class Wheel(yaml_files.StrictModel):
-    """A part of the file."""
+    """A section of the file."""
 
     radius: float
     spokes: int = 5
 
 
 class Car(yaml_files.StrictModel):
-    """A whole file."""
+    """The model of a whole file."""
 
     name: str
     wheels: dict[str, Wheel] = Field(default_factory=dict)
@@ -32,7 +32,7 @@ def read(tmp_path: Path, text: str | bytes) -> Car:
 
 
 def test_a_good_file_is_read(tmp_path: Path) -> None:
-    """Types are kept, and words that YAML 1.1 reads as booleans or times stay words."""
+    """Types are kept. Words that YAML 1.1 reads as booleans or times stay words."""
     car = read(
         tmp_path, "schema: car/2\nname: on\nwheels: {left: {radius: 3}}\ntags: ['1', 1:30, no, 1_0, 0x1]\n"
     )
@@ -101,7 +101,7 @@ def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int,
 
 @pytest.mark.parametrize("text", ["", "- a\n", "word\n"])
 def test_a_file_that_is_no_mapping(tmp_path: Path, text: str) -> None:
-    """An empty file, a list or a word is no mapping of keys."""
+    """An empty file, a list and a single word are refused, because a mapping is expected."""
     with pytest.raises(MutatorError, match="expected a mapping of keys to values"):
         read(tmp_path, text)
 
@@ -121,12 +121,12 @@ def test_a_file_made_to_hurt(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    """A missing file is a user's error, not a traceback."""
+    """A missing file is reported as a user's error, without a traceback."""
     with pytest.raises(MutatorError, match="cannot be read"):
         yaml_files.load(tmp_path / "none.yaml")
 
 
 def test_several_mistakes_are_counted(tmp_path: Path) -> None:
-    """The first mistake is shown, with the number of others."""
+    """The first mistake is shown, with the number of further mistakes."""
     with pytest.raises(MutatorError, match="1 more mistake after this one"):
         read(tmp_path, "schema: car/2\nname: 1\ntags: 2\n")

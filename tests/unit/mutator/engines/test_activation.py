@@ -1,4 +1,4 @@
-"""The step where a mutant leaves its golden run, according to its own probe."""
+"""The step at which a mutant leaves its golden run, as its probe determines it."""
 
 import math
 import random
@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def probe(toycar: Workspace):
-    """The source of the null mutant's probe with a trigger."""
+    """The source of the null mutant's probe, with a trigger."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def make(trigger: Trigger) -> str:
@@ -48,7 +48,7 @@ def start_of(probe: str, seen: Observed) -> Start | None:
     ],
 )
 def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
-    """The step is the first in which the probe is active; None if it never is."""
+    """The result is the first step in which the probe is active, or None if it never is."""
     start = start_of(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:
@@ -73,9 +73,8 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
     ],
 )
 def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: float, hold: Hold) -> None:
-    """For any observations, including standstill and NaN, the step is the first that `observe`
-    calls active.
-    """
+    """For any observations, including standstill and NaN, the result is the first step for which `observe`
+    returns that the probe is active."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):
@@ -95,16 +94,15 @@ def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: f
 
 
 def test_a_probe_may_be_armed_more_exactly(probe) -> None:
-    """The probe's template sets the precision of its arming time."""
+    """The precision of the arming time is taken from the probe's template."""
     code = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
     close, far = (code.replace("\n_TINY = 1e-9\n", f"\n_TINY = {tiny}\n") for tiny in (0.0, 0.002))
     assert [start_of(one, SEEN).step for one in (close, far)] == [4, 3]
 
 
 def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
-    """The trigger-specific part of a probe and the common part, run one after the other, equal the whole
-    probe, on the same lines.
-    """
+    """A probe's common part and its trigger-specific part, run one after the other, do the same as the
+    whole probe, on the same lines."""
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger), "_fi", "exec"), whole)
@@ -120,7 +118,8 @@ def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
 
 
 def test_several_observations_in_a_step(probe) -> None:
-    """A step may observe never or often; a mutant leaves the golden run before the observing step."""
+    """A step may have no observation or several. A mutant leaves the golden run before the step that
+    observes."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [start_of(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
@@ -129,7 +128,7 @@ def test_several_observations_in_a_step(probe) -> None:
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
 def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
-    """A probe set to the state after some observations equals one that made them all."""
+    """A probe that is set to the state after some observations equals one that made all of them."""
     start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
@@ -148,7 +147,7 @@ def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigge
 
 
 def test_probes_of_one_trigger_are_asked_once(probe) -> None:
-    """Mutants that differ only in their ids share the answer; another trigger gets its own."""
+    """Mutants that differ only in their ids share one answer. Another trigger has another answer."""
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
     assert start_of(one, SEEN) is start_of(other, SEEN)

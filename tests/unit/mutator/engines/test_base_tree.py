@@ -1,4 +1,4 @@
-"""The pristine tree: writes through its links are undone."""
+"""The pristine tree, in which writes through links are undone."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_tree_of_its_own(folder: Path, tmp_path: Path) -> None:
-    """A tree without links has the same files, and writes to it reach no other tree."""
+    """A tree without links has the same files, and writes to it do not reach any other tree."""
     base = BaseTree(folder)
     base.lay_out(tmp_path / "tree", linked=False)
     (tmp_path / "tree" / "car" / "go.py").write_bytes(b"stop")
@@ -27,7 +27,7 @@ def test_a_tree_of_its_own(folder: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["car/go.py", "car/__pycache__/go.pyc"])
 def test_what_is_written_through_a_link_is_undone(folder: Path, tmp_path: Path, name: str) -> None:
-    """A changed or locked file is restored; every user of the tree is notified once."""
+    """A changed or locked file is restored. Every user of the tree is notified once."""
     base, other = BaseTree(folder), BaseTree(folder)
     genuine = (folder / name).read_bytes()
     base.lay_out(tmp_path / "tree", linked=True)

@@ -1,4 +1,4 @@
-"""What a mutant changes in a loaded program, and what prevents a swap."""
+"""The functions of a loaded program that a mutant changes, and the reasons against a swap."""
 
 import re
 from collections.abc import Callable
@@ -38,7 +38,7 @@ Changes = Callable[..., CodeSwap]
 
 @pytest.fixture
 def changes() -> Changes:
-    """The code swap for PRISTINE with lines inserted before those that contain a text."""
+    """The code swap for PRISTINE after lines are inserted before those that contain a text."""
 
     def make(*inserted: tuple[str, str], reads_itself: tuple[str, ...] = ()) -> CodeSwap:
         text = "from car import _fi  # fi:probe\n" + PRISTINE
@@ -73,7 +73,7 @@ def test_functions_that_changed_are_found(changes: Changes) -> None:
 
 
 def test_imports_of_injected_lines(changes: Changes) -> None:
-    """Modules that injected lines import can be loaded in advance."""
+    """The modules that injected lines import are known, so that they can be loaded in advance."""
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
     assert changes(("return [value", lines)).imports == ("car.rain",)
 
@@ -91,9 +91,8 @@ def test_imports_of_injected_lines(changes: Changes) -> None:
     ],
 )
 def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
-    """A statement that acts without its trigger, a generator and an inner function are refused with their
-    reasons. Code outside functions needs no swap.
-    """
+    """A statement that acts without its trigger, a generator, and an inner function are refused with
+    reasons. Code outside functions needs no swap."""
     if why is None:
         assert changes((before, lines)).functions == ()
         return
@@ -103,7 +102,7 @@ def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: 
 
 @pytest.mark.parametrize(("kept", "swappable"), [(1, True), (0, False)])
 def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
-    """The whole statement that a guard keeps under `else:` asks the probe like the other branch."""
+    """A guard that keeps the whole statement under `else:` also asks the probe in that branch."""
     guarded = "".join(
         f"        {line}  # fi:abc guard:1\n" for line in ('if _fi.active("abc"):', "    y = x", "else:")
     )
@@ -121,7 +120,7 @@ def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
 
 
 def test_files_that_are_read_by_the_run(changes: Changes) -> None:
-    """A mutant of a file that the run digests must be on the disk."""
+    """A mutant of a file that the run digests must be written to the disk."""
     with pytest.raises(NotSwappable, match="read by the run itself"):
         changes(reads_itself=("car/*.py",))
 

@@ -1,4 +1,4 @@
-"""The fork engine's server processes: their number, their starting points, and what a kill leaves."""
+"""The fork engine's server processes: their number, their starting points, and what is left after a kill."""
 
 import os
 import signal
@@ -20,7 +20,7 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def gone(pid: int) -> bool:
-    """Whether the process is gone within some seconds."""
+    """Whether the process ends within a few seconds."""
     deadline = time.monotonic() + 20.0
     while time.monotonic() < deadline:
         try:
@@ -34,9 +34,8 @@ def gone(pid: int) -> bool:
 
 
 def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
-    """Every forking process has one OS thread; after the engine is closed, no process or scratch file is
-    left.
-    """
+    """Every process that forks has one OS thread. After the engine is closed, no process and no scratch
+    file is left."""
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
@@ -50,7 +49,7 @@ def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
 
 
 def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
-    """The golden run simulates the steps before the activation, and few processes wait."""
+    """The golden run simulates the steps before the activation, and only a few processes wait."""
     starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
@@ -59,7 +58,7 @@ def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
 
 
 def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
-    """Libraries that a run imports late are found and loaded in each waiting process."""
+    """Libraries that a run imports late are found, and every waiting process loads them."""
     fork.run(fork.job(at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)
@@ -69,23 +68,24 @@ def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
 
 
 def test_a_never_active_fault_is_not_run(fork: Fork) -> None:
-    """An experiment with a trigger that never holds gets golden's files without a run."""
+    """An experiment whose trigger never holds gets golden's files without a run."""
     execution = fork.run(fork.job(at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
 def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
-    """A killed server or waiting process is a harness error; the next job gets new ones."""
+    """If the server or a waiting process is killed, the run is a harness error, and the next job gets new
+    processes."""
     job = fork.job(at_time(2.0))
-    for place in (0, -1):  # the first process, and a waiting one
+    for place in (0, -1):  # the first process, then a waiting one
         assert fork.run(job).status is Status.OK
         victims = fork.processes()
         os.kill(victims[place], signal.SIGKILL)
         assert gone(victims[place])
         time.sleep(0.1)
         execution = fork.run(job)
-        if execution.status is Status.OK:  # otherwise a waiting process had been unharmed
+        if execution.status is Status.OK:  # a waiting process was not affected
             assert place == 0
             execution = fork.run(fork.job(Trigger(name="x", condition="t >= 0.01")))
         assert execution.status is Status.HARNESS_ERROR
@@ -95,7 +95,7 @@ def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
-    """All waiting processes, and their guard, end when the first process is killed."""
+    """If the first process is killed, all waiting processes and their guard end."""
     fork.run(fork.job(at_time(2.0)))
     guard, first, *waiting = fork.processes()
     assert guard == fork.pool._process.pid
@@ -131,7 +131,7 @@ time.sleep(60)
 
 @pytest.mark.slow
 def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> None:
-    """Killing the engine's process ends the server and all waiting processes."""
+    """If the engine's process is killed, the server and all waiting processes end."""
     arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parents[1]]
     engine = subprocess.Popen(
         [sys.executable, "-c", ENGINE, *map(str, arguments)], stdout=subprocess.PIPE, text=True
@@ -149,7 +149,7 @@ def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> N
 
 @pytest.mark.slow
 def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
-    """A child's CPU time limit counts from its fork, without the time of earlier processes."""
+    """The limit for a child's CPU time counts from its fork and excludes the time of earlier processes."""
     edit(
         "tree/toycar/world.py",
         "        now = self.frame",

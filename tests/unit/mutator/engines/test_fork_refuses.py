@@ -1,4 +1,4 @@
-"""What the fork engine leaves to the reference engine, and its reasons."""
+"""The targets and runs that the fork engine leaves to the reference engine, with its reasons."""
 
 from dataclasses import replace
 
@@ -12,7 +12,8 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A target that starts a thread when it is loaded runs on the reference engine, with the reason."""
+    """A target that starts a thread when it is loaded runs on the reference engine, and the reason is
+    stored."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -28,7 +29,7 @@ def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
 
 
 def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
-    """The allocator thread of pyarrow, which pandas imports, is switched off."""
+    """The thread of pyarrow's allocator, which pandas would start, is switched off."""
     pytest.importorskip("pyarrow")
     fork.limits = replace(LIMITS, memory_mb=4096)
     edit("tree/toycar/go.py", "class Drive:", "import pandas\nimport pyarrow\n\n\nclass Drive:")
@@ -37,7 +38,8 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
 
 
 def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
-    """A target that cannot be imported outside its command runs on the reference engine, with the reason."""
+    """A target that cannot be imported outside its command runs on the reference engine, and the reason is
+    stored."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -49,7 +51,7 @@ def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
 
 
 def test_the_reason_is_printable(fork: Fork, edit: Edit) -> None:
-    """The reason for the reference engine is stored as printable text, whatever the target raised."""
+    """The reason for using the reference engine is stored as printable text, whatever the target raised."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -65,7 +67,8 @@ def test_the_reason_is_printable(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> None:
-    """If a stepwise golden run differs from the command's, the fork engine is not used for it."""
+    """If a stepwise golden run differs from the command's golden run, the reference engine runs the
+    experiments."""
     edit(
         "tree/toycar/go.py",
         "    drive = begin(arguments)\n",
@@ -78,7 +81,8 @@ def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> No
 
 @pytest.mark.slow
 def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
-    """A run that leaves a thread would not have ended on its own: the reference engine reports that."""
+    """A run that leaves a thread would not have ended by itself. The reference engine runs it again and
+    reports that."""
     fork.limits = replace(LIMITS, wall_s=3)
     edit(
         "tree/toycar/sensing.py",
@@ -93,7 +97,8 @@ def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
-    """A run that writes into its tree does not affect the next one, and the reference engine judges it."""
+    """A run that writes into its tree does not affect the next run. The reference engine decides its
+    result."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -106,7 +111,8 @@ def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
 
 
 def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
-    """A fault in a function that is suspended between steps runs on the reference engine, with the reason."""
+    """A fault in a function that is suspended between steps runs on the reference engine, and the reason
+    is stored."""
     edit(
         "tree/toycar/sensing.py",
         "    def publish(self",
@@ -119,7 +125,8 @@ def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_golden_run_that_does_not_end_well(fork: Fork, edit: Edit) -> None:
-    """If the stepwise golden run fails, the reference engine takes over, with the reason."""
+    """If the stepwise golden run fails, the reference engine runs the experiment, and the reason is
+    stored."""
     edit(
         "tree/toycar/go.py",
         "    return Drive(case)",
@@ -142,9 +149,8 @@ EARLY = """
 
 
 def test_a_target_that_observes_before_its_first_step(fork: Fork, edit: Edit) -> None:
-    """No fork can see observations made while a run begins, so the reference engine runs, whether the fault
-    is active then or later, with the reason.
-    """
+    """A fork cannot see observations made before the first step. The reference engine runs such
+    experiments, whether the fault is active then or later, and the reason is stored."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):

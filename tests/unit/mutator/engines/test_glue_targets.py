@@ -1,4 +1,4 @@
-"""Targets with an entry built with the glue, which the harness provides, in both engines."""
+"""Targets with an entry that uses the harness's glue, in both engines."""
 
 from pathlib import Path
 
@@ -45,7 +45,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def glued(fork: Fork, edit: Edit) -> Fork:
-    """The toy with an entry built with the glue."""
+    """The toy with an entry that uses the glue."""
     (fork.toy.library.parent / "tree" / "toycar" / "go.py").write_text(ENTRY)
     edit(
         MANIFEST,
@@ -59,7 +59,7 @@ def glued(fork: Fork, edit: Edit) -> Fork:
 
 
 def test_both_engines_drive_the_same(glued: Fork) -> None:
-    """A run that an engine steps, forks and writes has the bytes of one in a fresh interpreter."""
+    """A run that an engine steps, forks and writes has the same bytes as one in a fresh interpreter."""
     job = glued.job(at_time(2.0))
     forked = glued.engine.execute(job, glued.folder / "work" / "forked")
     plain = glued.engine.reference.execute(job, glued.folder / "plain")
@@ -71,9 +71,8 @@ def test_both_engines_drive_the_same(glued: Fork) -> None:
 
 
 def test_the_glue_is_that_of_the_harness(glued: Fork) -> None:
-    """A run imports the glue from the harness that runs it, whichever mutator is installed, and its report
-    does not list it as a package of the target.
-    """
+    """A run imports the glue of the harness that runs it, whichever mutator is installed. Its report does
+    not list the glue as a package of the target."""
     plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules
@@ -81,6 +80,6 @@ def test_the_glue_is_that_of_the_harness(glued: Fork) -> None:
 
 
 def test_nothing_else_is_found_there() -> None:
-    """The path provides the harness only, not its neighbours."""
+    """The path gives access to the harness only, not to the packages next to it."""
     assert Harness.find_spec("tests") is None
     assert Harness.find_spec("mutator.glue") is None

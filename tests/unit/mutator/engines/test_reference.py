@@ -1,4 +1,4 @@
-"""The reference engine: isolation, limits, and the status of each way to end."""
+"""The reference engine: isolation, limits, and the status for each way in which a run ends."""
 
 import json
 import os
@@ -34,7 +34,7 @@ def manifest(toycar: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
-    """Run scenario A on a tree with changed files and the given `limits`."""
+    """Run scenario A on a tree with changed files and the given limits."""
     work = tmp_path / "work"
     work.mkdir()
     base = prepare_base(manifest, tmp_path / "base")
@@ -50,14 +50,14 @@ def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
 
 
 def entry(body: str) -> dict[str, str]:
-    """The target with another entry module."""
+    """The target with a different entry module."""
     return {"toycar/go.py": body}
 
 
 def test_a_mutant_of_what_runs_read_shares_nothing(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Only a mutant of a file in `reads_itself` gets the arguments of an independent run."""
+    """Only a mutant of a file in `reads_itself` gets the arguments for independent runs."""
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
@@ -70,7 +70,7 @@ def test_a_mutant_of_what_runs_read_shares_nothing(
 
 
 def test_a_good_run_leaves_its_files(run: Run) -> None:
-    """A run that ends well has trace and record in its output folder, and its CPU time is recorded."""
+    """A run that ends well has its trace and record in the output folder, and its CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
@@ -101,46 +101,46 @@ def test_a_good_run_leaves_its_files(run: Run) -> None:
     ],
 )
 def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
-    """Each way to end badly has its status and a reproducible message."""
+    """Each way of failing has a status and a reproducible message."""
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (status, detail)
 
 
 def test_a_target_that_does_not_parse_crashes(run: Run) -> None:
-    """A syntax error in executed code is the tree's failure, reported with its place."""
+    """A syntax error in executed code is a failure of the tree and is reported with its position."""
     execution = run(entry("if :"))
     assert execution.status is Status.CRASHED
     assert "go.py" in execution.detail
 
 
 def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
-    """An endless loop is a timeout after its CPU time."""
+    """An endless loop times out after its CPU time."""
     execution = run(entry("while True: pass"), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_who_ignores_the_cpu_limit_is_killed(run: Run) -> None:
-    """A run that ignores the signal of the CPU limit is killed."""
+    """A run that ignores the signal for the CPU limit is killed."""
     body = "import signal; signal.signal(signal.SIGXCPU, signal.SIG_IGN)\nwhile True: pass"
     execution = run(entry(body), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_sleeping_hits_the_wall_limit(run: Run) -> None:
-    """A run that waits for ever is a timeout after its wall time."""
+    """A run that waits for ever times out after its wall time."""
     execution = run(entry("import time; time.sleep(100)"), replace(LIMITS, wall_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
 
 
 def test_who_does_not_end_after_its_work_is_a_timeout(run: Run) -> None:
-    """A run that finishes its work but never ends because of a thread is a timeout."""
+    """A run that finishes its work but is kept alive by a thread times out."""
     body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
     execution = run(entry(body), replace(LIMITS, wall_s=2))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
 def test_steps_are_limited(run: Run) -> None:
-    """Exceeding the allowed observed steps is a timeout, the same on every machine."""
+    """More observed steps than allowed are a timeout, at the same step on every machine."""
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
         "def limit(n): global most; most = n\n"
@@ -159,7 +159,7 @@ def test_steps_are_limited(run: Run) -> None:
 
 
 def test_a_huge_file_is_refused(run: Run) -> None:
-    """A run cannot fill the disk with one file."""
+    """A run cannot fill the disk with one large file."""
     body = "f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()"
     execution = run(entry(body))
     assert execution.status is Status.CRASHED
@@ -167,7 +167,7 @@ def test_a_huge_file_is_refused(run: Run) -> None:
 
 
 def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManifest) -> None:
-    """A run that finds the package outside its own tree is a harness error."""
+    """A run that imports the package from outside its own tree is a harness error."""
     body = (
         f"import sys; sys.path.insert(0, {str(manifest.root)!r})\n"
         "for name in [n for n in sys.modules if n.startswith('toycar')]: del sys.modules[name]\n"
@@ -179,7 +179,7 @@ def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManif
 
 
 def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
-    """A run with files other than the job's is a harness error."""
+    """A run on files other than the job's is a harness error."""
     body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -188,7 +188,7 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
 
 
 def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp_path: Path) -> None:
-    """Writing to bytecode in its own tree does not affect later runs."""
+    """Bytecode that a run writes into its own tree does not affect later runs."""
     body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
     assert run(entry(body)).status is Status.OK
     (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
@@ -197,9 +197,8 @@ def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp
 
 
 def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
-    """If a run removes its log or report, or replaces it with a folder or pipe, it counts as missing; the
-    engine does not wait for it.
-    """
+    """A log or report that a run removes, or replaces with a folder or a pipe, counts as missing. The
+    engine does not wait for it."""
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
@@ -220,7 +219,7 @@ def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
     ],
 )
 def test_half_a_report_is_none(run: Run, more: dict[str, object]) -> None:
-    """A file in place of the report counts only if it is a valid report."""
+    """A file in place of the report is accepted only if it is a valid report."""
     report = {"ended": "ok", "error": None, "disk_full": False, "outside": [], "probe": None, **more}
     body = f"import json, os\nopen('../report.json', 'w').write(json.dumps({report!r}))\nos._exit(0)"
     execution = run(entry(body))
@@ -239,7 +238,7 @@ def test_names_that_are_no_text(run: Run) -> None:
 
 
 def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
-    """A run receives signals that its parent ignored, as background programs do."""
+    """A run receives signals even if its parent ignored them, as background programs do."""
     body = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
@@ -252,7 +251,7 @@ def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
 
 
 def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
-    """A source file from outside the job's tree is a harness error; a data cache is not."""
+    """A source file from outside the job's tree is a harness error; a data cache outside is allowed."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -261,7 +260,7 @@ def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
 
 
 def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
-    """A changed file with the original's size and time runs as changed."""
+    """A changed file runs as changed, even if its size and time equal the original's."""
     pristine = manifest.tree.files["toycar/world.py"].decode()
     changed = pristine.replace("STEP = 0.05", "STEP = 0.06")
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
@@ -273,9 +272,8 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
 
 
 def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PYTHONPATH and similar variables do not reach a run; the job sets the hash seed; there is one
-    thread.
-    """
+    """PYTHONPATH and similar variables do not reach a run. The job sets the hash seed, and there is one
+    thread."""
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("MUTATOR_SECRET", "x")
     body = (
@@ -287,12 +285,12 @@ def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPa
 
 
 def test_what_a_run_printed_is_kept(run: Run) -> None:
-    """The end of a run's output is available to the user."""
+    """The last lines of a run's output are available to the user."""
     assert "hello" in run(entry("print('hello')")).log
 
 
 def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
-    """Background processes of a run are killed when the run is over."""
+    """Background processes of a run are killed when the run ends."""
     note = tmp_path / "pid"
     body = (
         "import subprocess, pathlib\n"
@@ -303,7 +301,7 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
 
 
 def ended(pid: int) -> bool:
-    """Whether the process is gone, or only waits to be reaped, within some seconds."""
+    """Whether the process ends within a few seconds; a process that only waits to be reaped has ended."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:
@@ -333,7 +331,7 @@ engine.execute(job, folder / "work" / "x")
 
 
 def test_a_run_dies_with_its_engine(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
-    """Killing the engine's process kills the run."""
+    """If the engine's process is killed, the run is killed, too."""
     note = tmp_path / "pid"
     (tmp_path / "work").mkdir()
     prepare_base(manifest, tmp_path / "base")
@@ -356,7 +354,7 @@ def ended_now(pid: int) -> bool:
 
 
 def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that fails for lack of space raises DiskFull instead of counting as a crash."""
+    """A run that fails for lack of disk space raises DiskFull and does not count as a crash."""
     with pytest.raises(DiskFull):
         run(entry("import errno; raise OSError(errno.ENOSPC, 'No space left on device')"))
     real = os.statvfs
@@ -389,7 +387,7 @@ def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManif
 def test_engines_run_side_by_side(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Two threads may use one engine at once, each in a separate folder."""
+    """Two threads may use one engine at the same time, each in a separate folder."""
     work = tmp_path / "side"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -408,17 +406,15 @@ def test_engines_run_side_by_side(
 
 
 def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
-    """The report lists imported packages, except its own, the standard library's, and what Python itself had
-    loaded.
-    """
+    """The report lists imported packages. It excludes the target's own, the standard library, and those
+    that Python loaded before."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
 def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
-    """The report lists packages with used shared libraries even without an import, since their versions
-    affect results.
-    """
+    """The report lists packages whose shared libraries are used, even without an import, because their
+    versions affect results."""
     code = (
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
@@ -430,9 +426,8 @@ def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
 def test_a_limit_of_this_process_that_is_lower(
     manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
 ) -> None:
-    """An engine is refused if this process's own limits are lower than a run's: runs would end differently
-    here.
-    """
+    """An engine is refused if this process's limits are lower than a run's, because runs would end
+    differently."""
     number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
 

@@ -1,4 +1,4 @@
-"""The list of engines, and which one a campaign gets."""
+"""The list of engines, and how a campaign's engine is chosen."""
 
 from pkgutil import resolve_name
 
@@ -11,14 +11,15 @@ from mutator.workspace import Workspace
 
 
 def test_each_engine_can_be_made() -> None:
-    """Every engine in the list has a working factory, and is listed under its own name."""
+    """Every engine in the list has a working factory and is listed under its own name."""
     for name, kind in ENGINES.items():
         assert kind.name == name and kind.about
         assert callable(resolve_name(kind.factory))
 
 
 def test_the_default_is_the_fastest_that_pays(toycar: Workspace) -> None:
-    """A small campaign runs on the reference engine, a large one is forked; an unknown name is refused."""
+    """A small campaign uses the reference engine and a large one the fork engine. An unknown name is
+    refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 3) == REFERENCE
     assert choose_engine(None, manifest, 1000) == FORK

@@ -1,4 +1,4 @@
-"""Targets of several packages and flat modules: the probe is a separate module, with either engine."""
+"""Targets with several packages and flat modules, in either engine: the probe is a separate module."""
 
 import shutil
 from pathlib import Path
@@ -16,7 +16,7 @@ MANIFEST = "fault_library/targets/toycar.yaml"
 
 @pytest.fixture
 def several(fork: Fork, edit: Edit) -> Fork:
-    """The toy with a sensor that uses a module outside any package."""
+    """The toy with a sensor that uses a module outside all packages."""
     tree = fork.toy.library.parent / "tree"
     (tree / "margin.py").write_text("def wider(gap):\n    gap = gap + 0.0\n    return gap\n")
     edit("tree/toycar/sensing.py", 'world."""\n', 'world."""\n\nimport margin\n')
@@ -27,7 +27,7 @@ def several(fork: Fork, edit: Edit) -> Fork:
 
 
 def test_both_engines_drive_the_same(several: Fork) -> None:
-    """A mutant that imports the probe by its bare name gives the same bytes with either engine."""
+    """A mutant that imports the probe by its bare name produces the same bytes with either engine."""
     job = several.job(at_time(2.0))
     assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
     assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]
@@ -42,7 +42,7 @@ def test_both_engines_drive_the_same(several: Fork) -> None:
 
 
 def test_a_flat_module_from_elsewhere_is_noticed(several: Fork, tmp_path: Path) -> None:
-    """A run that imports a target module from another folder is a harness error."""
+    """A run that imports a module of the target from another folder is a harness error."""
     _ = several.engine
     (tmp_path / "other").mkdir()
     shutil.copy(several.manifest.root / "margin.py", tmp_path / "other")

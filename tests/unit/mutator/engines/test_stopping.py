@@ -1,4 +1,4 @@
-"""Runs that end at their first terminal hazard."""
+"""Runs that stop at their first terminal hazard."""
 
 import math
 import re
@@ -46,7 +46,7 @@ RECORDED = """
 
 @pytest.fixture
 def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
-    """The toy with hazards as data; its runs report their last recorded values."""
+    """The toy with hazards defined as conditions. Its runs report their last recorded values."""
     edit(MANIFEST, "hazards: [H1, H3, TOO_FAST]\n", HAZARDS)
     edit(MANIFEST, "observation:", CHANNELS)
     edit(MANIFEST, "  derived:\n", DERIVED)
@@ -55,7 +55,7 @@ def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
 
 
 def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Record:
-    """The record of the toy's fault, which makes the car come too near."""
+    """The record of the toy's fault, which brings the car too close."""
     manifest = fork.manifest
     experiment = Experiment(
         fault=fork.fault(),
@@ -76,7 +76,7 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
 
 
 def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> None:
-    """Every engine stops at the same step, and the result equals that of the whole run up to then."""
+    """Every engine stops at the same step. The result equals that of the complete run, cut at that step."""
     fork = stopping.engine
     null = build(stopping.manifest, stopping.models, None, always()).files
     work = stopping.folder / "warm"
@@ -102,7 +102,7 @@ def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> 
 def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
     stopping: Fork, edit: Edit, terminal: str, at: float
 ) -> None:
-    """Golden has a terminal hazard before the fault, so nothing is forked after that end."""
+    """Golden has a terminal hazard before the fault, so no run is forked after it."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP, at) for one in (stopping.engine.reference, stopping.engine)
@@ -117,9 +117,8 @@ def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
 def test_a_drive_that_ends_after_the_fault_where_golden_ends(
     stopping: Fork, edit: Edit, terminal: str, outcome: Outcome
 ) -> None:
-    """The fork engine runs it and gives the reference engine's record: the fault acted before, or ended the
-    drive itself.
-    """
+    """The fork engine returns the reference engine's record, because the fault acted before that end or
+    caused it."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP) for one in (stopping.engine.reference, stopping.engine)
@@ -151,14 +150,15 @@ def test_a_drive_that_ends_after_the_fault_where_golden_ends(
 def test_what_cannot_be_told_of_one_step_is_refused(
     stopping: Fork, edit: Edit, old: str, new: str, message: str
 ) -> None:
-    """The end of a drive must follow from the numbers of a single step; an error names what does not."""
+    """A hazard that stops runs must be computable from the values of a single step. The error names what
+    is not."""
     edit(MANIFEST, old, new)
     with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
         stop_source(stopping.toy.manifest("toycar"))
 
 
 def test_a_target_without_a_terminal_hazard_cannot_stop(stopping: Fork, edit: Edit) -> None:
-    """A target without a terminal hazard has nothing to stop at and is refused."""
+    """A target without a terminal hazard is refused, because its runs would never stop."""
     edit(MANIFEST, ", terminal: true", "")
     edit(MANIFEST, ", terminal: speed > 90", "")
     with pytest.raises(MutatorError, match="no terminal hazard"):
@@ -176,14 +176,14 @@ def test_a_target_without_a_terminal_hazard_cannot_stop(stopping: Fork, edit: Ed
     ],
 )
 def test_when_a_drive_is_over(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    """Any terminal condition ends a drive, over the trace's channels and values derived from them."""
+    """Any terminal condition over the trace's channels, and over values derived from them, ends a drive."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_a_drive_is_over_where_its_trace_says_so(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """A run ends by the same rule that judges its trace, even if a value is NaN."""
+    """A run stops by the rule that also judges its trace, even if a value is NaN."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))
@@ -197,7 +197,8 @@ def test_a_drive_is_over_where_its_trace_says_so(stopping: Fork, edit: Edit, ter
 
 
 def test_a_run_that_does_not_tell_what_it_recorded_is_no_crash(stopping: Fork, edit: Edit) -> None:
-    """Missing recorded values are an error of the glue before anything is active, so no fault is blamed."""
+    """Recorded values that are missing before anything is active are an error of the glue, and no fault is
+    blamed."""
     edit("tree/toycar/go.py", "def recorded(", "def something_else(")
     record = drive(stopping, stopping.engine.reference, AfterHazard.STOP)
     assert record.status is Status.HARNESS_ERROR
@@ -205,7 +206,8 @@ def test_a_run_that_does_not_tell_what_it_recorded_is_no_crash(stopping: Fork, e
 
 
 def test_a_campaign_says_so(stopping: Fork, edit: Edit) -> None:
-    """`after_hazard: stop` reaches every experiment and its id; a target that cannot stop is not planned."""
+    """`after_hazard: stop` applies to every experiment and changes its id. A target that cannot stop is
+    not planned."""
     edit("fault_library/campaigns/small.yaml", "chunk: 2", "chunk: 2\nafter_hazard: stop")
     stopped = make_plan(stopping.toy, "small")
     assert {e.after_hazard for e in (*stopped.experiments, stopped.canary)} == {AfterHazard.STOP}
@@ -223,7 +225,7 @@ def test_a_campaign_says_so(stopping: Fork, edit: Edit) -> None:
 
 
 def test_a_trace_up_to_a_time() -> None:
-    """Every channel ends at that time, by its own times if it has some."""
+    """Every channel is cut at the given time. A channel with its own times is cut by these."""
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
     cut = until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {

@@ -1,6 +1,5 @@
-"""What a watched run records about a tree, in a separate process, because the watcher replaces what it
-watches.
-"""
+"""What watching a run records about its tree. It runs in a separate process, because the watcher replaces
+the functions that it watches."""
 
 import json
 import subprocess
@@ -74,7 +73,7 @@ print(json.dumps(watcher.found()["noted"]))
 
 @pytest.fixture(scope="module")
 def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, str]]]:
-    """The findings for each line of a controller."""
+    """What the watcher finds for each line of a controller."""
     folder = tmp_path_factory.mktemp("tree")
     lines = [*NOTED, *SOUND]
     body = "".join(f"    {line}\n" for line in lines)
@@ -98,12 +97,13 @@ def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, l
 
 @pytest.mark.parametrize("line", SOUND)
 def test_what_is_the_same_in_each_run_is_not(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """Seeded draws and given times are not reported."""
+    """Seeded random draws and times that the run is given are not reported."""
     assert noted[line] == []
 
 
 def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
-    """A clock that a package reads is recorded at the target's line, together with the package's."""
+    """A clock that a package reads is recorded at the target's line that calls the package, with the
+    package's line."""
     package, tree = tmp_path / "site-packages" / "pid", tmp_path / "tree"
     for folder in (package, tree):
         folder.mkdir(parents=True)
@@ -125,7 +125,8 @@ def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
 
 
 def test_compiled_code_has_its_classes(tmp_path: Path) -> None:
-    """pandas, which breaks with a replaced `datetime`, imports normally; the tree's own dates are watched."""
+    """pandas cannot work with a replaced `datetime`, and imports normally. Dates that the tree reads are
+    recorded."""
     (tmp_path / "controller.py").write_text(
         "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
         "    datetime.date.today()\n"

@@ -1,4 +1,4 @@
-"""From executions to records: what is accepted, and what is a harness error."""
+"""How executions become records: what is accepted, and what is a harness error."""
 
 import json
 from collections.abc import Callable, Iterable, Iterator
@@ -19,7 +19,7 @@ Outputs = dict[str, Any]
 
 
 class PlayedEngine:
-    """An engine that runs nothing: every job leaves the given outputs."""
+    """An engine that runs nothing and leaves the given outputs for every job."""
 
     def __init__(self, out: Path, status: Status, outputs: Outputs) -> None:
         self.out = out
@@ -55,7 +55,7 @@ def write(out: Path, **channels: np.ndarray) -> None:
 
 @pytest.fixture
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
-    """The record of an experiment with the given outputs."""
+    """The record of an experiment that leaves the given outputs."""
     manifest = toycar.manifest("toycar")
     experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     (tmp_path / "golden").mkdir()
@@ -77,7 +77,7 @@ def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
 
 
 def stepped(row: int, height: float = 1.0) -> np.ndarray:
-    """Zeros, and `height` from a row on."""
+    """An array of zeros, with `height` from the given row on."""
     return np.where(np.arange(20) >= row, height, 0.0)
 
 
@@ -86,7 +86,8 @@ NEVER = {"a": {"first": None, "last": None, "count": 0}}
 
 
 def test_masked(judged: Callable[..., Record]) -> None:
-    """A run activated without any difference is masked, with the activation of all injections together."""
+    """A run that is activated and does not differ from golden is masked. Its activation covers all
+    injections."""
     record = judged(ran=RAN)
     assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
     assert record.activation == Activation(first=0.2, last=0.5, count=5)
@@ -94,7 +95,7 @@ def test_masked(judged: Callable[..., Record]) -> None:
 
 
 def test_sdc_from_the_moment_of_activation(judged: Callable[..., Record]) -> None:
-    """A difference in the step of the activation is caused by the fault."""
+    """A difference in the step of the activation is attributed to the fault."""
     record = judged(ran=RAN, trace={"brake": stepped(4, 0.5)})
     assert (record.outcome, record.t_manifest) == (Outcome.SDC, T[4])
     assert dict(record.max_dev)["brake"] == 0.5
@@ -119,7 +120,7 @@ def test_never_active(judged: Callable[..., Record]) -> None:
 
 @pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
 def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], ran: dict, told: str) -> None:
-    """A difference before the activation, or without one, is a harness error."""
+    """A difference before the activation, or without an activation, is a harness error."""
     record = judged(ran=ran, trace={"gas": stepped(3)})
     assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
     assert told in record.detail
@@ -127,9 +128,8 @@ def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], r
 
 @pytest.mark.parametrize("outputs", [{"trace": {}}, {"said": []}, {"trace": {"gas": np.zeros(3)}}])
 def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs) -> None:
-    """A run without a usable trace and record crashed if its fault was active; otherwise it is a harness
-    error.
-    """
+    """A run without a usable trace and record has crashed if its fault was active. Otherwise it is a
+    harness error."""
     record = judged(ran=RAN, **outputs)
     assert (record.status, record.outcome) == (Status.CRASHED, None)
     assert record.activation is not None
@@ -142,14 +142,16 @@ def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs)
     ("status", "kept"), [(Status.CRASHED, True), (Status.TIMEOUT, False), (Status.HARNESS_ERROR, False)]
 )
 def test_other_statuses(judged: Callable[..., Record], status: Status, kept: bool) -> None:
-    """A crash keeps its activation; a timeout does not, since its count depends on the machine's speed."""
+    """The record of a crash keeps the activation. That of a timeout does not, because its count depends on
+    the machine's speed."""
     record = judged(status, ran=RAN)
     assert (record.status, record.outcome, record.detail) == (status, None, "why")
     assert (record.activation is not None) == kept
 
 
 def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
-    """A mutant that does not compile is invalid, a missing anchor is a harness error; the others run."""
+    """A mutant that does not compile is invalid, and a missing anchor is a harness error. The other
+    experiments run."""
     manifest = toycar.manifest("toycar")
     experiments: tuple[Experiment, ...] = make_plan(toycar, "hostile").experiments
     engine = PlayedEngine(tmp_path / "faulty", Status.CRASHED, {"ran": RAN})

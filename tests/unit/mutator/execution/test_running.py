@@ -1,4 +1,4 @@
-"""Campaigns with a custom distributor of the work."""
+"""Campaigns that use a custom distributor of work."""
 
 from pathlib import Path
 
@@ -11,7 +11,7 @@ from mutator.workspace import Workspace
 
 
 class InOrder:
-    """A distributor that runs every piece in this process, without pytest."""
+    """A distributor that runs every piece in this process."""
 
     def run(self, session: Session) -> None:
         name = session.worker_name("mine")
@@ -26,7 +26,7 @@ class InOrder:
 
 
 class Idle:
-    """A distributor that gives up at once."""
+    """A distributor that gives up immediately."""
 
     def run(self, session: Session) -> None:
         session.problem = "no machine answered"
@@ -34,7 +34,8 @@ class Idle:
 
 @pytest.mark.usefixtures("kept_checks")
 def test_another_distributor_gives_the_same_results(toycar: Workspace, tmp_path: Path) -> None:
-    """The distributor changes no byte of the results, and resuming works across distributors."""
+    """Another distributor gives the same bytes of results and can resume a run that a different
+    distributor began."""
     assert run_campaign(toycar, "small", tmp_path / "local").exit_code == 0
     summary = run_campaign(toycar, "small", tmp_path / "idle", distributor=Idle())
     assert (summary.exit_code, summary.done, summary.problem) == (3, 0, "no machine answered")

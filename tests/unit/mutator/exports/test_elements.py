@@ -1,4 +1,4 @@
-"""Runs as mutation testing reports: the schema's structure, and the meaning of statuses."""
+"""Runs as mutation testing reports: the structure that the schema requires, and the meaning of statuses."""
 
 import json
 import re
@@ -36,7 +36,7 @@ IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
 def report(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> dict[str, Any]:
-    """The report of a toy run with hazardous lane faults."""
+    """The report of a toy run in which lane faults are hazardous."""
     tmp_path = tmp_path_factory.mktemp("report")
     toycar = copy_toycar(tmp_path)
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD if e.fault.fault_type == "lane" else {})
@@ -49,7 +49,7 @@ def report(
 
 
 def mutants(report: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each mutant with the source of its file."""
+    """Yield each mutant with the source of its file."""
     for file in report["files"].values():
         yield from ((file["source"], mutant) for mutant in file["mutants"])
 
@@ -75,7 +75,7 @@ def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
 
 
 def test_tests_are_drives(report: dict[str, Any]) -> None:
-    """Every drive that a mutant names is a test of its scenario, listed once."""
+    """Every drive that a mutant names is listed once, as a test of its scenario."""
     tests = [test["id"] for file in report["testFiles"].values() for test in file["tests"]]
     assert len(tests) == len(set(tests))
     named = {test for _, m in mutants(report) for test in (*m["coveredBy"], *m["killedBy"])}
@@ -84,7 +84,8 @@ def test_tests_are_drives(report: dict[str, Any]) -> None:
 
 
 def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
-    """Source and location give the statement; the replacement has it together with the injected lines."""
+    """The location in the source is that of the statement. The replacement is the statement with the
+    injected lines."""
     for source, mutant in mutants(report):
         start, end = mutant["location"]["start"], mutant["location"]["end"]
         lines = source.splitlines()[start["line"] - 1 : end["line"]]
@@ -99,9 +100,8 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
 def test_a_mutant_of_an_operator_replaces_its_expression(
     toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
 ) -> None:
-    """It has the operator's name, the exact columns of the expression, and the replacement; a deleted
-    statement becomes `pass`.
-    """
+    """An operator's mutant has the operator's name, the exact columns of the expression, and the
+    replacement. A deleted statement is replaced by `pass`."""
 
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
@@ -120,8 +120,8 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD, changed=changed)
     made = json.loads(export(run, Format.MUTATION_ELEMENTS, workspace=toycar).read_text())
     *changes, (_, minus), (source, omission) = mutants(made)
-    assert minus["replacement"] == "(1.5 - speed)"  # after `gap - 5.0 -`
-    assert len(changes) == 9  # binary operations in the file
+    assert minus["replacement"] == "(1.5 - speed)"  # the column after `gap - 5.0 -`
+    assert len(changes) == 9  # the binary operations in the file
     found = set()
     for source, mutant in changes:
         start, end = mutant["location"]["start"], mutant["location"]["end"]
@@ -139,7 +139,7 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
 
 
 def test_killed_means_hazard(report: dict[str, Any]) -> None:
-    """A drive in which a fault led to a hazard kills it; the other faults survive."""
+    """A mutant is killed if its fault led to a hazard in a drive. The other mutants survive."""
     for _, mutant in mutants(report):
         lane = mutant["description"].startswith("sensor/lane/")
         assert mutant["status"] == ("Killed" if lane else "Survived")
@@ -147,7 +147,7 @@ def test_killed_means_hazard(report: dict[str, Any]) -> None:
 
 
 def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Sources that differ from the run's are refused."""
+    """Sources that differ from those of the run are refused."""
     run = write_run(toycar, tmp_path / "run")
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -176,7 +176,7 @@ def test_status(
     experiment: Callable[..., Experiment],
     record: Callable[..., Record],
 ) -> None:
-    """The status of a fault follows from its drives' outcomes, hazards first."""
+    """The status of a fault follows from the outcomes of its drives. Hazards take precedence."""
     drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None

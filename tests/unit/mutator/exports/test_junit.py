@@ -1,4 +1,4 @@
-"""Runs as JUnit XML."""
+"""Runs exported as JUnit XML."""
 
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
@@ -25,7 +25,8 @@ BECAME: dict[str, dict[str, Any] | None] = {
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Lane: hazards. Silence: harness errors. Distance: masked, not active, not run."""
+    """The result of an experiment: lane faults are hazards, silence is a harness error, distance is
+    masked, not activated or not run."""
     if e.fault.fault_type in BECAME:
         return BECAME[e.fault.fault_type]
     if e.method.value == "random":
@@ -44,7 +45,7 @@ def run(
 
 
 def cases(file: Path) -> dict[str, list[ET.Element]]:
-    """The cases of each suite, by the last word of its name."""
+    """The cases of each suite, by the last word of the suite's name."""
     root = ET.parse(file).getroot()
     suites = root.findall("testsuite")
     for element in (root, *suites):
@@ -55,7 +56,8 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
 
 
 def test_a_hazard_is_data(run: Path) -> None:
-    """Hazards pass, harness errors are errors, faults that did not act or run are skipped; counts agree."""
+    """Hazards pass, harness errors are errors, and faults that did not act or run are skipped. The counts
+    agree."""
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}
@@ -75,20 +77,20 @@ def test_a_hazard_is_data(run: Path) -> None:
 
 
 def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
-    """With the option, hazards are failures that name hazard and time."""
+    """With the option, hazards are failures that name the hazard and its time."""
     found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=Parts(failures=["hazard"])))
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
 
 def test_an_error_cannot_be_a_failure(run: Path) -> None:
-    """A harness error says nothing about the controller, so it cannot be selected as a failure."""
+    """A harness error cannot be selected as a failure, because it says nothing about the controller."""
     with pytest.raises(MutatorError, match="harness_error"):
         export(run, Format.JUNIT, parts=Parts(failures=["harness_error"]))
 
 
 def test_tables_are_those_of_the_run(run: Path, tmp_path: Path) -> None:
-    """CSV and Parquet are the run's own tables, updated."""
+    """The CSV and Parquet exports are the run's own tables, up to date."""
     for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
         file = export(run, format, tmp_path / "new" / name)
         assert file.read_bytes() == (run / name).read_bytes()

@@ -1,4 +1,4 @@
-"""Experiments as MCAP files, read back with the mcap library."""
+"""Experiments exported as MCAP files and read back with the mcap library."""
 
 import json
 import math
@@ -41,7 +41,7 @@ GOLDEN = Series(
     every=[1, 1],
     about={"start": 0.0, "end": 1.0, "channels": CHANNELS},
 )
-FAULTY = Series(  # it ended after 0.5 s; in between, gas was 1 for one step
+FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
     t=np.array([0.0, 0.5]),
     rows=list(np.array([[0.0, 0.75], [40.0, math.nan]], dtype="<f4")),
     every=[1, 1],
@@ -56,7 +56,8 @@ FAULTY = Series(  # it ended after 0.5 s; in between, gas was 1 for one step
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """A hazard with every kind of event, for some experiments."""
+    """The result of an experiment: lane faults are hazards with every kind of event, and all others are
+    masked."""
     if e.fault.fault_type != "lane":
         return {}
     return {
@@ -76,7 +77,7 @@ def run(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """Eight experiments; exactly those with hazards have a series."""
+    """A run of eight experiments. Only those with hazards have a series."""
     folder = tmp_path_factory.mktemp("mcap")
     run = write_run(copy_toycar(folder), folder / "run", became, limit=8)
     golden = encode(GOLDEN)
@@ -91,9 +92,8 @@ def hazardous(run: Path) -> list[str]:
 
 
 def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
-    """Each run's channels are topics with a schema and a unit, each value is a message at its time, and each
-    event is a message; values that are not finite are null.
-    """
+    """Each channel of a run is a topic with a schema and a unit. Each value is a message at its time, each
+    event is a message, and values that are not finite are null."""
     only = 'outcome == "hazard" and fault_type == "lane"'
     out = export(run, Format.MCAP, tmp_path / "out", parts=Parts(only=only))
     assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
@@ -132,7 +132,7 @@ def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
 
 
 def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -> None:
-    """Log times are unsigned: all are shifted together, and the metadata give the shift."""
+    """Log times cannot be negative. All times are shifted by the same amount, which the metadata give."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     early = replace(GOLDEN, t=GOLDEN.t - 0.5)
@@ -147,16 +147,15 @@ def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -
         facts = {record.name: record.metadata for record in reader.iter_metadata()}
     ms = 1_000_000
     assert times["/golden/gap"] == [0, 500 * ms, 1000 * ms]
-    assert times["/events"][0] == 750 * ms  # the activation, at 0.25 s
+    assert times["/events"][0] == 750 * ms  # the activation at 0.25 s, shifted by 0.5 s
     assert facts["times"] == {"first_s": "-0.5"}
 
 
 def test_a_kept_trace_of_another_run_is_refused(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A stored trace that is damaged, or not the campaign's, is an error with its file, because the series
-    would give another result.
-    """
+    """A stored trace that is damaged, or that is not the campaign's, is an error with its file, because
+    the series would show another result."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     faulty = copy / "traces" / name / "faulty"
@@ -172,14 +171,15 @@ def test_a_kept_trace_of_another_run_is_refused(
 
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
-    """Exporting a run twice gives the same bytes."""
+    """Exporting a run twice writes the same bytes."""
     parts = Parts(only=f'experiment_id == "{hazardous(run)[0]}"')
     first, again = (next(export(run, Format.MCAP, tmp_path / x, parts=parts).iterdir()) for x in "ab")
     assert first.read_bytes() == again.read_bytes()
 
 
 def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> None:
-    """Experiments left out are counted, with the command that reruns them; an empty export is an error."""
+    """The export reports how many experiments it leaves out, with the command that reruns them. An empty
+    export is an error."""
     left = 8 - len(hazardous(run))
     with pytest.warns(
         MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"
@@ -204,13 +204,13 @@ def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> Non
 def test_what_a_format_has_no_use_for_is_refused(
     run: Path, tmp_path: Path, format: Format, parts: Parts, name: str
 ) -> None:
-    """An option without effect on a format is refused."""
+    """An option that has no effect on a format is refused."""
     with pytest.raises(MutatorError, match=f"leave `{name}` out"):
         export(run, format, tmp_path / "x", parts=parts)
 
 
 def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
-    """Tables that a run folder has only as Parquet are also written as CSV, with the same cells."""
+    """Tables that a run folder has only as Parquet are also exported as CSV, with the same cells."""
     parts = Parts(table=Table.PROPAGATION)
     written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
     rows = pd.read_csv(written)
@@ -226,7 +226,7 @@ def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
-    """Everything that `export` writes into a run folder belongs to the run."""
+    """Every file that `export` writes into a run folder counts as a file of the run."""
     for table in Table:
         export(run, Format.CSV, None, parts=Parts(table=table))
         export(run, Format.PARQUET, None, parts=Parts(table=table))

@@ -1,4 +1,4 @@
-"""What a run's process reports about its modules, its end and its probe."""
+"""What the process of a run reports about its modules, its end and its probe."""
 
 import errno
 import os
@@ -66,7 +66,7 @@ class StepLimit(RuntimeError):
 
 
 def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Modules imported later, and the module itself; also one imported again."""
+    """The list has the named module and those imported after it, even a module that is imported again."""
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     assert imported_since("_fi") == ["late", "_fi"]
@@ -76,13 +76,13 @@ def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_a_module_that_never_came_hides_none() -> None:
-    """If the probe was not installed, all modules count."""
+    """If the probe was never imported, all modules are listed."""
     assert set(imported_since("never.imported")) == set(sys.modules)
 
 
 @pytest.fixture
 def described() -> Callable[..., dict[str, Any]]:
-    """The description of the end of a run that called a function of the tree from outside."""
+    """Call a function of the tree from outside, and describe how the run ends."""
     names: dict[str, Any] = {}
     for file, text in CODE.items():
         exec(compile(text, file, "exec"), names)
@@ -115,9 +115,8 @@ def test_exceptions_are_described(
     message: str,
     stacks: list[list[tuple[str, int]]],
 ) -> None:
-    """An exception is described by type, text and the tree's lines that it passed, each once, innermost
-    first; then those of its cause.
-    """
+    """An exception is described by its type, its text, and the tree's lines that it passed, each once and
+    innermost first. Its causes follow."""
     found = described(name, *arguments)
     assert found["ended"] == "error"
     error = found["error"]
@@ -126,14 +125,14 @@ def test_exceptions_are_described(
 
 
 def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
-    """The exceptions in a group count as its causes."""
+    """The exceptions in a group are described as its causes."""
     error = described("several")["error"]
     assert error["kind"] == "ExceptionGroup"
     assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]
 
 
 def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]) -> None:
-    """The probe's own limit is distinguished from an exception of the same class name."""
+    """The probe's own limit exception is distinguished from another exception with the same class name."""
     assert described("stop") == {"ended": "steps"}
 
 
@@ -149,9 +148,8 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     ],
 )
 def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
-    """An error for lack of space says so, however it is worded and wherever it is in a chain of causes, even
-    a cyclic one.
-    """
+    """An error for lack of space is recognized in any wording and anywhere in a chain of causes, even a
+    cyclic one."""
     assert describe(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
@@ -162,13 +160,14 @@ def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
 
 
 def test_a_full_disk_in_a_group_is_told(described: Callable[..., dict[str, Any]]) -> None:
-    """A group of exceptions reports a full disk if one of them does; one without a text reports none."""
+    """A group of exceptions reports a full disk if one of its members does. A group without a text reports
+    none."""
     assert described("several")["disk_full"]
     assert not described("unspeakable")["disk_full"]
 
 
 def test_the_first_activation_is_noted(tmp_path: Path) -> None:
-    """The file is deleted when an injection is first active, and the probe is restored."""
+    """When an injection is first active, the file is deleted and the probe is restored."""
     inactive = tmp_path / "inactive"
     inactive.touch()
     answers = [False, False, True, False]
@@ -182,7 +181,7 @@ def test_the_first_activation_is_noted(tmp_path: Path) -> None:
 
 
 def test_a_probe_is_asked() -> None:
-    """The probe's report is passed on, its exception ends the run, and anything else is no report."""
+    """The probe's report is passed on, and its exception ends the run. Any other value is not a report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

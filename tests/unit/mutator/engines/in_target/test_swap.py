@@ -1,4 +1,5 @@
-"""Putting code into loaded modules: every way to hold a function, and every reason to refuse."""
+"""Putting new code into loaded modules: all the ways in which a module can hold a function, and the
+reasons to refuse."""
 
 import sys
 import types
@@ -80,7 +81,7 @@ def loaded() -> Iterator[types.ModuleType]:
 
 
 def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.CodeType, types.CodeType]]:
-    """The functions that differ after a text is replaced in the module's source."""
+    """The functions that differ after some text is replaced in the module's source."""
     before = compile(LOADED, "car.py", "exec", dont_inherit=True)
     after = compile(LOADED.replace(old, new), "car.py", "exec", dont_inherit=True)
     return [
@@ -106,9 +107,8 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_everyone_who_holds_a_function_gets_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """Plain, wrapped, cached, static, class and private functions, methods and properties run the new code,
-    even after they ran hot with the old.
-    """
+    """Functions of every form run the new code: plain, wrapped, cached, static, class and private ones,
+    methods and properties. This holds even after many calls of the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":
@@ -119,7 +119,7 @@ def test_everyone_who_holds_a_function_gets_the_new_code(
 
 
 def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType) -> None:
-    """A name imported elsewhere and a bound method keep their function, with new code."""
+    """An imported name and a bound method keep their function object, which has the new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)
@@ -127,7 +127,7 @@ def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType)
 
 
 def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
-    """If one function is not the loaded one, no code is swapped at all."""
+    """If one of the functions is not the loaded one, no code is swapped."""
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
     with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
@@ -136,13 +136,13 @@ def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -
 
 
 def test_a_function_that_there_are_two_of_is_left_alone(loaded: types.ModuleType) -> None:
-    """Code that two functions share is not swapped in one of them."""
+    """Code that two functions share is not swapped in one of them only."""
     with pytest.raises(SwapRefused, match="several of it"):
         swap_code(functions('"old twice"', '"new twice"'), PROBE)
 
 
 def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
-    """A function on the stack would continue with its old code, so it is not swapped."""
+    """A function on the stack is not swapped, because it would continue with its old code."""
 
     def work() -> None:
         swap_code(functions('"old walk"', '"new walk"'), PROBE)
@@ -153,7 +153,7 @@ def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
 
 
 def test_a_module_that_is_not_loaded(loaded: types.ModuleType) -> None:
-    """A module that was not imported yet cannot be changed."""
+    """A module that is not imported yet cannot be changed."""
     changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
     with pytest.raises(SwapRefused, match="car_nobody_loaded is not loaded"):
         swap_code(changed, PROBE)

@@ -1,4 +1,4 @@
-"""An event loop for a test in a separate thread, because a browser's loop may run in this one."""
+"""An event loop in a separate thread, for tests in a thread where a browser's loop may already run."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -9,6 +9,6 @@ T = TypeVar("T")
 
 
 def run(work: Coroutine[Any, Any, T]) -> T:
-    """Like `asyncio.run`."""
+    """Run a coroutine like `asyncio.run`, in a new thread."""
     with ThreadPoolExecutor(1) as pool:
         return pool.submit(asyncio.run, work).result()

@@ -1,4 +1,5 @@
-"""Which worker does which piece next: each is done once, none is lost, and another worker does the proof."""
+"""Which worker gets which piece of work next. Each piece is done once, none is lost, and another worker
+does the proof."""
 
 import random
 from collections import Counter
@@ -21,7 +22,7 @@ CLONE = Path(__file__).parents[5]
 
 
 class Clock:
-    """A clock that the test moves."""
+    """A clock that the test sets."""
 
     now = 0.0
 
@@ -31,7 +32,7 @@ class Clock:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
-    """The plan of `paper_smoke`, with some experiments that share a run."""
+    """The plan of `paper_smoke`, in which some experiments share a run."""
     shipped = Workspace.find(root=CLONE)
     return freeze(make_plan(shipped, "paper_smoke"), tmp_path_factory.mktemp("board") / "run", shipped)
 
@@ -43,12 +44,12 @@ def clock() -> Clock:
 
 @pytest.fixture
 def ids(folder: RunFolder) -> list[str]:
-    """All planned experiments."""
+    """The ids of all planned experiments."""
     return list(plan_file.ids(folder.path))
 
 
 def board(folder: RunFolder, clock: Clock, proof: tuple[str, ...] = ()) -> Board:
-    """The whole plan, and the proof of some of it, for two workers."""
+    """A board for two workers, with the whole plan and the proof of some experiments."""
     samples = [Sample(number, name) for number, name in enumerate(proof)]
     made = Board(folder, pending(folder, {}), samples, now=clock)
     for name in ("alpha", "beta"):
@@ -63,7 +64,7 @@ def taken(board: Board, worker: str) -> Piece:
 
 
 def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[tuple[str, Piece]]:
-    """Which worker did what, until nothing is left."""
+    """Let the workers take pieces until none is left; return who did which."""
     done = []
     while not board.is_empty:
         for worker in workers:
@@ -74,7 +75,8 @@ def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[
 
 
 def test_all_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """Two workers do each planned experiment once; a piece has one golden run and its own faults."""
+    """Two workers do each planned experiment once. Each piece has one golden run and only faults of that
+    run."""
     done = [piece for _, piece in drained(board(folder, clock))]
     assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
     for piece in done:
@@ -84,7 +86,7 @@ def test_all_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> No
 
 
 def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """If there is another worker, no worker proves its own experiments."""
+    """If there is another worker, no worker does the proof of its own experiments."""
     done = drained(board(folder, clock, tuple(ids[::7])))
     ran = {name: worker for worker, piece in done if piece.kind is Kind.RUN for name in piece.lines}
     proved = {name: worker for worker, piece in done if piece.kind is Kind.PROVE for name in piece.lines}
@@ -93,7 +95,7 @@ def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, 
 
 
 def test_a_worker_alone_proves_what_it_ran(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """A single worker proves its own experiments."""
+    """A single worker does the proof of its own experiments."""
     alone = board(folder, clock, tuple(ids[:2]))
     alone.leave("beta")
     done = drained(alone, ("alpha",))
@@ -101,7 +103,7 @@ def test_a_worker_alone_proves_what_it_ran(folder: RunFolder, clock: Clock, ids:
 
 
 def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> None:
-    """Golden runs change as seldom as two workers allow."""
+    """Each worker changes its golden run at most as often as there are golden runs."""
     done = drained(board(folder, clock))
     for worker in ("alpha", "beta"):
         keys = [piece.golden for name, piece in done if name == worker]
@@ -110,7 +112,7 @@ def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> 
 
 
 def test_pieces_get_shorter_towards_the_end(folder: RunFolder, clock: Clock) -> None:
-    """The last pieces are single runs if a run takes longer than the shortest piece."""
+    """The last pieces have one run each if a run takes longer than the shortest piece."""
     there = board(folder, clock)
     first = taken(there, "alpha")
     there.done(first, "alpha", 2.0 * first.runs)
@@ -120,7 +122,7 @@ def test_pieces_get_shorter_towards_the_end(folder: RunFolder, clock: Clock) -> 
 
 
 def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Clock) -> None:
-    """An idle worker repeats a late piece; the first result counts."""
+    """An idle worker repeats a piece that is late, and the first result counts."""
     there = board(folder, clock)
     frozen = taken(there, "alpha")
     drained_by_beta = 0
@@ -137,7 +139,7 @@ def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Cloc
 
 
 def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """If workers die of an unknown experiment, it is found and given up, and all others are done."""
+    """If an unknown experiment kills workers, it is identified and given up. All others are done."""
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:
@@ -154,7 +156,8 @@ def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clo
 
 
 def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """A known deadly experiment is set apart at once, and given up at its second kill."""
+    """An experiment that is known to kill workers is set apart at once, and given up when it kills a
+    second one."""
     there = board(folder, clock)
     piece = taken(there, "alpha")
     deadly = piece.ids[-1]
@@ -165,9 +168,8 @@ def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids:
 
 
 def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock) -> None:
-    """A worker retries an experiment that killed it only if it is alone, and does not repeat it when it is
-    late.
-    """
+    """A worker retries an experiment that killed it only if no other worker is left. It does not repeat
+    that experiment when it is late."""
     there = board(folder, clock)
     deadly = taken(there, "alpha")
     there.died(deadly, "alpha")
@@ -183,7 +185,7 @@ def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock
 
 
 def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, clock: Clock) -> None:
-    """When one of two workers at a piece dies, the other continues."""
+    """If two workers do the same piece and one dies, the other continues."""
     for first in ("alpha", "beta"):
         there = board(folder, clock)
         late = taken(there, "alpha")
@@ -198,7 +200,8 @@ def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, 
 
 
 def test_a_worker_waits_longer_for_others_where_runs_are_long(folder: RunFolder, clock: Clock) -> None:
-    """An idle worker leaves the proof of its own runs to others that are at work for a usual time."""
+    """An idle worker leaves the proof of its own runs to a worker that is still busy, if its piece is not
+    late."""
     there = board(folder, clock, taken(board(folder, clock), "alpha").ids[:1])
     first = taken(there, "alpha")
     there.done(first, "alpha", 60.0 * first.runs)
@@ -212,7 +215,7 @@ def test_a_worker_waits_longer_for_others_where_runs_are_long(folder: RunFolder,
 
 
 def test_random_losses_lose_nothing(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """After any returns, deaths and duplicates, each experiment is done once."""
+    """After any sequence of results, deaths and duplicates, each experiment is done once."""
     draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
     out: list[tuple[str, Piece]] = []
     while not there.is_empty:

@@ -1,4 +1,4 @@
-"""Cluster files: their valid content, and the resulting requests to a queueing system."""
+"""Cluster files: their valid content, and the requests that they send to a queueing system."""
 
 import os
 import subprocess
@@ -25,7 +25,7 @@ options:
 
 
 async def opened(folder: Path, text: str, insecure: bool = False) -> str:
-    """The dashboard address of the cluster that a file with this text describes, once it is open."""
+    """Open the cluster that a file with this text describes, and return the address of its dashboard."""
     file = folder / "some.yaml"
     file.write_text(text)
     async with parse(str(file)).open(insecure=insecure) as client:
@@ -33,9 +33,8 @@ async def opened(folder: Path, text: str, insecure: bool = False) -> str:
 
 
 def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> None:
-    """Replace Slurm's commands by scripts in this folder: one keeps the jobs, the other records
-    cancellations.
-    """
+    """Replace Slurm's commands by scripts in this folder. One stores the submitted jobs, the other records
+    cancellations."""
     for name, script in (("sbatch", sbatch), ("scancel", "echo $1 >> cancelled")):
         (folder / name).write_text(f"#!/bin/sh\ncd {folder}\n{script}\n")
         (folder / name).chmod(0o755)
@@ -64,7 +63,8 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
     ],
 )
 def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: str, tmp_path: Path) -> None:
-    """Unknown kinds, keys and options, and values that the class rejects, are refused with their line."""
+    """Unknown kinds, keys and options are refused with their line, and so are values that the class
+    rejects."""
     with pytest.raises(MutatorError, match=error):
         run(opened(tmp_path, SLURM.replace(before, after)))
 
@@ -79,7 +79,7 @@ def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: s
     ],
 )
 def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path) -> None:
-    """The error names the file and the line of the options, and the queueing system is not contacted."""
+    """The error names the file and the line of the options, and nothing is sent to the queueing system."""
     with pytest.raises(
         MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
     ):
@@ -87,7 +87,7 @@ def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path)
 
 
 def test_ctrl_c_stays_what_it_is() -> None:
-    """dask_jobqueue would install its own handler, and could not be imported outside the main thread."""
+    """dask_jobqueue is not allowed to install its signal handler, which works only in the main thread."""
     code = (
         "import signal, threading\n"
         "from mutator.execution.cluster.cluster_files import _class\n"
@@ -100,7 +100,7 @@ def test_ctrl_c_stays_what_it_is() -> None:
 
 
 def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error names the missing extra; it comes after the check that an open network is allowed."""
+    """The error names the missing extra. It is raised after the check that an open network is allowed."""
     monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
     monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
     with pytest.raises(MutatorError, match=r"no package dask_kubernetes.*'.\[kubernetes\]'"):
@@ -108,7 +108,7 @@ def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four workers on two cores each are two jobs of single-threaded workers; at the end no job is left."""
+    """Four workers on two cores each are two jobs with single-threaded workers. No job is left at the end."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job$$; echo Submitted batch job $$")
     dashboard = run(opened(tmp_path, SLURM))
     assert dashboard.startswith("http://127.0.0.1:")
@@ -124,7 +124,7 @@ def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.Mo
 def test_workers_over_tls_are_told_of_the_certificates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`security: true` creates certificates for this cluster only, and needs no `--insecure-network`."""
+    """`security: true` creates certificates for this cluster only and does not need `--insecure-network`."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
     options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
     run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
@@ -137,7 +137,7 @@ def test_workers_over_tls_are_told_of_the_certificates(
 def test_a_job_that_is_refused_ends_it(
     script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    """The error contains the queueing system's message, and nothing else is printed."""
+    """The error contains the queueing system's message. Nothing else is printed."""
     with_slurm(tmp_path, monkeypatch, script)
     with pytest.raises(MutatorError, match=r"some.yaml:4: .*(no such partition|this is no answer)"):
         run(opened(tmp_path, SLURM))
@@ -145,7 +145,7 @@ def test_a_job_that_is_refused_ends_it(
 
 
 def test_a_machine_without_the_command_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the command, the error says that jobs are submitted where the queueing system is installed."""
+    """If the command is missing, the error says to submit jobs where the queueing system is installed."""
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(MutatorError, match=r"some.yaml:2: .*sbatch.*; submit from a machine"):
         run(opened(tmp_path, SLURM))

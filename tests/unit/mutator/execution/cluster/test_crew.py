@@ -1,4 +1,4 @@
-"""Which workers may join a run, and what is reported about them."""
+"""Which workers may join a run, and what is reported about the others."""
 
 import pytest
 
@@ -30,19 +30,20 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
     ],
 )
 def test_versions_decide(change: dict[str, object], objection: str) -> None:
-    """A difference that would keep a machine from resuming the run keeps a worker out, and is reported."""
+    """A worker is refused, with the reason, if it differs in a way that would stop its machine from
+    resuming the run."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 
 def test_other_versions_can_be_accepted() -> None:
-    """Other versions of Python and packages can be accepted, but not of mutator."""
+    """The user can accept other versions of Python and of packages, but not of mutator."""
     crew = Crew(STRETCH, accept=True)
     assert crew.objection(FACTS | {"packages": {"numpy": "1.0"}}) == ""
     assert crew.objection(FACTS | {"mutator": "0.0.1"})
 
 
 def test_rates_are_told_by_machine() -> None:
-    """Two workers of one machine are reported as one rate, a refused one by number."""
+    """Two workers on one machine are reported with one rate. Refused workers are reported by number."""
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
@@ -58,7 +59,7 @@ def test_rates_are_told_by_machine() -> None:
 
 
 def test_a_worker_is_described_by_machine_and_versions() -> None:
-    """Name, host, processor, versions and the kernel of its BLAS."""
+    """A worker reports its name, host, processor, versions, and the kernel of its BLAS."""
     assert describe("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )

@@ -1,4 +1,4 @@
-"""Work dealt out to workers that fail in many ways: each failure is blamed on its true cause."""
+"""Work is dealt to workers that fail in many ways, and each failure is blamed on its true cause."""
 
 import asyncio
 import json
@@ -37,7 +37,7 @@ Work = Callable[[Piece], Result]
 
 
 def healthy(piece: Piece) -> Result:
-    """A healthy worker's result for a piece."""
+    """The result of a piece from a healthy worker."""
     line = {"detail": "", "hazards": [], "max_dev": [], "outcome": "masked", "status": "ok", "tree": ""}
     line |= {"activation": None, "alerts": [], "t_manifest": None, "trace_digest": ""}
     records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.lines]
@@ -50,7 +50,7 @@ def healthy(piece: Piece) -> Result:
 
 
 def sick(ending: Ending, deadly: str = "") -> Work:
-    """A worker on which each piece, or only those with this experiment, ends like this."""
+    """A worker on which every piece ends this way, or only the pieces with the experiment `deadly`."""
 
     def work(piece: Piece) -> Result:
         if deadly and deadly not in piece.lines:
@@ -61,7 +61,7 @@ def sick(ending: Ending, deadly: str = "") -> Work:
 
 
 class Answer:
-    """Stands for a Dask future."""
+    """A substitute for a Dask future."""
 
     def __init__(self, future: "asyncio.Future[Any]") -> None:
         self.future = future
@@ -74,25 +74,25 @@ class Answer:
 
 
 class Workers:
-    """Stands for a client of a scheduler with these workers, which respond at once."""
+    """A substitute for a client of a scheduler with these workers, which answer immediately."""
 
     dashboard_link = None
 
     def __init__(self, **workers: Work) -> None:
         self.workers, self.scheduler, self.address = workers, self, "here"
-        self.began: list[str] = []  # pieces, by worker
-        self.cut_at = -1  # pieces, until the scheduler forgets this client's tasks
+        self.began: list[str] = []  # the worker of each piece that began
+        self.cut_at = -1  # the number of pieces begun after which the scheduler forgets this client's tasks
         self._open: list[asyncio.Future[Any]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
-        """As the scheduler returns it."""
+        """Return what Dask's scheduler returns."""
         told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
         return {"workers": {f"tcp://{name}": one for name, one in told.items()}}
 
     def submit(
         self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
     ) -> Answer:
-        """Like Dask's."""
+        """Submit a task, with Dask's signature."""
         future = asyncio.get_running_loop().create_future()
         self._open.append(future)
         if function.__name__ == "work":
@@ -120,7 +120,7 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 @pytest.fixture
 def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> Any:
-    """A session with everything left to run; the workers' versions do not matter."""
+    """A session in which every experiment is pending. The workers' versions do not matter."""
     monkeypatch.setattr(Bundle, "of", lambda *given: Bundle(b"", ""))
     monkeypatch.setattr(Crew, "objection", lambda *given: "")
     folder.head["stretches"] = [{"python": "", "packages": {}, "platform": ""}]
@@ -141,7 +141,7 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
 
 
 def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[dict[str, Record], list[str]]:
-    """The resulting records of the run folder, and the remarks."""
+    """Return the records in the run folder at the end, and the remarks."""
     remarks: list[str] = []
 
     async def deal() -> None:
@@ -159,9 +159,8 @@ def errors(records: dict[str, Record]) -> list[str]:
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
 def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending) -> None:
-    """If pieces fail on one worker only, the other completes them; the sick one is refused by name with the
-    reason, and no experiment is blamed.
-    """
+    """If pieces fail on one worker only, the other worker completes them. The failing worker is refused by
+    name with the reason, and no experiment is blamed."""
     records, remarks = dealt(session, Workers(odd=sick(ending), alpha=healthy))
     assert (len(records), errors(records), session.problem) == (12, [], "")
     assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
@@ -169,9 +168,8 @@ def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending)
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
 def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Ending) -> None:
-    """An experiment that fails on every worker gets a harness error with the reason; both workers
-    continue.
-    """
+    """An experiment that fails on every worker gets a harness error with the reason. Both workers
+    continue."""
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
@@ -179,9 +177,8 @@ def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Endin
 
 
 def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
-    """When the command's connection breaks briefly, the scheduler forgets all tasks, and the command submits
-    its work again.
-    """
+    """If the command's connection breaks for a moment, the scheduler forgets all tasks, and the command
+    submits its work again."""
     workers = Workers(alpha=healthy, beta=healthy)
     workers.cut_at = 2
     records, remarks = dealt(session, workers)
@@ -189,7 +186,7 @@ def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
 
 
 def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> None:
-    """A cluster file requests two workers: if the first is refused, the work waits for the second."""
+    """A cluster file requests two workers. If the first one is refused, the work waits for the second one."""
     workers = Workers(odd=sick(Ending.UNLIKE))
 
     async def late() -> None:
@@ -207,13 +204,13 @@ def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> No
 
 
 def test_a_refused_worker_is_the_last_where_nobody_queues(session: Any) -> None:
-    """Without a queue the command ends with the reason."""
+    """Without a queue, the command ends and reports the reason."""
     dealt(session, Workers(odd=sick(Ending.UNLIKE)))
     assert session.problem == "no worker is left that may do the work: the reason"
 
 
 def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Experiments are not given up while results are written, since both append to the same file."""
+    """No experiment is given up while results are being written, because both append to the same file."""
     inside, most = [0], [0]
 
     def slow(real: Callable[..., None]) -> Callable[..., None]:
@@ -236,7 +233,7 @@ def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_remark_that_is_an_error_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If warnings are errors, no background work continues after the first one."""
+    """If warnings are errors, no background work continues after the first warning."""
 
     class Place:
         @asynccontextmanager

@@ -1,4 +1,4 @@
-"""A worker's side of a run: a separate process runs the pieces and ends when it is no longer wanted."""
+"""The worker's part of a run: a separate process runs the pieces and ends when it is no longer wanted."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ from mutator.workspace import Workspace
 
 
 def children(host: Host) -> list[int]:
-    """The processes that run its pieces."""
+    """The processes that run the host's pieces."""
     words = str(host.folder).encode()
     found = []
     for path in Path("/proc").glob("[0-9]*/cmdline"):
@@ -37,7 +37,7 @@ def children(host: Host) -> list[int]:
 
 @contextmanager
 def attended(host: Host) -> Iterator[threading.Event]:
-    """The host, attended; the event means that it is no longer wanted."""
+    """Attend the host in a thread; set the event to say that it is no longer wanted."""
     unwanted = threading.Event()
     thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
     thread.start()
@@ -50,7 +50,7 @@ def attended(host: Host) -> Iterator[threading.Event]:
 
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory: pytest.TempPathFactory, copy_toycar: object) -> tuple[Bundle, Piece]:
-    """What a worker receives for the toy's small campaign: the bundle and a piece of work."""
+    """What a worker receives for the toy's small campaign: the bundle, and a piece of work."""
     folder = tmp_path_factory.mktemp("sent")
     toy: Workspace = copy_toycar(folder)  # type: ignore[operator]
     with open_session(toy, "small", folder / "run", workers=2, choices=Choices(), engine="fork") as session:
@@ -68,7 +68,8 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
 
 
 def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """Two pieces run in one process; once the host is not wanted, process and folder are gone."""
+    """Two pieces run in the same process. When the host is no longer wanted, the process and its folder
+    are removed."""
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
@@ -82,9 +83,8 @@ def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundl
 
 
 def test_a_process_that_dies_is_told_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """If the process is killed, the result says how it ended and at which experiment, and the next piece gets
-    a new one.
-    """
+    """If the process is killed, the result says how it ended and at which experiment. The next piece gets
+    a new process."""
     with attended(host):
         killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
         killer.start()
@@ -104,7 +104,8 @@ def _first(host: Host) -> int:
 def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
     host: Host, sent: tuple[Bundle, Piece]
 ) -> None:
-    """If a worker's process does not start, as on a full disk, it says why, and the piece is not blamed."""
+    """If a worker's process does not start, for example on a full disk, the result says why and does not
+    blame the piece."""
     (host.folder / "meta.json").unlink()
     with attended(host):
         result = host.run(sent[1].packed(), lambda: True)
@@ -113,7 +114,7 @@ def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
 
 
 def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """A cancelled piece ends within a second, with its process."""
+    """A cancelled piece and its process end within a second."""
     asked: list[float] = []
 
     def wanted() -> bool:
@@ -127,7 +128,7 @@ def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece
 
 
 def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
-    """A damaged bundle is not unpacked; a damaged piece is not begun."""
+    """A damaged bundle is not unpacked, and a damaged piece is not started."""
     with pytest.raises(MutatorError, match="damaged parcel"):
         Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
     assert not [*(tmp_path / "other").iterdir()]
@@ -137,13 +138,13 @@ def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The machine's cache of golden runs; empty."""
+    """The empty cache of golden runs on this machine."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache" / "mutator" / "goldens"
 
 
 def run_once(sent: tuple[Bundle, Piece], place: Path) -> Result:
-    """The result of the piece on a new host."""
+    """Run the piece on a new host; return its result."""
     host = Host.lay_out(sent[0].data, str(place), "alpha")
     with attended(host):
         return host.run(sent[1].packed(), lambda: True)
@@ -154,7 +155,8 @@ def written(entry: Path) -> int:
 
 
 def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path) -> None:
-    """A second host finds the golden run of the first one; a damaged one is rerun and replaced.
+    """A second host uses the golden run that the first one cached. A damaged golden run is rerun and
+    replaced.
 
     The records are the same each time.
     """
@@ -171,7 +173,8 @@ def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: P
 def test_a_kept_golden_run_must_be_the_campaigns(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """A cached golden run with another digest than the campaign's, or of other sources, is not used."""
+    """A cached golden run is not used if its digest is not the campaign's, or if it belongs to other
+    sources."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")

@@ -1,4 +1,4 @@
-"""What travels between command and workers arrives unchanged or is refused."""
+"""Data sent between the command and workers arrive unchanged or are refused."""
 
 import random
 
@@ -10,7 +10,7 @@ from mutator.execution.cluster.pieces import Ending, Result
 
 
 def test_parts_come_back() -> None:
-    """Names and bytes come back in order, including empty and binary ones."""
+    """Names and bytes are read back in order, including empty and binary ones."""
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
     assert unpack(pack(parts)) == parts
     assert list(unpack(pack(parts))) == list(parts)
@@ -28,7 +28,7 @@ def test_damage_is_found() -> None:
 
 
 def test_a_result_comes_back() -> None:
-    """A result's lines, blocks and ending come back."""
+    """The lines, blocks and ending of a result are read back."""
     result = Result(
         number=7,
         ending=Ending.DONE,

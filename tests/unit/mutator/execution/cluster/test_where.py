@@ -1,4 +1,5 @@
-"""Valid values of `WHERE`, the refusals before anything starts, and what is opened and closed again."""
+"""Valid values of `WHERE`, refusals before anything starts, and connections that are opened and closed
+again."""
 
 import json
 import os
@@ -27,7 +28,7 @@ async def opened(place: Where, insecure: bool = False) -> None:
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tls://far.example:1", "tls://[::1]:8786"])
 def test_an_address_is_a_scheduler(address: str) -> None:
-    """TCP and TLS, hosts by name and by number."""
+    """TCP and TLS addresses are accepted, with a host name or a host number."""
     assert parse(address) == Scheduler(address=address)
 
 
@@ -44,7 +45,7 @@ def test_local_names_how_many_workers() -> None:
     ],
 )
 def test_what_means_no_cluster_is_refused(text: str) -> None:
-    """The error names the argument, the value found, and the valid ones."""
+    """The error names the argument, the value found, and the valid values."""
     with pytest.raises(MutatorError) as caught:
         parse(text)
     assert caught.value.argument == "cluster"
@@ -53,7 +54,7 @@ def test_what_means_no_cluster_is_refused(text: str) -> None:
 
 
 def test_parsing_needs_no_dask() -> None:
-    """`parse` only checks the text, and works without the extra."""
+    """`parse` checks only the text and works without the extra."""
     code = (
         "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
     )
@@ -62,7 +63,8 @@ def test_parsing_needs_no_dask() -> None:
 
 
 def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
-    """The address is read as `dask scheduler --scheduler-file` writes it; an error names the file."""
+    """The address is read from the file that `dask scheduler --scheduler-file` writes. An error names the
+    file."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
     found = parse(str(file))
@@ -75,7 +77,7 @@ def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
     "text", ["", "[]", "{}", '{"address": 7}', '{"address": "http://x:1"}', "\xff", "[" * 9999]
 )
 def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None:
-    """The error names the file, even a missing one."""
+    """The error names the file, even if it is missing."""
     file = tmp_path / "scheduler.json"
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
         parse(str(file))
@@ -100,12 +102,12 @@ def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None
     ],
 )
 def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> None:
-    """Any other network can be reached by others."""
+    """Only the loopback and TLS are closed. All other networks are open to other users."""
     assert connecting.is_closed(address) is closed
 
 
 def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No connection is tried; the remedy names TLS and the argument that allows it."""
+    """No connection is attempted. The remedy names TLS and the argument that allows open networks."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
         MutatorError, match=r"neither on the loopback nor encrypted.*tls://.*`insecure_network`"
@@ -116,7 +118,7 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
 def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """`dask scheduler` listens on all networks, so it is refused even if reached over the loopback."""
+    """`dask scheduler` listens on all networks. It is refused even if its address is on the loopback."""
 
     @asynccontextmanager
     async def found(*given: Any, **more: Any) -> AsyncIterator[Any]:
@@ -137,17 +139,17 @@ def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The attempt ends after a limited time, with the reason."""
+    """The attempt to connect ends after a limited time, and the error has the reason."""
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with socket.socket() as silent:
-        silent.bind(("127.0.0.1", 0))  # nobody else listens there
+        silent.bind(("127.0.0.1", 0))  # no other process listens there
         address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(MutatorError, match=rf"no Dask scheduler answers at {address} \(.*refused"):
             run(opened(parse(address)))
 
 
 def test_tls_needs_certificates() -> None:
-    """Without certificate files, the error says how to name them."""
+    """The error for missing certificate files says how to name them."""
     import dask
 
     with pytest.raises(
@@ -163,9 +165,8 @@ def test_tls_needs_certificates() -> None:
 
 
 def test_local_workers_work_and_end() -> None:
-    """A single-threaded worker process on the loopback, in a separate folder; afterwards all of it
-    is gone.
-    """
+    """The cluster has one single-threaded worker process on the loopback, in a separate folder. Both are
+    removed afterwards."""
 
     async def used() -> tuple[str, dict[str, int], int, str]:
         async with parse("local:1").open(insecure=False) as client:
