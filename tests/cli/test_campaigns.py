@@ -250,7 +250,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
     reseal(run)
     answer = cli("report", run)
     assert answer.code == 1
-    assert f"experiment {wrong['experiment_id']} is another one" in answer.err
+    assert f"experiment {wrong['experiment_id']} differs on the reference engine" in answer.err
     text = (run / "report/REPORT.md").read_text()
     assert text.index("The equivalence check failed") < text.index("12 experiments")
     assert f"FAILED: experiment {wrong['experiment_id']}" in text

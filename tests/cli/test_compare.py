@@ -48,11 +48,11 @@ def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> 
     answer = cli("compare", *runs, "--out", "c")
     assert answer.code == 0, answer.err
     assert answer.out.startswith(said)
-    assert answer.out.count("unlike parts") == 1
+    assert answer.out.count("different parts") == 1
     written = (Path("c") / "COMPARISON.md").read_text()
     assert written.index(said) < written.index("What differs")
     assert cli("compare", *runs, "--json", "--out", "c").json["remarks"][0].startswith(said)
-    assert "unlike parts" not in cli("compare", runs[1], runs[1], "--out", "d").out
+    assert "different parts" not in cli("compare", runs[1], runs[1], "--out", "d").out
 
 
 def test_alerts_of_fault_free_runs_are_named(

@@ -16,10 +16,10 @@ def test_init_writes_a_library_that_is_then_used(
     """After `init`, the verbs in that folder use the files edited there."""
     assert cli("init", "faults").out.startswith("faults: fault_library/, templates/ and a README.md")
     spec = nowhere / "faults/fault_library/faults/radar/chaff.yaml"
-    spec.write_text(spec.read_text().replace("The radar's echo", "My radar's echo"))
+    spec.write_text(spec.read_text().replace("about: The radar", "about: My radar"))
     assert "My radar" not in cli("list", "specs").out
     monkeypatch.chdir(nowhere / "faults")
-    assert "My radar's echo" in cli("list", "specs").out
+    assert "My radar" in cli("list", "specs").out
     assert cli("check").code == 0
 
 

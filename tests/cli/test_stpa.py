@@ -22,7 +22,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
         "they cover everything exactly once: proved in 9 cells",
         "unsafe control actions (14)",
         "vision_output/camera_unavailable",
-        "none: People are not simulated",
+        "none: Drivers are not simulated",
         "control structure: structure.svg",
         "all well: 22 causal factors, 27 fault specs",
     ):

@@ -223,7 +223,7 @@ def test_a_shard_whose_proof_failed_is_told(
     wrong = json.loads(first) | {"trace_digest": "0" * 64}
     path.write_text("\n".join([head, json.dumps(wrong), *rest, ""]))
     reseal(copies[broken])
-    with pytest.raises(CheckFailed, match=f"experiment {wrong['experiment_id']} is another one") as caught:
+    with pytest.raises(CheckFailed, match=f"experiment {wrong['experiment_id']} differs on") as caught:
         merge([copies["1/2"], copies["2/2"]], tmp_path / "out")
     assert str(copies[broken]) in str(caught.value)
     assert not (tmp_path / "out").exists()

@@ -169,7 +169,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         (
             "params: {by_m: error}",
             "params: {low_m: 0}",
-            "17: parameter 'by' of model offset is missing; expected what is added; add `by_m`",
+            "17: parameter 'by' of model offset is missing; expected the constant to add; add `by_m`",
         ),
         (
             "params: {by_m: error}",
