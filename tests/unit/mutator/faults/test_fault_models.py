@@ -1,4 +1,4 @@
-"""Fault models: templates, schemas, and examples that are tests."""
+"""Fault models: their templates, their schema, and their examples, which are tests."""
 
 import shutil
 from pathlib import Path
@@ -43,7 +43,7 @@ RAISING = ["exception", "reordering", "repetition", "slow_call", "swapped_argume
 
 @pytest.fixture
 def folder(tmp_path: Path, clone: Workspace) -> Path:
-    """A copy of the templates that a test may break."""
+    """A copy of the templates, which a test may break."""
     return Path(shutil.copytree(clone.templates, tmp_path / "templates"))
 
 
@@ -57,9 +57,8 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
 
 
 def test_the_models_that_ship(clone: Workspace) -> None:
-    """These models ship, two of which wrap statements, and those of operators, each with at least one
-    example.
-    """
+    """The expected models ship, each with at least one example. Two wrap statements, and some belong to
+    operators."""
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
@@ -68,7 +67,7 @@ def test_the_models_that_ship(clone: Workspace) -> None:
 
 @pytest.mark.parametrize("name", NAMES + OF_OPERATORS)
 def test_examples_hold(clone: Workspace, name: str) -> None:
-    """Each model's examples give exactly the stated text, and un-splice."""
+    """Each model's examples produce exactly the stated text, and the original can be restored from it."""
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:
@@ -76,9 +75,9 @@ def test_examples_hold(clone: Workspace, name: str) -> None:
 
 
 def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on which models raise on purpose, so the digest does, too.
+    """The digest covers which models raise on purpose, because verdicts depend on it.
 
-    Those models run the target's own code differently from how it is written.
+    These models do not run the target's own code as it is written.
     """
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)
@@ -92,7 +91,7 @@ def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> No
 
 
 def test_an_example_that_does_not_hold(folder: Path) -> None:
-    """A template whose output differs from its example is a problem with file and line."""
+    """If a template's output differs from its example, the problem has file and line."""
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = check_examples(load_fault_models(folder))
@@ -101,7 +100,7 @@ def test_an_example_that_does_not_hold(folder: Path) -> None:
 
 
 def test_an_example_that_fails(folder: Path) -> None:
-    """A template that does not parse is a problem of its examples, not a traceback."""
+    """A template that does not parse is reported as a problem of its examples, without a traceback."""
     (folder / "scale.py.j2").write_text("if {{ target:\n")
     (problem,) = check_examples(load_fault_models(folder))
     assert "scale.yaml:11: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
@@ -110,7 +109,7 @@ def test_an_example_that_fails(folder: Path) -> None:
 
 
 def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
-    """Any change to what a mutant's text depends on changes the digest."""
+    """The digest changes with anything that determines a mutant's text."""
     before = load_fault_models(folder).digest
     for name in ("offset.py.j2", "_fi.py.j2"):
         (folder / name).write_text((folder / name).read_text() + "\n")
@@ -150,18 +149,18 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
     ],
 )
 def test_a_mistake_is_answered(folder: Path, name: str, old: str, new: str, said: str) -> None:
-    """A model's YAML is read as strictly as any other."""
+    """A model's YAML is read as strictly as other files."""
     assert said in broken(folder, name, old, new)
 
 
 def test_a_missing_template(folder: Path) -> None:
-    """A YAML without its template is refused by name."""
+    """A YAML file without its template is refused by name."""
     (folder / "scale.py.j2").unlink()
     with pytest.raises(MutatorError, match=r"scale.py.j2: cannot be read"):
         load_fault_models(folder)
 
 
 def test_an_empty_folder(tmp_path: Path) -> None:
-    """A folder without models is not a templates folder."""
+    """A folder without models is refused as a folder of templates."""
     with pytest.raises(MutatorError, match="no fault model"):
         load_fault_models(tmp_path)

@@ -1,4 +1,4 @@
-"""Names that injected statements import."""
+"""The names that injected statements import."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ variants:
 
 
 def answer(toy: Workspace, name: str) -> str:
-    """The error for a spec with an effect of that name; empty if it expands."""
+    """The error for a spec whose effect has this name, or an empty text if the spec expands."""
     path = toy.library / "faults" / "sensor" / "weather.yaml"
     path.write_text(SPEC.replace("toycar.sensor.NAME", name))
     try:
@@ -40,7 +40,7 @@ def answer(toy: Workspace, name: str) -> str:
 
 
 def test_a_name_that_the_target_defines(toy: Workspace) -> None:
-    """A class of a module of the target may be imported."""
+    """A spec may import a class of one of the target's modules."""
     assert answer(toy, "toycar.sensor.Sensor") == ""
 
 
@@ -59,7 +59,7 @@ def test_a_name_that_the_target_defines(toy: Workspace) -> None:
     ],
 )
 def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
-    """Any name that no target module defines is reported at its line."""
+    """A name that no module of the target defines is reported at its line."""
     assert answer(toy, name).startswith(f"weather.yaml:16: {said}")
 
 
@@ -67,13 +67,13 @@ def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
     "line", ["from toycar.road import Rain", "import x as Rain", "Rain = Snow", "def Rain(): 0"]
 )
 def test_names_are_defined_in_many_ways(toy: Workspace, line: str) -> None:
-    """A package that only re-exports a name defines it, too."""
+    """A package that only re-exports a name also defines it."""
     (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
     check_import(toy.manifest("toy"), "toycar.sky.Rain")
 
 
 def test_a_module_that_does_not_parse(toy: Workspace) -> None:
-    """A target module that is not Python is an error at its line, not a traceback."""
+    """A target module that is not valid Python is an error at its line, without a traceback."""
     path = Path(toy.manifest("toy").root) / "toycar" / "sky.py"
     path.write_text("class Rain:\n    x = = 1\n")
     with pytest.raises(MutatorError, match="not valid Python: invalid syntax") as caught:

@@ -1,4 +1,4 @@
-"""Readings that a library declares."""
+"""The readings that a library declares."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def declare(workspace: Workspace, first: str, second: str) -> None:
 
 
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
-    """The file's order counts, not the alphabet's."""
+    """Readings keep the order of the file and are not sorted."""
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
     assert (readings.names, readings.default) == (("printed", "measured"), "printed")
@@ -32,7 +32,8 @@ def test_the_first_reading_is_the_default(toy: Workspace) -> None:
 
 
 def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
-    """Its faults have the same ids as when that reading is the first of several."""
+    """A library without the file has one reading. Its faults have the same ids as when that reading is the
+    first of several."""
     spec = next(iter(toy.spec_files()))
     spec.write_text(spec.read_text().partition("  both:")[0])
 
@@ -47,7 +48,8 @@ def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
 
 
 def test_specs_are_written_in_the_names_that_are_declared(toy: Workspace) -> None:
-    """With other reading names a spec has other keys, and its faults another reading."""
+    """If a library declares other readings, its specs use their names as keys, and its faults have these
+    readings."""
     for path in toy.spec_files():
         text = path.read_text().replace("as_described:", "printed:").replace("as_coded:", "measured:")
         path.write_text(text)

@@ -1,4 +1,4 @@
-"""Fault specs: read strictly, expanded with a seed, and every mistake is reported at its line."""
+"""Fault specs are read strictly and expanded with a seed. Every mistake is reported at its line."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
 
 
 def test_a_spec_is_read(toy: Workspace) -> None:
-    """Variants keep their order; the number of faults is known before any is built."""
+    """Variants keep their order. The number of faults is known before any fault is built."""
     spec = toy.spec(NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
     assert [v.count for v in spec] == [3, 1, 2]
@@ -38,7 +38,7 @@ def test_a_spec_is_read(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    """Integer ranges give integers, in the order of the ranges, with the unit of the key."""
+    """An integer range gives integers, in the order of the ranges and in the key's unit."""
     found = of(faults(toy), "longer")
     assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
@@ -48,7 +48,8 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
 
 
 def test_expansion_converts_units(toy: Workspace) -> None:
-    """A value in km/h reaches a variable in m/s as m/s, with the spec's sign; the table keeps km/h."""
+    """A value in km/h is converted for a variable in m/s, with the sign that the spec gives. The table
+    keeps km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
         assert by == pytest.approx(-float(fault.value) / 3.6)
@@ -57,7 +58,8 @@ def test_expansion_converts_units(toy: Workspace) -> None:
 
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
-    """As coded, the same number is taken in another unit; without a part for the reading nothing differs."""
+    """As coded, the same number is taken in another unit. A variant without a part for the reading is the
+    same in both readings."""
     described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == "as_coded" for f in coded)
@@ -67,7 +69,7 @@ def test_both_readings_share_their_draws(toy: Workspace) -> None:
 
 
 def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
-    """A fault declares that it latches, or needs another scenario."""
+    """A fault declares that it latches, and which changes of the scenario it needs."""
     (silent,) = of(faults(toy), "silent")
     assert silent.hold is Hold.TO_END
     assert silent.changes == ("alone",)
@@ -75,7 +77,8 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
 
 
 def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
-    """A reading's setting overrides the variant's; a reading that is not written is the default one."""
+    """A setting of a reading overrides the variant's. A reading that the variant does not mention uses the
+    variant's setting."""
     path = toy.spec(NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
@@ -87,7 +90,7 @@ def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
 
 
 def test_ids_are_contents(toy: Workspace) -> None:
-    """The same seed gives the same ids, another seed other ones, and no two faults share one."""
+    """The same seed gives the same ids, another seed gives other ids, and no two faults have the same id."""
     again = [f.id for f in faults(toy)]
     assert again == [f.id for f in faults(toy)]
     assert len(set(again)) == 6
@@ -96,7 +99,8 @@ def test_ids_are_contents(toy: Workspace) -> None:
 
 
 def test_a_cap_is_kept_and_keys_share_draws() -> None:
-    """The cap limits values; equal keys and ranges give equal values, other keys other values."""
+    """The cap limits the number of values. The same key and range give the same values, and another key
+    gives others."""
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
     draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
@@ -112,7 +116,7 @@ def test_a_cap_is_kept_and_keys_share_draws() -> None:
 )
 @pytest.mark.parametrize("unit", ["          unit: m\n", ""])
 def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, value: object) -> None:
-    """A variable may be stuck at a truth value, at None or at a text, whatever its unit."""
+    """A variable of any unit may be stuck at a truth value, at None or at a text."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()
@@ -123,7 +127,7 @@ def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, 
 
 
 def test_constants_that_are_drawn(toy: Workspace) -> None:
-    """A text that equals the draw's name stands for the drawn value, converted."""
+    """A parameter whose text is the name of the draw gets the drawn value, converted."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset", "model: stuck", 1)
     path.write_text(text.replace("by_m: error", "value_m: -error", 1))
@@ -132,7 +136,7 @@ def test_constants_that_are_drawn(toy: Workspace) -> None:
 
 
 def edited(workspace: Workspace, old: str, new: str) -> str:
-    """The error of loading and expanding after one edit of the spec, without the file's name."""
+    """The error from loading and expanding the spec after one edit, without the file's name."""
     path = workspace.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text()
     assert text.count(old) >= 1
@@ -315,12 +319,12 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """The message has file and line, the offending value, the expectation and a remedy."""
+    """The message has file and line, the invalid value, the expected one, and a remedy."""
     assert said.replace("{KNOWN}", KNOWN) in edited(toy, old, new)
 
 
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:
-    """A file anywhere is a spec like any other."""
+    """A spec file outside the library is read like any other."""
     path = tmp_path / "mine.yaml"
     path.write_text((toy.library / "faults" / "sensor" / "distance.yaml").read_text())
     assert load_spec(path, toy.readings()).count == toy.spec(path).count == 6

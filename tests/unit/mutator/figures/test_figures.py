@@ -18,7 +18,8 @@ BLUR = {"module": "vision_input", "fault_type": "blur"}
 
 @pytest.fixture
 def frame() -> pd.DataFrame:
-    """Chaff: H1, H1 with H2, none, not activated; blur in S2: never activated when guided, H2 at random."""
+    """Runs of two faults. Chaff: H1, H1 with H2, no hazard, not activated. Blur in S2: not activated when
+    guided, H2 at a random time."""
     return results(
         RUN | H1,
         RUN | H1 | H2,
@@ -34,14 +35,13 @@ def texts(file: Path) -> list[str]:
 
 
 def test_a_run_has_one_hazard_several_or_none(frame: pd.DataFrame) -> None:
-    """A bar is divided by the set of hazards: every run is in exactly one."""
+    """A bar is divided by the sets of hazards, so that each run is in exactly one part."""
     assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
 def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
-    """Bars are as long as the counts, labelled with the number injected; a type never activated has
-    no rate.
-    """
+    """The length of a bar is the count, and its label is the number injected. A type that was never
+    activated has no rate."""
     figure = hazards.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
@@ -52,7 +52,7 @@ def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
 
 
 def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.DataFrame) -> None:
-    """Colour is hazards per activated fault; a cell without activated faults has no colour."""
+    """The colour shows hazards per activated fault. A cell without activated faults has no colour."""
     guided = heat_map.draw(frame).axes[0]
     assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
     cells = guided.images[0].get_array()
@@ -61,7 +61,7 @@ def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.Data
 
 
 def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None:
-    """Each panel has a bar if there is such a run, with the number of runs and the mean at its place."""
+    """Each panel has a bar if a run has both events, labelled with the number of runs. The mean is marked."""
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
     assert [t.get_text() for t in panels["alert to hazard"].texts] == ["2", "1"]
@@ -71,7 +71,7 @@ def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None
 
 
 def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """SVG and PNG of a figure have the same bytes when drawn again; names are text in the SVG."""
+    """The SVG and PNG of a figure that is drawn again have the same bytes. The SVG has names as text."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)
@@ -82,7 +82,8 @@ def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> No
 
 
 def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> None:
-    """A single fault type or scenario has no comparison figure, and empty results have none."""
+    """Results with a single fault type or scenario have no figure that compares these. Empty results have
+    no figures."""
     chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
     assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
     one_scenario = frame.assign(scenario="S1")

@@ -1,4 +1,4 @@
-"""Plots of golden and faulty runs."""
+"""Plots of a golden run and a faulty run."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -39,7 +39,7 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
 
 
 def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Every channel that both runs have is a panel with its unit; every mark is shown with its time."""
+    """Every channel that both runs have is a panel with its unit. Every mark is shown with its time."""
     mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
     figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
     save(figure, [tmp_path / "p.svg"])
@@ -61,7 +61,8 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
 
 
 def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
-    """Lines and marks after the end are grey, and the axes ignore them; without an end nothing is grey."""
+    """Lines and marks after the drive's end are grey, and the axes ignore them. Without an end, nothing is
+    grey."""
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
     marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
@@ -85,19 +86,19 @@ def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespa
 
 
 def test_a_png_is_a_png(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """The suffix decides the format."""
+    """The file's suffix decides the format."""
     save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Runs without a common channel are an error that names the manifest, not an empty figure."""
+    """Runs without a common channel are an error that names the manifest. No empty figure is drawn."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
         draw_run(trace(), {"t": TIME}, manifest, title="x")
 
 
 def test_marks_come_from_the_record_in_order_of_time() -> None:
-    """Activation, manifestation, alerts and hazards of a record are its marks, earliest first."""
+    """A record's marks are its activation, manifestation, alerts and hazards, earliest first."""
     record = Record(
         experiment_id="0" * 16,
         status=Status.OK,

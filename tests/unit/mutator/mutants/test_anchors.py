@@ -1,4 +1,4 @@
-"""Anchors: one statement, or an error that lists the candidates."""
+"""An anchor finds one statement, or raises an error that lists the candidates."""
 
 from pathlib import Path
 
@@ -80,7 +80,7 @@ def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None 
     ],
 )
 def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line: int) -> None:
-    """Assignments of every form, calls that are a statement's value, and returns are anchors."""
+    """Anchors cover assignments of every form, calls that are the value of a statement, and returns."""
     assert lines(kind, name, nth=nth) == (line, line)
 
 
@@ -95,7 +95,8 @@ def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line
     ],
 )
 def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]) -> None:
-    """An index that the same statement sets after the item is unknown afterwards."""
+    """If a statement sets an index after the item that uses it, the index's value at the item is unknown
+    afterwards."""
     for source in (
         f"def f(self):\n    {targets} = g()\n",
         f"def f(self):\n    for {targets} in g():\n        h()\n",
@@ -105,7 +106,8 @@ def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]
 
 
 def test_heads_of_blocks_count_last() -> None:
-    """With a block's head as a new candidate, an existing `nth`, or none, still means the same statement."""
+    """After the head of a block became a candidate, an anchor with or without `nth` still means the same
+    statement."""
     source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
     source += "    with xs as y:\n        y = 2\n        y = 3\n"
 
@@ -118,7 +120,8 @@ def test_heads_of_blocks_count_last() -> None:
 
 
 def test_functions_are_found_by_qualified_name() -> None:
-    """Nested functions have their own statements, written with `<locals>` or without."""
+    """The statements of a nested function belong to it, whether or not its name is written with
+    `<locals>`."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
@@ -157,7 +160,7 @@ def test_functions_are_found_by_qualified_name() -> None:
 def test_no_hit_or_several_is_an_error(
     kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
 ) -> None:
-    """The error names the place, the candidates or the reason, and the remedy."""
+    """The error names the place, the candidates or the reason, and a remedy."""
     with pytest.raises(MutatorError) as caught:
         lines(kind, name, function, nth)
     for piece in pieces:
@@ -165,7 +168,7 @@ def test_no_hit_or_several_is_an_error(
 
 
 def test_entry_goes_below_the_docstring() -> None:
-    """The first place in a function is after its docstring, even if the function has nothing else."""
+    """The entry of a function is after its docstring, even if the function has no other statement."""
     assert lines(AnchorKind.ENTRY, "") == (15, 14)
     assert lines(AnchorKind.ENTRY, "", "empty") == (37, 36)
     assert lines(AnchorKind.ENTRY, "", "A.width", 2) == (11, 10)
@@ -185,7 +188,8 @@ def test_entry_goes_below_the_docstring() -> None:
     ],
 )
 def test_where_an_import_goes(source: str, line: int) -> None:
-    """After docstring and `from __future__` imports, below a head of comments, above decorators."""
+    """The import goes after the docstring, the head comments and `from __future__` imports, and before
+    decorators."""
     assert parsed(source).import_line + 1 == line
 
 
@@ -201,7 +205,7 @@ def test_where_an_import_goes(source: str, line: int) -> None:
     ],
 )
 def test_a_file_that_cannot_be_a_target(source: bytes, piece: str) -> None:
-    """A file that does not parse, or was instrumented before, is refused by name."""
+    """A file that does not parse, or that already has injected lines, is refused by name."""
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source, Path("root"))
     assert piece in str(caught.value)

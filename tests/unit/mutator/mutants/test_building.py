@@ -1,4 +1,4 @@
-"""Mutants: built, compiled, diffed, identified, written, and run."""
+"""Mutants are built, compiled, compared, identified, written and run."""
 
 import json
 import os
@@ -37,7 +37,7 @@ def build(toy: Workspace, fault: Fault | None, trigger: Trigger = CLOSING) -> Mu
 
 
 def one(**location: object) -> Fault:
-    """A hand-written fault: `gap = 3.0`, at some place."""
+    """A fault written by hand, `gap = 3.0`, at a given location."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     values = {"path": "toycar/sensor.py", "function": "Sensor.measure", "anchor": anchor, **location}
     params = (("target", "gap"), ("value", 3.0))
@@ -56,7 +56,8 @@ def one(**location: object) -> Fault:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_golden_diffs(toy: Workspace, variant: str) -> None:
-    """The diff of each kind of fault equals the stored one exactly (of the probe, only the head)."""
+    """The diff of each kind of fault equals the stored one exactly. Of the probe, only the head is
+    compared."""
     fault = None if variant == "null" else toy_faults(toy)[variant]
     made = build(toy, fault)
     patch = made.patch.replace(made.id, "<id>")
@@ -70,7 +71,8 @@ def test_golden_diffs(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
-    """Changed files un-splice to the original bytes; the probe is the only new file; everything compiles."""
+    """The original bytes can be restored from changed files. The probe is the only new file, and every
+    file compiles."""
     manifest = toy.manifest("toy")
     made = build(toy, None if variant == "null" else toy_faults(toy)[variant])
     assert set(made.files) - set(manifest.tree.files) == {"toycar/_fi.py"}
@@ -83,7 +85,7 @@ def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("name", ["toycar/_fi.py", "toycar/_fi/__init__.py"])
 def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
-    """A target module or package with the probe's name is refused by its path."""
+    """A module or package of the target with the probe's name is refused with its path."""
     path = toy.manifest("toy").root / name
     path.parent.mkdir(exist_ok=True)
     path.write_text("x = 1\n")
@@ -92,7 +94,7 @@ def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
 
 
 def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
-    """The patched copy, the written tree and the digest agree, and the target is unchanged."""
+    """The patched copy, the written tree and the digest agree. The target is unchanged."""
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
@@ -107,9 +109,8 @@ def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
-    """Same fault, trigger, target and templates give the same id and bytes; any difference gives
-    another id.
-    """
+    """The same fault, trigger, target and templates give the same id and bytes. Any difference gives
+    another id."""
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])
@@ -127,7 +128,7 @@ def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
 
 
 def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
-    """The fault's own hold goes before the trigger's."""
+    """A hold that the fault sets overrides the trigger's."""
     assert b'HOLD = "while"' in build(toy, toy_faults(toy)["longer"]).files["toycar/_fi.py"]
     assert b'HOLD = "to_end"' in build(toy, toy_faults(toy)["silent"]).files["toycar/_fi.py"]
 
@@ -148,7 +149,7 @@ def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str
 
 
 def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
-    """The null mutant changes nothing and sees its trigger; faults act from their trigger on."""
+    """The null mutant changes nothing and observes its trigger. Faults act from their trigger on."""
     null = run(toy, build(toy, None), tmp_path / "null")
     assert null["report"]["injections"] == {}
     assert null["report"]["triggered"]["first"] == 0.5
@@ -177,14 +178,15 @@ def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_locations_are_checked_again(toy: Workspace, location: dict[str, object], said: str) -> None:
-    """A fault that skipped expansion passes the same location checks."""
+    """The locations of a fault are checked when it is built, even if it was not expanded from a spec."""
     with pytest.raises(MutatorError) as caught:
         build(toy, one(**location))
     assert said in str(caught.value)
 
 
 def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
-    """Lines that are not allowed at their place make an invalid mutant, which names line and file."""
+    """If the injected lines are not allowed at their place, the mutant is invalid, and the error names
+    line and file."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
     broken = Workspace(library=toy.library, templates=templates)
@@ -195,7 +197,7 @@ def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_triggers_are_checked_again(toy: Workspace) -> None:
-    """An invalid condition does not get into a probe, nor a time without its length."""
+    """A probe is not built with an invalid condition, or with a hold for a time that has no length."""
     with pytest.raises(MutatorError, match="is no truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="expected hold_s with it"):
@@ -203,7 +205,7 @@ def test_triggers_are_checked_again(toy: Workspace) -> None:
 
 
 def test_a_target_with_a_probe_of_its_own(toy: Workspace) -> None:
-    """A tree with a file at the probe's path is refused."""
+    """A tree that already has a file at the probe's path is refused."""
     (toy.manifest("toy").root / "toycar" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file toycar/_fi.py"):
         build(toy, None)

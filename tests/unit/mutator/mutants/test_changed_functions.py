@@ -1,4 +1,4 @@
-"""Whether a changed file compiles is decided from its changed functions, without compiling the file."""
+"""Compiling only the changed functions shows whether a changed file compiles."""
 
 from pathlib import Path
 
@@ -42,11 +42,11 @@ def file() -> ParsedFile:
         (6, b"\tx = 2  # fi:0a\n", False),
         (13, b"def f(a): return await a  # fi:0a\n", False),
         (13, b"def f(a): return -a  # fi:0a\n", True),
-        (0, b"LIMIT = 2  # fi:0a\n", False),  # in no function, so unknown
+        (0, b"LIMIT = 2  # fi:0a\n", False),  # outside all functions, so undecided
     ],
 )
 def test_a_change_of_a_function(file: ParsedFile, line: int, text: bytes, known: bool) -> None:
-    """A change that compiles in its function compiles; other changes are undecided."""
+    """A change that compiles in its function compiles in the file. All other changes are undecided."""
     edits = [
         probe_import(file, None),
         Edit(index=line, rank=Rank.INSTEAD, lines=(text,)),

@@ -1,4 +1,5 @@
-"""Expressions: which of them anchors reach, their names, and how a changed value reads in the source."""
+"""Expressions: which ones anchors can name, how they are named, and how a changed value is written in the
+source."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -50,7 +51,7 @@ def location(
 
 
 def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
-    """The source with values changed, by tags that count from `a0`."""
+    """The source with changed values. Their tags count from `a0`."""
     file = parsed(source)
     edits = [
         value_change(file, file.resolve_value(place), text, f"a{number}")
@@ -62,9 +63,8 @@ def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
 
 
 def test_what_anchors_reach() -> None:
-    """Every value of a function has a name for each of its roles, except those that name an object, lie in a
-    string, or begin or end where no tag fits.
-    """
+    """Every value of a function has a name for each of its roles. Exceptions are values that name an
+    object, values in a string, and values that begin or end where no tag fits."""
     named = {
         kind: [
             (name, which) if which else name
@@ -111,7 +111,7 @@ def test_what_anchors_reach() -> None:
     ],
 )
 def test_an_anchor_names_one_expression(place: FaultLocation, line: int) -> None:
-    """Spaces and quotes do not matter, and an empty name matches any."""
+    """A name matches regardless of spaces and quotes. An empty name matches any expression."""
     assert parsed().span(place)[0] + 1 == line
 
 
@@ -136,9 +136,8 @@ def test_none_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]
 
 
 def test_a_changed_line_keeps_the_old_one() -> None:
-    """The expression stays in place; a value on several lines changes the first and the last; two in one line
-    share its tag.
-    """
+    """A changed expression stays in its place. Over several lines, its first and last lines change. Two
+    expressions in one line share its tag."""
     source = "def f(a, b):  # go\r\n    c = a, b\r\n    return g(a,  # first\r\n        b) + c  # sum\r\n"
     at = {"function": "f"}
     assert changed(source, (location("assigned_value", "c", **at), "None")) == source.replace(
@@ -169,9 +168,8 @@ def test_a_changed_line_keeps_the_old_one() -> None:
     ],
 )
 def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
-    """A tuple is changed as a whole, whatever parentheses its elements have, on one line or several, and in
-    an index, too.
-    """
+    """A tuple is changed as a whole, also in an index, on one line or several, and with or without
+    parentheses around its elements."""
     place = location("return_value", "", function="f")
     line = changed(f"def f(a, b):\n    return {value}\n", (place, "0")).splitlines()[1]
     assert line == f'    return (0 if _fi.active("a0") else {kept})  # fi:a0 was:    return {value}'
@@ -184,7 +182,7 @@ def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
 
 
 def test_what_python_cannot_write_has_no_anchor() -> None:
-    """A number with thousands of digits has no text; the rest of its file can be changed."""
+    """A number with thousands of digits has no name. Other expressions in its file can be changed."""
     source = f"def f(a):\n    b = g(0x{'f' * 5000})\n    return a\n"
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")
@@ -193,13 +191,13 @@ def test_what_python_cannot_write_has_no_anchor() -> None:
 
 
 def test_one_value_in_another_is_refused() -> None:
-    """Two injections into one expression are refused, since their effects could not be separated."""
+    """Two injections into one expression are refused, because their effects could not be separated."""
     with pytest.raises(MutatorError, match="two injections into one expression"):
         changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
 
 
 def test_names_are_those_of_its_own_function() -> None:
-    """Functions that share a name, such as a property's, each know their own names."""
+    """Functions with the same name, such as those of a property, have separate lists of names."""
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
@@ -207,7 +205,7 @@ def test_names_are_those_of_its_own_function() -> None:
 
 
 def test_a_file_in_another_encoding() -> None:
-    """Columns are bytes of the file's encoding, whatever Python counts."""
+    """Columns count bytes of the file's encoding, although Python counts other units."""
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
     file = parse_file("m.py", source.encode("latin-1"), Path())
     place = location("value", "'ü' + é", function="f")
@@ -220,16 +218,15 @@ def test_a_file_in_another_encoding() -> None:
 
 
 def test_an_f_string_is_changed_as_a_whole() -> None:
-    """A formatted string is one value, even in several parts; its inner values have no anchors."""
+    """An f-string is one value, even if it has several parts. The values inside it have no anchors."""
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
     found = parse_file("m.py", source, Path()).expressions["f"]
     assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
 
 
 def test_what_sets_a_name_is_a_value() -> None:
-    """A condition that is a `:=` as a whole has an anchor, with or without parentheses: while no fault is
-    active it sets its name as before.
-    """
+    """A condition that consists of a `:=` has an anchor, with or without parentheses. While no fault is
+    active, it sets its name as before."""
     source = "def f(a):\n    while n := a.pop():\n        if (m := n + 1): return g(k := m)\n"
     places = [
         location("condition", "(n := a.pop())", function="f"),

@@ -1,4 +1,5 @@
-"""Constants and defaults: which exist, which are refused, and what the probe does to them in a run."""
+"""Constants and defaults: which ones can be changed, which are refused, and how the probe changes them in
+a run."""
 
 import sys
 import types
@@ -110,9 +111,8 @@ def mutant(clone: Workspace, *locations: FaultLocation) -> bytes:
 
 @pytest.fixture
 def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
-    """Load the module with these injections; return it and its probe, with time `t` and the condition `t <
-    2`.
-    """
+    """Load the module with these injections. Return it and its probe, with time `t` and the condition `t <
+    2`."""
     names = ("_fi", "fixed_values_m")
 
     def made(*locations: FaultLocation) -> tuple[Any, Any]:
@@ -134,9 +134,8 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], place: str) -> None:
-    """A constant or default differs from the first active step to the next inactive one and is restored when
-    a run starts again; each active step counts once.
-    """
+    """A constant or default is changed from the first active step to the next inactive one, and restored
+    when a run starts again. Each active step counts once."""
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -149,7 +148,8 @@ def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], pla
 
 
 def test_all_stand_beside_each_other(clone: Workspace) -> None:
-    """A tagged line follows the statement that makes the value, in the same block, the innermost first."""
+    """A tagged line follows the statement that sets the value, in the same block. If there are several,
+    the innermost comes first."""
     lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
     assert [lines[i - 1].strip() for i in tagged if i - 1 not in tagged] == [
@@ -180,15 +180,15 @@ def test_all_stand_beside_each_other(clone: Workspace) -> None:
     ],
 )
 def test_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
-    """A missing value is refused with a list of the existing ones; one that the program makes in another way,
-    with the reason.
-    """
+    """A missing value is refused with a list of the existing ones. A value that the program sets in
+    another way is refused with the reason."""
     with pytest.raises(MutatorError, match=words):
         mutant(clone, location)
 
 
 def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
-    """A model that changes no value is refused, and so is a variable, which belongs to no function here."""
+    """A model that changes no value is refused. A parameter that names a variable is refused, too, because
+    a constant belongs to no function."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
         with pytest.raises(MutatorError, match=r"changes no value|expected no variable"):
@@ -198,7 +198,8 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
 
 
 def test_importers(tmp_path: Path) -> None:
-    """Modules that import a constant are found, also indirectly; imports inside functions do not matter."""
+    """Modules that import a constant are found, also through other modules. Imports inside functions are
+    ignored."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",
@@ -218,9 +219,8 @@ def test_importers(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """A star import, a class, and a name that the module sets itself are refused together, each with its
-    line.
-    """
+    """A star import, a class, and a name that the module sets itself are reported in one error, each with
+    its line."""
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

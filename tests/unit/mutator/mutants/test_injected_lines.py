@@ -1,4 +1,4 @@
-"""Injected lines: what is written can be recognized."""
+"""Injected lines are recognized in a mutant's source."""
 
 import re
 
@@ -8,7 +8,7 @@ from mutator.workspace import Workspace
 
 
 def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
-    """Import, observation, guards, and the ids in them are recognized."""
+    """The import, the observation, the guards, and the ids in them are recognized."""
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
@@ -33,7 +33,7 @@ def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
 
 
 def test_what_is_no_tag(clone: Workspace) -> None:
-    """A tag ends its line, in lower case; a similar comment belongs to the target."""
+    """A tag is lower-case text at the end of a line. A similar comment belongs to the target."""
     for line in (
         b"x = 1",
         b"x = 1  # fi",
@@ -47,7 +47,7 @@ def test_what_is_no_tag(clone: Workspace) -> None:
 
 
 def test_pages_are_told_the_tags() -> None:
-    """The script that shows diffs contains no tag: the page carries the mark and the probe's own tags."""
+    """The script that shows diffs contains no tag. The page gives it the mark and the probe's tags."""
     words = injected_lines.tag_words()
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"

@@ -1,4 +1,4 @@
-"""An injection that would disturb a name of the target is refused before a mutant is built."""
+"""Injections that would disturb a name of the target are refused before a mutant is built."""
 
 import shutil
 from pathlib import Path
@@ -48,7 +48,7 @@ class _Car:
 def injected(
     models: FaultModels, function: str, anchor: Anchor | None = None, model: str = "stuck", **params: Value
 ) -> str:
-    """The source with one injection, by default at the function's entry."""
+    """The source with one injection, by default at the entry of the function."""
     file = parse_file("m.py", SOURCE.encode(), Path("root"))
     place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
     given = {"value": 1.0, **params} if model == "stuck" else params
@@ -71,7 +71,8 @@ def injected(
     ],
 )
 def test_a_name_from_outside(function: str, target: str, line: int, said: str) -> None:
-    """A variable that the function only reads from outside, or does not know, is refused with its line."""
+    """A variable that the function does not know, or only reads from an outer scope, is refused with its
+    line."""
     with pytest.raises(MutatorError) as caught:
         injected(MODELS, function, target=target)
     error = caught.value
@@ -93,14 +94,14 @@ def test_a_name_from_outside(function: str, target: str, line: int, said: str) -
     ],
 )
 def test_a_name_that_may_be_set(function: str, anchor: Anchor | None, target: str) -> None:
-    """Variables of the function, attributes, and declared global or nonlocal names can be set."""
+    """A fault can set variables of the function, attributes, and names declared global or nonlocal."""
     line = f"{target} = _fi.like({target}, 1.0)  # fi:ab12\n"
     assert line in injected(MODELS, function, anchor, target=target)
 
 
 @pytest.fixture
 def models(tmp_path: Path) -> FaultModels:
-    """The fault models; `stuck` also sets its own names."""
+    """The fault models, with a `stuck` that also sets its own names."""
     workspace = Workspace.find(root=Path(__file__).parents[4])
     templates = Path(shutil.copytree(workspace.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
@@ -111,7 +112,7 @@ def models(tmp_path: Path) -> FaultModels:
 
 
 def test_names_of_a_template(models: FaultModels) -> None:
-    """A template may set its own names, unless the function uses them."""
+    """A template may set its own names unless the function uses the same names."""
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
@@ -124,9 +125,8 @@ def test_names_of_a_template(models: FaultModels) -> None:
 
 
 def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
-    """A template may not set a name within an expression, because the name would become the
-    function's own.
-    """
+    """A template may not set a name inside an expression, because the name would become a local one of the
+    function."""
     templates = Path(shutil.copytree(MODELS.folder, tmp_path / "templates"))
     (templates / "sign_flip.py.j2").write_text("(limit := -{{ original }})\n")
     place = Anchor(kind=AnchorKind.RETURN_VALUE)
@@ -135,7 +135,7 @@ def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
 
 
 def test_a_name_that_is_imported() -> None:
-    """The class that an image effect imports must not be one that the function uses."""
+    """An image effect is refused if the function uses the name of the class that the effect imports."""
     params = {"amount": 1.0, "camera": None, "scene": None, "seed": 1, "target": "x"}
     params |= {"camera": "x", "scene": "x"}
     with pytest.raises(MutatorError, match="set 'Rain', a name that the function uses"):
@@ -146,7 +146,7 @@ def test_a_name_that_is_imported() -> None:
 
 
 def test_a_refusal_is_not_forgotten() -> None:
-    """The same injection into the same file is refused again."""
+    """An injection that was refused is refused again for the same file."""
     file = parse_file("m.py", SOURCE.encode(), Path("root"))
     place = FaultLocation(path="m.py", function="reads", anchor=Anchor(kind=AnchorKind.ENTRY))
     injection = Injection(location=place, model="stuck", params=(("target", "limit"), ("value", 1.0)))

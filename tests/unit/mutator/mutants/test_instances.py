@@ -1,4 +1,4 @@
-"""One instance among several, one execution, every n-th: how a mutant asks, and what then acts."""
+"""Faults limited to one instance among several, to one execution, or to every n-th."""
 
 import types
 from pathlib import Path
@@ -44,9 +44,8 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
 
 
 def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list[list[int]], Any]:
-    """Each step's view of three lanes, at these times, with a fault active from 1 to 3; the probe's report on
-    it.
-    """
+    """Run steps at these times with a fault active from 1 to 3. Return each step's view of three lanes,
+    and the probe's report."""
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
@@ -80,16 +79,15 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
 def test_what_acts(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """An instance is one for which the condition holds; executions count from the activation, for the
-    instance alone; only executions that acted count as activations.
-    """
+    """The fault acts on instances for which the condition holds. Executions count from the activation,
+    only for such instances, and only executions that acted count as activations."""
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
 
 
 def test_executions_count_anew_in_each_stretch(clone: Workspace) -> None:
-    """Executions are counted separately for each stretch of activity and each run."""
+    """Executions are counted separately for each active stretch and each run."""
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "of the newest run"
@@ -102,7 +100,8 @@ def test_a_guard_leaves_out_one(clone: Workspace) -> None:
 
 
 def test_how_it_reads(clone: Workspace) -> None:
-    """The target's names are evaluated only while the fault is active, and the probe counts last."""
+    """The condition's names are read only while the fault is active. The probe counts an execution after
+    all other checks."""
     lines = {
         AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
         VALUE: b'gap = (lane["gap"] + 10 if _fi.on() and (index == 2) and _fi.every("a", 5) and '
@@ -116,9 +115,8 @@ def test_how_it_reads(clone: Workspace) -> None:
 
 
 def test_tags_know_what_asks(clone: Workspace) -> None:
-    """A line that asks for an instance asks the probe, and the choice of the instance belongs to the
-    injection.
-    """
+    """A line that selects an instance also asks the probe. The selection belongs to the injected part of
+    the line."""
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
@@ -148,15 +146,14 @@ def test_tags_know_what_asks(clone: Workspace) -> None:
     ],
 )
 def test_other_conditions_are_refused(text: str) -> None:
-    """A condition may not call, calculate or set anything, or use the probe."""
+    """A condition that calls, calculates or sets anything, or uses the probe, is refused."""
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
 def test_unknown_names_and_models_that_ask_twice_are_refused(clone: Workspace) -> None:
-    """A name that the function does not know is reported with the known ones; a model that acts longer than
-    the fault is active is refused, too.
-    """
+    """A name unknown in the function is reported with the known ones. A model that acts longer than the
+    fault is active is refused."""
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
@@ -171,7 +168,7 @@ def read(**given: Any) -> InjectionSpec:
 
 
 def test_as_yaml_writes_them() -> None:
-    """A condition is stored in Python's canonical form, whatever its spaces and quotes."""
+    """A condition is stored in Python's canonical form, regardless of its spaces and quotes."""
     found = read(where='name=="left"  and not (index < 2)', every=3)
     assert (found.where, found.call, found.every) == ("name == 'left' and (not index < 2)", None, 3)
 
@@ -190,6 +187,7 @@ def test_as_yaml_writes_them() -> None:
     ],
 )
 def test_refused_in_yaml(given: dict[str, Any], words: str) -> None:
-    """Invalid conditions, contradictions, and settings for all instances are refused with the reason."""
+    """Invalid conditions, contradictions, and settings that select all instances are refused with the
+    reason."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

@@ -1,4 +1,4 @@
-"""Each place that `mutator places` lists is found again, and accepts its listed models."""
+"""Each place that `mutator places` lists can be found again and accepts the models listed for it."""
 
 from collections import Counter
 from pathlib import Path
@@ -46,7 +46,7 @@ VALUES: dict[str, Value] = {
 
 
 def value(param: ParamSchema) -> Value:
-    """A value that the template accepts."""
+    """A parameter's value that the template accepts."""
     if param.type == "variable":
         return "gap"
     if param.type == "choice":
@@ -67,7 +67,7 @@ def shipped() -> Workspace:
 
 
 def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
-    """A place is listed with its line, and with `nth` if its name is ambiguous."""
+    """A place is listed with its line. If its name is ambiguous, it also has `nth`."""
     found = [(one.line, {k: v for k, v in one.at.items() if k not in ("file", "function")}) for one in listed]
     assert found[:3] == [
         (1, {"constant": "LIMIT"}),
@@ -93,7 +93,7 @@ def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
 
 
 def test_each_is_found_again(listed: list[ListedPlace]) -> None:
-    """Every listed anchor is valid in a spec, leads to its own line, and is listed once."""
+    """Every listed anchor is valid in a spec, finds its own line, and is listed once."""
     source = Source(path=Path("spec.yaml"), data={}, lines={})
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))
@@ -103,7 +103,7 @@ def test_each_is_found_again(listed: list[ListedPlace]) -> None:
 
 
 def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[ListedPlace]) -> None:
-    """Each model makes an edit at each place for which it is listed."""
+    """Each model produces an edit at each place for which it is listed."""
     file, models, tried = parse_file("m.py", SOURCE, Path("x")), shipped.fault_models(), Counter[bool]()
     for one in listed:
         if one.location.function == "other":
@@ -111,7 +111,7 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
         kind = one.location.anchor.kind
         for model in models:
             if model.name in ("ghost_object", "image_effect") or "exchanged" in model.template:
-                continue  # their parameters name more than a place has
+                continue  # these models need more names than one place gives
             at_value = kind in VALUE_ANCHORS | FIXED_ANCHORS
             params = {p.name: value(p) for p in model.params if not (at_value and p.name == "target")}
             given = tuple(sorted(params.items()))
@@ -126,7 +126,8 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
 
 
 def test_one_function(shipped: Workspace) -> None:
-    """Only the function's places are listed; an unknown function is refused with the existing ones."""
+    """Only the places of the function are listed. The error for an unknown function lists the existing
+    ones."""
     file = parse_file("m.py", SOURCE, Path("x"))
     found = places_of(file, shipped.fault_models(), "other")
     assert {one.location.function for one in found} == {"other"}
@@ -135,7 +136,8 @@ def test_one_function(shipped: Workspace) -> None:
 
 
 def test_a_statement_that_yields_is_not_repeated(shipped: Workspace) -> None:
-    """Models that repeat a statement are not listed for one that yields, because its order matters."""
+    """Models that repeat a statement are not listed for a statement with `yield`, because the order of
+    yields matters."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
     places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
     models = {one.line: one.models for one in places}

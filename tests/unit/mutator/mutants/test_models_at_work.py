@@ -1,4 +1,4 @@
-"""What fault models do to a small function that runs under the probe, step by step."""
+"""What fault models do, step by step, to a small function that runs with the probe."""
 
 import types
 from collections.abc import Callable
@@ -22,7 +22,7 @@ Make = Callable[..., "Toy"]
 
 
 class Toy:
-    """The function `f` of a source with one injection; `names` are its globals."""
+    """The function `f` of a source with one injection. `names` are its globals."""
 
     def __init__(self, clone: Workspace, source: str, anchor: Anchor, model: str, **params: Value) -> None:
         models = clone.fault_models()
@@ -42,7 +42,8 @@ class Toy:
         self.steps = 0
 
     def run(self, marks: str, *arguments: Any) -> list[Any]:
-        """The result of `f` in each step; the fault is active at an `x`. Each argument is called."""
+        """Return the result of `f` in each step. The fault is active in a step marked `x`. Each argument
+        is called to get its value."""
         found = []
         for mark in marks:
             lead = 15.0 if mark == "x" else 20.0
@@ -61,7 +62,7 @@ def toy(clone: Workspace) -> Make:
 
 
 def counting() -> Callable[[], int]:
-    """A function that returns how often it was called: 1, 2, ..."""
+    """A function that returns the number of calls so far: 1, 2, ..."""
     calls: list[None] = []
 
     def count() -> int:
@@ -76,14 +77,15 @@ def counting() -> Callable[[], int]:
     [(AnchorKind.AFTER_ASSIGN, "y"), (AnchorKind.ASSIGNED_VALUE, "y"), (AnchorKind.VALUE, "x")],
 )
 def test_a_stale_value(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The value is that of two steps ago, the first one until then; each stretch of activity starts again."""
+    """The value is the one from two steps ago, or the first one until then. Each active stretch starts
+    again."""
     params = {"target": "y"} if kind is AnchorKind.AFTER_ASSIGN else {}
     made = toy("def f(x):\n    y = x\n    return y\n", kind, name, "stale", steps=2, **params)
     assert made.run(".xxxx.xx", counting()) == [1, 2, 2, 2, 3, 6, 7, 7]
 
 
 def test_steps_are_counted_and_not_executions(toy: Make) -> None:
-    """If a statement runs twice a step, the newest value of an older step counts."""
+    """If a statement runs twice in a step, the newest value of an earlier step is used."""
     made = toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "x", "stale", steps=1)
     count, f = counting(), made.names["f"]
     made.names["f"] = lambda x: (f(x), f(count()))
@@ -91,14 +93,15 @@ def test_steps_are_counted_and_not_executions(toy: Make) -> None:
 
 
 def test_a_slow_call(toy: Make) -> None:
-    """During a slow call no other is made; at its end it returns its result, and the next begins."""
+    """While a slow call lasts, no other call is made. When it ends, its result is returned, and the next
+    call begins."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
     count = counting()
     assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
 
 
 def test_a_call_that_fails_is_none_that_was_made(toy: Make) -> None:
-    """An exception in the call propagates, and the next step makes the call again."""
+    """An exception in the call propagates, and the next step repeats the call."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=1.0)
     with pytest.raises(ZeroDivisionError):
         made.run("x", lambda: lambda: 1 / 0)
@@ -122,14 +125,14 @@ def test_a_statement_that_assigns_may_be_repeated(toy: Make) -> None:
 
 
 def test_a_value_that_is_calculated_twice(toy: Make) -> None:
-    """The second calculation counts."""
+    """The result of the second calculation is used."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "repetition")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, 3, 4]
 
 
 def test_a_message_that_is_dropped(toy: Make) -> None:
-    """An omitted statement does nothing."""
+    """An omitted statement has no effect."""
     sent: list[int] = []
     made = toy("def f(x):\n    put(x)\n", AnchorKind.BEFORE_CALL, "put", "omission")
     made.names["put"] = sent.append
@@ -152,7 +155,7 @@ REORDERED = """def f(x):
 
 
 def test_two_statements_exchanged(toy: Make) -> None:
-    """The next statement runs first while the fault is active; otherwise nothing changes."""
+    """While the fault is active, the next statement runs first. Otherwise nothing changes."""
     source = REORDERED.replace("y = x", "x = x * 2").replace("y = y +", "y = x +")
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "x", "reordering")
     assert made.run(".x.", lambda: 1) == [12, 11, 12]
@@ -162,7 +165,7 @@ def test_two_statements_exchanged(toy: Make) -> None:
 
 
 def test_the_target_raises_where_order_matters(toy: Make) -> None:
-    """A name that is not yet set raises the usual error."""
+    """Reading a name that is not set yet raises the usual error."""
     source = "def f(x):\n    y = x\n    z = y\n    return z\n"
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
     assert made.run(".", lambda: 1) == [1]
@@ -182,25 +185,25 @@ def test_the_target_raises_where_order_matters(toy: Make) -> None:
     ],
 )
 def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
-    """Statements that cannot be exchanged are refused with line and reason."""
+    """Statements that cannot be exchanged are refused with the line and the reason."""
     with pytest.raises(MutatorError, match=rf"m.py:2: .*{said}"):
         toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
 
 
 def test_no_statement_to_repeat(toy: Make) -> None:
-    """A function's entry has no statement to repeat."""
+    """The entry of a function is refused, because it has no statement to repeat."""
     with pytest.raises(MutatorError, match="no statement that is alone on its lines"):
         toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
 
 
 def test_a_return_is_not_repeated(toy: Make) -> None:
-    """A return ends the function, so it is refused; its result can be repeated."""
+    """A return statement is refused, because it ends the function. Its result can be repeated."""
     with pytest.raises(MutatorError, match=r"`return g\(x\)` is the last thing that its block does"):
         toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
 
 
 def test_arguments_that_are_swapped(toy: Make) -> None:
-    """The values change places, with or without keywords; the others keep their order."""
+    """The two values are exchanged, with or without keywords. The other arguments keep their order."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
     made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
     assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
@@ -211,7 +214,7 @@ def test_arguments_that_are_swapped(toy: Make) -> None:
     [("g(x)", 1, 2), ("g(x, y)", 2, 2), ("g(x, *y)", 1, 2), ("g(x, **y)", 2, 1), ("g()", 1, 2)],
 )
 def test_arguments_that_cannot_be_swapped(toy: Make, call: str, first: int, second: int) -> None:
-    """A swap needs two different arguments without stars."""
+    """An exchange needs two different arguments without stars."""
     with pytest.raises(MutatorError, match="expected two different ones, counted from 1, without stars"):
         toy(
             f"def f(x, y):\n    return {call}\n",
@@ -226,7 +229,7 @@ def test_arguments_that_cannot_be_swapped(toy: Make, call: str, first: int, seco
 @pytest.mark.parametrize("model", ["slow_call", "swapped_arguments"])
 @pytest.mark.parametrize(("kind", "name"), [(AnchorKind.VALUE, "x + 1"), (AnchorKind.AFTER_ASSIGN, "y")])
 def test_no_call(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
-    """A model that needs a call is refused elsewhere, with the anchor that it needs."""
+    """A model that needs a call is refused at other places. The error names the anchor that it needs."""
     params: dict[str, Value] = {"duration": 1.0} if model == "slow_call" else {"first": 1, "second": 2}
     with pytest.raises(
         MutatorError, match=rf"m.py:2: model {model} needs more than .*; expected a call: an anchor `result`"
@@ -238,7 +241,7 @@ def test_no_call(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
     ("holds", "taken"), [("inverted", [1, 2, 2]), ("always", [1, 1, 1]), ("never", [2, 2, 2])]
 )
 def test_a_wrong_branch(toy: Make, holds: str, taken: list[int]) -> None:
-    """A condition is negated, true or false while the fault is active, and is still evaluated."""
+    """While the fault is active, a condition is negated, true or false. It is still evaluated."""
     asked: list[int] = []
     source = "def f(x):\n    if ask(x):\n        return 1\n    return 2\n"
     made = toy(source, AnchorKind.CONDITION, "ask(x)", "wrong_branch", holds=holds)
@@ -258,7 +261,7 @@ def test_a_wrong_branch(toy: Make, holds: str, taken: list[int]) -> None:
     ],
 )
 def test_an_exception(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The exception is raised while the fault is active, at a statement and in an expression."""
+    """While the fault is active, the exception is raised, both at a statement and in an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
     with pytest.raises(TimeoutError, match="injected fault"):
@@ -266,14 +269,15 @@ def test_an_exception(toy: Make, kind: AnchorKind, name: str) -> None:
 
 
 def test_none_is_what_a_call_gives(toy: Make) -> None:
-    """The call is made, and its result is lost."""
+    """The call is made, and its result is discarded."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "none")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, None, 3]
 
 
 def test_a_drift_of_an_expression(toy: Make) -> None:
-    """The drift grows with every active step; one that stays needs a statement."""
+    """The drift grows with every active step. A drift that stays after the fault needs a statement, so an
+    expression is refused."""
     source = "def f(x):\n    return x\n"
     made = toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5)
     assert made.run(".xx.x", lambda: 1) == [1, 1.5, 2.0, 1, 2.5]
@@ -306,7 +310,7 @@ def test_a_drift_of_an_expression(toy: Make) -> None:
 def test_parameters_that_do_not_go_together(
     toy: Make, model: str, params: dict[str, Value], said: str
 ) -> None:
-    """Contradictory parameters are refused with a specific message."""
+    """Each contradiction between parameters is refused with a specific message."""
     with pytest.raises(MutatorError, match=said):
         toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", model, **params)
 
@@ -315,7 +319,7 @@ def test_parameters_that_do_not_go_together(
     ("value", "index"), [(b"ab", 2), (b"ab", -3), (b"", 0), ("ab", 0), (3, 0), (bytearray(), 0)]
 )
 def test_bytes_that_are_not_there(toy: Make, value: Any, index: int) -> None:
-    """A value without such a byte is an error and is not passed on unchanged."""
+    """If the value does not have the byte, an error is raised. The value is not passed on unchanged."""
     made = toy(
         "def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", "byte_corruption", index=index, mask=1
     )

@@ -1,4 +1,4 @@
-"""Sources with the same normalized source either all compile or all fail."""
+"""Either all sources with the same normalized source compile, or none."""
 
 import pytest
 from hypothesis import example, given, settings
@@ -30,12 +30,12 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
     ],
 )
 def test_what_counts_as_a_number(text: str, kept: str) -> None:
-    """Decimal integer literals of a usual length become a zero of their kind; nothing else changes."""
+    """Decimal integers of usual length become a zero with the same form. All other text is unchanged."""
     assert normalized(text, ()) == kept
 
 
 def test_ids_stay_apart() -> None:
-    """Equal ids stay equal and different ones different, whatever they are."""
+    """After normalization, equal ids are still equal, and different ids are still different."""
     ids = ("00000001", "deadbeef")
     text = "a('00000001'); b('deadbeef', '00000001')"
     assert normalized(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
@@ -43,32 +43,32 @@ def test_ids_stay_apart() -> None:
 
 
 def test_where_the_value_matters() -> None:
-    """If the compiler depends on the id or number, the normalized source does not compile."""
+    """If compiling depends on the id or the number, the normalized source does not compile."""
     assert compiles(b"x = 12345678")
     assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
     assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
     assert not compiles(normalized(r"x = '\U0000abcd'", ["0000abcd"]).encode())
 
 
-@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@pytest.mark.filterwarnings("ignore")  # about escapes in the generated texts
 @settings(deadline=None)
 @given(st.sampled_from(AROUND), NUMBERS)
 @example("x = {}", "07")
 def test_numbers(around: str, number: str) -> None:
-    """If the normalized source compiles, so does the source."""
+    """If the normalized source compiles, so does the source with any number."""
     text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, ()).encode()):
         compile(text, "x", "exec")
 
 
-@pytest.mark.filterwarnings("ignore")  # of escapes in the generated texts
+@pytest.mark.filterwarnings("ignore")  # about escapes in the generated texts
 @settings(deadline=None)
 @given(st.sampled_from(AROUND), IDS)
 @example("x = {}", "12345678")
 @example("x = {}", "abcdefab")
 @example("x = 1{}", "00000000")
 def test_ids(around: str, name: str) -> None:
-    """If the normalized source compiles, so does the source with any id in its place."""
+    """If the normalized source compiles, so does the source with any id."""
     text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, [name]).encode()):
         compile(text, "x", "exec")

@@ -1,4 +1,4 @@
-"""Files are refused if Python or LibCST cannot read them, or if LibCST loses part of them."""
+"""A file is refused if Python or LibCST cannot read it, or if LibCST loses part of it."""
 
 from pathlib import Path
 
@@ -32,7 +32,7 @@ BODY = "def f(x):\n    x = 1\n    return x\n"
     ],
 )
 def test_files_that_are_refused(source: str, line: int | None, said: str) -> None:
-    """The error names the file, the first faulty line, the reason and the remedy."""
+    """The error names the file, the first invalid line, the reason and the remedy."""
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source.encode("latin-1" if "latin" in source else "utf-8"), Path("root"))
     error = caught.value
@@ -54,7 +54,6 @@ def test_files_that_are_refused(source: str, line: int | None, said: str) -> Non
     ],
 )
 def test_files_that_are_not(source: str) -> None:
-    """Byte order marks, CRLF, continued lines, form feeds and odd spaces are preserved, so the file is
-    accepted.
-    """
+    """Files with byte order marks, CRLF, continued lines, form feeds or odd spaces are accepted, because
+    all of these are preserved."""
     assert parse_file("m.py", source.encode(), Path("root")).data == source.encode()

@@ -1,4 +1,4 @@
-"""Patches apply with `patch -p1` and undo with `-R`."""
+"""Patches apply with `patch -p1` and can be undone with `-R`."""
 
 import shutil
 import subprocess
@@ -15,7 +15,8 @@ BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
 
 
 def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
-    """(patch, new bytes) for insertions after assignments to `names`, and an import of the probe."""
+    """Return the patch and the new bytes for insertions after assignments to `names` and an import of the
+    probe."""
     file = parse_file("pack/m.py", data, Path("root"))
     edits = [splicing.probe_import(file, "pack")]
     for name in names:
@@ -43,7 +44,7 @@ def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
     ],
 )
 def test_patch_applies_and_reverses(tmp_path: Path, text: str, names: list[str], guard: bool) -> None:
-    """GNU patch turns the original into exactly the mutated bytes, and back."""
+    """GNU patch turns the original into exactly the mutated bytes, and restores it with `-R`."""
     if shutil.which("patch") is None:
         pytest.skip("no patch on this machine")
     data = text.encode("latin-1" if "latin" in text else "utf-8")
@@ -68,12 +69,12 @@ def test_hunks_are_joined_when_close() -> None:
 
 
 def test_names_with_spaces() -> None:
-    """A file name with a space ends in a tab, as patch requires."""
+    """As patch requires, a file name with a space is followed by a tab."""
     assert "+++ b/a file.py\t\n" in patches.new_file("a file.py", "x = 1\n")
 
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
 def test_a_new_file(end: str, told: str) -> None:
-    """Every line is an added one, even an empty one; a missing line end is marked."""
+    """For a new file, every line is an added one, even if it is empty. A missing line end is marked."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
     assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

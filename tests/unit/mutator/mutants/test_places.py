@@ -1,4 +1,4 @@
-"""LibCST and `ast` agree on places; a statement on which they disagree is no anchor."""
+"""LibCST and `ast` must agree on the place of a statement. Otherwise the statement cannot be an anchor."""
 
 import ast
 from pathlib import Path
@@ -30,7 +30,7 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 
 def test_both_parsers_tell_the_same_places() -> None:
-    """Statements of every kind and functions have one place, whatever precedes them on their lines."""
+    """A statement of any kind and a function have one place, whatever precedes them on their line."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -45,7 +45,7 @@ def test_both_parsers_tell_the_same_places() -> None:
 
 @pytest.mark.parametrize("kind", [AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_RETURN, AnchorKind.ENTRY])
 def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If `ast` sees the anchored statement a line further down, it is refused with its line."""
+    """If `ast` finds the anchored statement one line further down, the statement is refused with its line."""
     later = places_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.places_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
@@ -57,7 +57,7 @@ def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.Mon
 
 
 def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Even without comparing the file's bytes, the statement is refused."""
+    """The statement is refused even if the check of the whole file's bytes is left out."""
 
     def unchecked(data: bytes, where: Path) -> object:
         module = cst.parse_module(data)
@@ -82,9 +82,8 @@ def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
     ],
 )
 def test_where_a_line_of_statements_ends(line: str, after: int) -> None:
-    """Lines that backslashes add after the last statement belong to it; a backslash in a comment
-    adds none.
-    """
+    """Lines that backslashes add after the last statement belong to it. A backslash in a comment adds no
+    line."""
     module = cst.parse_module(line + "\n")
     positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     first = module.body[0]

@@ -1,4 +1,4 @@
-"""The probe at run time: triggers, holds, counts and memory."""
+"""The probe in a run: triggers, holds, counts and stored values."""
 
 import copy
 import math
@@ -22,7 +22,7 @@ from mutator.workspace import Workspace
 def probe(
     clone: Workspace, condition: str = "rs > 0", observation: Observation | None = None, **more: Any
 ) -> Any:
-    """A fresh probe module with two injections, `a` and `b`."""
+    """A new probe module with two injections, `a` and `b`."""
     observation = observation or clone.manifest("openpilot").observation
     trigger = Trigger(name="test", condition=check_condition(condition))
     values = contract.template_values("m1", trigger, Hold.WHILE, ("a", "b"), observation, 0.1) | more
@@ -33,7 +33,8 @@ def probe(
 
 
 def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
-    """Observe one step per character, the lead slower than the host at an `x`; return what was active."""
+    """Observe one step per character. At an `x`, the lead is slower than the car. Return the active steps
+    as `x`."""
     seen = ""
     for i, mark in enumerate(lead_speeds):
         fi.observe(t=start + i * 0.1, d_rel=40.0, v_ego=20.0, v_lead=15.0 if mark == "x" else 20.0)
@@ -53,15 +54,15 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
     ],
 )
 def test_hold_and_arming(clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str) -> None:
-    """Once armed, a fault is active while its condition holds, for a time after it, or for ever."""
+    """Once armed, a fault is active while its condition holds, for a time after that, or to the end of the
+    run."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 
 
 def test_report(clone: Workspace) -> None:
-    """The report has the trigger's activity and each injection's executions, including injections that never
-    ran.
-    """
+    """The report has the times of the trigger's activity and of each injection's executions, even for an
+    injection that never ran."""
     fi = probe(clone)
     drive(fi, "..xx.x")
     assert fi.report() == {
@@ -75,14 +76,14 @@ def test_report(clone: Workspace) -> None:
 
 
 def test_nothing_before_the_first_observation(clone: Workspace) -> None:
-    """Injected statements that run before any ground truth stay inactive."""
+    """Injected statements that run before the first observation are inactive."""
     fi = probe(clone, condition="True")
     assert not fi.active("a")
     assert fi.report()["triggered"] is None
 
 
 def test_a_new_run_starts_afresh(clone: Workspace) -> None:
-    """When time restarts at or before the previous run's start, the probe forgets that run."""
+    """If time goes back to the previous run's start or earlier, the probe discards that run's state."""
     fi = probe(clone, hold="to_end")
     assert drive(fi, ".x.", start=0.9) == ".xx"
     assert drive(fi, "..x", start=0.9) == "..x"
@@ -102,9 +103,9 @@ def test_a_new_run_starts_afresh(clone: Workspace) -> None:
     ],
 )
 def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...], said: str) -> None:
-    """An observation at the same time as the one before, or between those of a run, is an error.
+    """An observation at the time of the previous one, or at an earlier time within the run, is an error.
 
-    The probe repeats it in its report, in case the target caught it.
+    The probe also puts the error into its report, in case the target catches it.
     """
     fi = probe(clone)
     *before, last = times
@@ -117,7 +118,7 @@ def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...]
 
 
 def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
-    """Ground truth that is not a number is a probe error, also in the report."""
+    """An observed value that is not a number is an error of the probe, which is also in the report."""
     fi = probe(clone)
     with pytest.raises(TypeError, match="NoneType"):
         fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
@@ -126,7 +127,7 @@ def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
 
 
 def test_step_limit(clone: Workspace) -> None:
-    """A run stops in the step after its limit; a new run has the whole limit again."""
+    """A run stops in the step after its limit. The full limit applies to the next run."""
     fi = probe(clone)
     fi.limit(3)
     drive(fi, "...")
@@ -136,7 +137,7 @@ def test_step_limit(clone: Workspace) -> None:
 
 
 def test_values_have_any_name(clone: Workspace) -> None:
-    """Observed values may have the names of the probe's own variables."""
+    """Observed values may have the names of the probe's variables."""
     names = ("run", "values", "error", "active", "float", "map")
     read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
     observed = replace(clone.manifest("openpilot").observation, values=read, derived=())
@@ -148,14 +149,15 @@ def test_values_have_any_name(clone: Workspace) -> None:
 
 
 def test_derived_variables(clone: Workspace) -> None:
-    """Headway is infinite at standstill; relative speed is own minus lead's; division never raises."""
+    """Headway is infinite at standstill, relative speed is the own speed minus the lead's, and division
+    never raises."""
     fi = probe(clone, condition="hwt > 1e6 and rs == -3 and 1 / v_ego > 5")
     fi.observe(t=0.0, d_rel=10.0, v_ego=0.0, v_lead=3.0)
     assert fi.active("a")
 
 
 def test_probe_and_planner_agree(clone: Workspace) -> None:
-    """The probe decides like `trigger.evaluate`, on observations with edge cases of every kind."""
+    """For observations with edge cases of every kind, the probe decides as `trigger.evaluate` does."""
     stream = random.Random(1)
     conditions = ["hwt <= 2 and rs > 0", "d_rel / rs < 3 or not t > 1", "1 <= v_ego / v_lead < abs(rs) * 2"]
     for condition in conditions:
@@ -172,7 +174,7 @@ def test_probe_and_planner_agree(clone: Workspace) -> None:
 
 
 def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
-    """`steps` grows by one in each active observation, however often an injection runs."""
+    """`steps` grows by one in each active observation, regardless of how often an injection runs."""
     fi = probe(clone)
     drive(fi, "xx.x")
     for _ in range(5):
@@ -181,7 +183,7 @@ def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
 
 
 def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> None:
-    """Remembered values and the time restart when the fault becomes active again."""
+    """Stored values and the active time are reset when the fault becomes active again."""
     fi = probe(clone)
     seen = []
     for i, mark in enumerate(".xxx.xx"):
@@ -192,7 +194,7 @@ def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> N
 
 
 def test_delay(clone: Workspace) -> None:
-    """The first value is held until a value is old enough; then the delay stays constant."""
+    """The first value is returned until another value is old enough. From then on, the delay is constant."""
     fi = probe(clone, condition="t >= 0.2")
     seen = []
     for i in range(8):
@@ -203,7 +205,8 @@ def test_delay(clone: Workspace) -> None:
 
 
 def test_kept_for_a_whole_run(clone: Workspace) -> None:
-    """An injection's stored values outlive its stretches of activity, are separate, and end with the run."""
+    """An injection's stored values are kept between its active stretches, separate from other injections,
+    and are discarded at the end of the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -216,7 +219,8 @@ def test_kept_for_a_whole_run(clone: Workspace) -> None:
 
 
 def test_noise_repeats_with_every_run(clone: Workspace) -> None:
-    """Noise depends only on its seed, differs between seeds, and leaves the shared generator unchanged."""
+    """Noise depends only on its seed, so different seeds give different noise. The shared generator is
+    unchanged."""
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
@@ -258,9 +262,8 @@ FLIPS = [
 
 @pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
 def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
-    """Flipping a bit changes a number, or each of an array, in its representation; it keeps the type and the
-    original value, and a second flip restores it.
-    """
+    """Flipping a bit changes a number, or each number of an array, and keeps its type. The original value
+    is not modified, and a second flip restores it."""
     fi, before = probe(clone), copy.deepcopy(value)
     flipped = fi.flip_bit(value, bit)
     assert np.array_equal(flipped, result)
@@ -282,7 +285,8 @@ def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
     ],
 )
 def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None:
-    """A bit outside the type is an error that names the type, as is a bit of a value without such a type."""
+    """A bit outside the type is an error that names the type. A value without such a type is an error,
+    too."""
     with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
         probe(clone).flip_bit(value, bit)
 
@@ -307,9 +311,8 @@ def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None
     ],
 )
 def test_a_number_like_the_value(clone: Workspace, value: Any, number: float, kind: type) -> None:
-    """A whole number becomes an integer next to an integer, of numpy, too, or next to an array of them;
-    otherwise not.
-    """
+    """A whole number becomes an integer if the value is an integer, a numpy integer, or an array of
+    integers. Otherwise it stays as it is."""
     found = probe(clone).like(value, number)
     assert type(found) is kind
     assert found == number or math.isnan(number)

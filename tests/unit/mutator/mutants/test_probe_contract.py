@@ -1,4 +1,4 @@
-"""The probe's contract: it recognizes what it writes, and reads a probe's report."""
+"""The contract with the probe: the harness recognizes the text of a probe and reads its report."""
 
 import json
 import math
@@ -22,27 +22,27 @@ MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 
 def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
-    """The text of a probe, rendered like a mutant's."""
+    """The text of a probe, rendered as in a mutant."""
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     values = contract.template_values(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
     return render(models.probe, values, models.folder / "_fi.py.j2")
 
 
 def module(clone: Workspace) -> Any:
-    """A fresh probe as a module."""
+    """Load a new probe as a module."""
     made = types.ModuleType("_fi")
     exec(source(clone), made.__dict__)
     return made
 
 
 def see(fi: Any, *, near: bool) -> None:
-    """Observe a step and return whether the first injection is active."""
+    """Observe one step and return whether the first injection is active."""
     fi.observe(t=1.0 if near else 0.5, d_rel=20.0 if near else 200.0, v_ego=20.0, v_lead=15.0)
     assert fi.active(IDS[0]) is near
 
 
 def test_the_decision_is_the_probes(clone: Workspace) -> None:
-    """A probe asked directly is first active when `observe` says so."""
+    """A probe's decision, evaluated without a run, agrees with `observe` in the first active step."""
     code = compile(source(clone), "_fi", "exec")
     armed_t, holds = contract.decision(code)
     module: dict[str, Any] = {}
@@ -56,7 +56,7 @@ def test_the_decision_is_the_probes(clone: Workspace) -> None:
 
 
 def test_settings_are_all_that_differs(clone: Workspace) -> None:
-    """Probes of two triggers differ only in their settings, which are found by name."""
+    """The probes of two triggers differ only in their settings, which can be found by name."""
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):
@@ -78,14 +78,14 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
 
 
 def test_a_hold_time_is_needed(clone: Workspace) -> None:
-    """A trigger that holds for a time needs that time."""
+    """A trigger with a hold for a time needs the length of that time."""
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="holds for a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
 
 
 def test_a_condition_asks_for_what_the_target_observes(clone: Workspace) -> None:
-    """Any other name is refused with the known ones."""
+    """Other names are refused with the known ones."""
     observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
     with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
         contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
@@ -99,12 +99,13 @@ RAN = {"first": 0.5, "last": 2.0, "count": 3}
     "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
 )
 def test_no_activation(report: dict[str, Any]) -> None:
-    """A report without an executed injection has no activation."""
+    """If no injection was executed, the report has no activation."""
     assert contract.activation_of(report) is None
 
 
 def test_reports_are_read(clone: Workspace) -> None:
-    """Injections count together; the report of a mutant that never triggers reads like a probe's own."""
+    """All injections count together. The report of a mutant that never triggers is read like a probe's
+    report."""
     early = {"first": 0.25, "last": 0.75, "count": 1}
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
@@ -124,7 +125,7 @@ SOUND = {
 
 
 def test_sound_reports(clone: Workspace) -> None:
-    """Valid reports of active and inactive faults have no findings."""
+    """Valid reports of active and inactive faults give no findings."""
     assert contract.report_problem(SOUND, "m", ("a", "b")) == ""
     fi = module(clone)
     for near in (False, True):
@@ -162,6 +163,6 @@ def test_sound_reports(clone: Workspace) -> None:
     ],
 )
 def test_damaged_reports(change: Any, said: str) -> None:
-    """Wrong keys, types, numbers and contradictions in a report are found."""
+    """Wrong keys, types and numbers in a report are found, and so are contradictions."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))

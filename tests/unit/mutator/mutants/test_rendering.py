@@ -1,4 +1,5 @@
-"""Rendering: values become literals, names are checked, and templates cannot reach outside."""
+"""Rendering templates: values become literals, names are checked, and templates have no access to anything
+else."""
 
 import copy
 import math
@@ -59,9 +60,8 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
     ],
 )
 def test_values_are_literals(value: float, plain: str, added: str) -> None:
-    """Numbers are written exactly, non-finite ones so that Python understands them; whole-number terms have
-    no point, so that an integer stays one.
-    """
+    """Numbers are written exactly, and non-finite ones in a form that Python reads. A whole number has no
+    decimal point, so that an integer variable stays an integer."""
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -70,14 +70,14 @@ def test_values_are_literals(value: float, plain: str, added: str) -> None:
     "name", ["x y", "x;y", "import", "x.class", "1x", "", "_fi.active", "x\ny", 3.0, None]
 )
 def test_names_are_checked(name: Value) -> None:
-    """A variable's place accepts only chains of identifiers."""
+    """A variable is accepted only as a chain of identifiers."""
     with pytest.raises(MutatorError):
         rendered("{{ target }} = 1\n", target=name)
 
 
 @pytest.mark.parametrize("name", ["os;x", "a.b c", "a..b", ".a", "a.import", 1, None])
 def test_imported_names_are_checked(name: Value) -> None:
-    """An imported name must be a chain of identifiers, too."""
+    """An imported name is accepted only as a chain of identifiers."""
     imports = ParamSchema(name="what", type="import", about="")
     made = replace(model("from {{ what }} import x\n"), params=(imports,))
     assert snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
@@ -86,7 +86,7 @@ def test_imported_names_are_checked(name: Value) -> None:
 
 
 def test_text_is_no_number() -> None:
-    """A number's place accepts no text, not even a harmless name."""
+    """Text is refused where a number is expected, even a harmless name."""
     with pytest.raises(MutatorError, match="'os' for 'by'; expected a number"):
         rendered("{{ target }} = {{ by }}\n", by="os")
 
@@ -121,7 +121,7 @@ def test_text_is_no_number() -> None:
     ],
 )
 def test_a_template_that_fails(template: str, pieces: list[str]) -> None:
-    """The error names the template, its line if there is one, and the reason."""
+    """The error names the template, the line if it is known, and the reason."""
     with pytest.raises(MutatorError) as caught:
         rendered(template)
     for piece in pieces:
@@ -147,16 +147,16 @@ def test_a_guard_opens_a_block() -> None:
     ],
 )
 def test_a_value_holds_together(template: str, text: str) -> None:
-    """A template's expression holds together next to the `if` that asks the probe, with brackets if
-    needed.
-    """
+    """A template's expression remains one operand of the `if` that asks the probe. Brackets are added if
+    it needs them."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
 
 @pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
 def test_a_value_is_an_expression(template: str) -> None:
-    """A value is an expression on one line without a comment, which would end the line early."""
+    """A value must be one expression on one line, without a comment, which would hide the rest of the
+    line."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     with pytest.raises(MutatorError, match="expected one expression on one line"):
         changed_value(made, {"by": 1.0}, "ab12", "y")
@@ -164,7 +164,7 @@ def test_a_value_is_an_expression(template: str) -> None:
 
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
 def test_a_target_is_a_name_and_nothing_else(target: Value) -> None:
-    """A target is a plain name: a comment in it would disable the assignment."""
+    """A target must be a plain name. A comment in it would disable the assignment."""
     made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):
@@ -186,7 +186,7 @@ CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
     ],
 )
 def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
-    """A constant is written by `repr` on one line; None differs from a missing constant."""
+    """A constant is written with `repr` on one line. None is distinguished from a missing constant."""
     template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
     assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
 
@@ -260,7 +260,7 @@ def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
 def test_values_keep_their_kind(
     clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
 ) -> None:
-    """A fault keeps a variable's type: an integer stays one if the parameters are whole numbers."""
+    """A fault keeps the type of a variable: an integer stays one if the parameters are whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}

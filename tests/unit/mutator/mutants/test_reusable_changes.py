@@ -1,4 +1,4 @@
-"""Reusable changes give what splicing gives, in files of every form."""
+"""Reusable changes give the same result as splicing, in files of every form."""
 
 import shutil
 from pathlib import Path
@@ -34,7 +34,8 @@ SENSOR = "toycar/sensor.py"
 
 
 def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange, Change, list[bytes], bool]:
-    """The reusable change, the spliced one, its inserted lines, and whether all of its kind compile."""
+    """Return the reusable change, the spliced change, the inserted lines, and whether all changes of this
+    kind compile."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
     kind = AnchorKind.BEFORE_ASSIGN if guard else AnchorKind.AFTER_ASSIGN
     site = file.resolve(FaultLocation(path="m.py", function="f", anchor=Anchor(kind=kind, name="x")))
@@ -50,7 +51,8 @@ def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange
 @pytest.mark.parametrize("guard", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
-    """The reusable change of one mutant, filled with another's lines of the same kind, equals the other's."""
+    """The reusable change of one mutant, filled with the lines of another of the same kind, equals the
+    other mutant's change."""
     code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
     reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
@@ -61,7 +63,8 @@ def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
-    """The same holds if a value changes in the line before inserted lines, including the last line."""
+    """This also holds if a value changes in the line before the inserted lines, even in the last line of
+    the file."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
     def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
@@ -84,12 +87,12 @@ def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
 
 
 def test_a_change_that_compiles_only_with_some_values() -> None:
-    """A change that compiles with some values only is not marked as always compiling."""
+    """A change that compiles only with some values is not marked as one that always compiles."""
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
 
 
 def fault(value: Value, **location: object) -> Fault:
-    """`gap = value` in the toy's sensor, or at another place."""
+    """A fault `gap = value` in the toy's sensor, or at another location."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     place = FaultLocation(**{"path": SENSOR, "function": "Sensor.measure", "anchor": anchor, **location})
     injection = Injection(location=place, model="stuck", params=(("target", "gap"), ("value", value)))
@@ -106,7 +109,8 @@ def fault(value: Value, **location: object) -> Fault:
 
 
 def test_a_change_is_spliced_once(toy: Workspace) -> None:
-    """Another number reuses the change; a sign, another type or a non-finite value does not."""
+    """The change is reused for another number, but not for another sign, another type or a non-finite
+    value."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
     known = known_changes(manifest.tree, SENSOR)
     counts = []
@@ -119,7 +123,7 @@ def test_a_change_is_spliced_once(toy: Workspace) -> None:
 
 
 def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
-    """A mutant that cannot be built gets the same error, even after one of its kind was built."""
+    """A mutant that cannot be built gets the same error after another mutant of its kind was built."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
         "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"

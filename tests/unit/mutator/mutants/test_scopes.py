@@ -1,4 +1,4 @@
-"""Scopes: the names that a function knows, and those that inserted lines would change."""
+"""Scopes: the names that a function knows, and the names whose meaning inserted lines would change."""
 
 import pytest
 
@@ -18,9 +18,8 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 
 
 def test_names_of_functions() -> None:
-    """A function knows its variables and the outer names it uses, but not those that only inner functions
-    use.
-    """
+    """A function knows its variables and the outer names that it uses. It does not know names that only
+    inner functions use."""
     names = function_names(SOURCE.encode())
     go = names[4, "go"]
     assert {"self", "x", "__own", "limit", "inner", "max"} <= go
@@ -30,7 +29,7 @@ def test_names_of_functions() -> None:
 
 
 def test_sources_of_any_encoding() -> None:
-    """The declared encoding counts, and so does a byte order mark."""
+    """The file's declared encoding or byte order mark is used."""
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
     assert function_names(latin) == {(2, "f"): {"\xe9"}}
     assert function_names("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
@@ -73,9 +72,8 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
     ],
 )  # fmt: skip
 def test_names_that_move(source: str, inserted: str, moved: tuple[str, str, str, str] | None) -> None:
-    """Any binding makes a name local to its function and hides it from inner ones, unless it was local or
-    declared. Names of attributes, arguments and comprehensions are separate.
-    """
+    """Any binding makes a name local to its function and hides it from inner functions, unless the name
+    was local or declared before. Attributes, arguments and comprehensions have separate names."""
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

@@ -1,4 +1,4 @@
-"""The splicer on the source shapes of real trees."""
+"""The splicer, on the shapes of source found in real trees."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def edit(
 
 
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
-    """The mutated bytes; they must compile and un-splice."""
+    """The mutated bytes. The function checks that they compile and that the original can be restored."""
     file = parsed(text)
     result = splicing.joined(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
@@ -35,7 +35,8 @@ def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool
 
 
 def test_after_and_before() -> None:
-    """Lines go directly after or before the statement, at its indentation, each with its tag."""
+    """Lines are inserted directly after or before the statement, with its indentation and with a tag on
+    each."""
     text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
     assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
         "def f(x):\n    # why\n    x = 1  # set\n"
@@ -78,7 +79,7 @@ def test_after_and_before() -> None:
     ],
 )
 def test_shapes_of_source(text: str | bytes) -> None:
-    """The new lines follow the assignment, nothing else changes, and it un-splices."""
+    """The new lines follow the assignment, no other line changes, and the original can be restored."""
     result = spliced(text, AnchorKind.AFTER_ASSIGN)
     data = text if isinstance(text, bytes) else text.encode()
     added = [line for line in result.splitlines() if b"fi:ab12" in line]
@@ -90,7 +91,7 @@ def test_shapes_of_source(text: str | bytes) -> None:
 
 
 def test_a_guard_indents_the_statement_it_wraps() -> None:
-    """All lines of the statement move one level in, blank ones stay blank."""
+    """All lines of the wrapped statement move in by one level. Blank lines stay blank."""
     text = "def f(x):\n    g(\n        1,\n\n  2)  # why\n    return x\n"
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:4\n'
@@ -99,7 +100,8 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
 
 
 def test_a_guard_leaves_strings_alone() -> None:
-    """If a string spans lines, only the first line moves; otherwise the string would change."""
+    """If a string spans lines, only its first line moves, because moving the others would change the
+    string."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -119,7 +121,7 @@ def test_a_guard_leaves_strings_alone() -> None:
     ],
 )
 def test_guards_in_all_shapes(text: str) -> None:
-    """Tabs, mixed indentation, CRLF and missing newlines are restored exactly."""
+    """Tabs, mixed indentation, CRLF and missing final newlines are restored exactly."""
     assert b"guard:" in spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True)
 
 
@@ -133,16 +135,15 @@ def test_guards_in_all_shapes(text: str) -> None:
     ],
 )
 def test_a_guard_needs_its_statement_alone(text: str, kind: AnchorKind) -> None:
-    """A statement that shares its line, or anything that is no statement, cannot be wrapped."""
+    """A statement that shares its line cannot be wrapped, nor can anything that is not a statement."""
     file = parsed(text)
     with pytest.raises(MutatorError, match="a guard needs a statement to wrap"):
         edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
 
 
 def test_edits_at_one_boundary() -> None:
-    """Lines after a statement come before lines that precede the next one; a guard stays with its
-    statement.
-    """
+    """Lines after a statement come before the lines that precede the next statement. A guard stays with
+    its statement."""
     file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
     edits = [
         edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),
@@ -159,7 +160,7 @@ def test_edits_at_one_boundary() -> None:
 
 
 def test_two_guards_around_one_statement() -> None:
-    """The second omission of a statement is refused."""
+    """A second omission of the same statement is refused."""
     file = parsed("def f(x):\n    g(1)\n")
     guard = edit(file, AnchorKind.BEFORE_CALL, "g", guard=True)
     with pytest.raises(MutatorError, match="two guards around one statement"):
@@ -167,7 +168,7 @@ def test_two_guards_around_one_statement() -> None:
 
 
 def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
-    """The result has no final newline either, whichever edit its last line comes from."""
+    """Without a final newline in the source, the result has none, whichever edit its last line comes from."""
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
     result = splicing.joined(splicing.apply_edits(file, edits))
@@ -176,7 +177,7 @@ def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
 
 
 def test_names_that_the_encoding_lacks() -> None:
-    """A snippet that the file's encoding cannot represent is refused."""
+    """A snippet that cannot be written in the file's encoding is refused."""
     file = parsed("# coding: ascii\ndef f(x):\n    x = 1\n")
     site = file.resolve(
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
@@ -186,7 +187,7 @@ def test_names_that_the_encoding_lacks() -> None:
 
 
 def test_the_probe_is_imported() -> None:
-    """The import goes below docstring and future imports and carries the probe's tag."""
+    """The import is inserted below the docstring and `__future__` imports, and has the probe's tag."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (
@@ -195,7 +196,8 @@ def test_the_probe_is_imported() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """Nothing goes before the mark: an import below a docstring is fine, otherwise it is refused."""
+    """Nothing is inserted before the byte order mark. An import below a docstring is allowed; any other is
+    refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")
