@@ -1,4 +1,4 @@
-"""Packing and parsing agree with cantools on every message the car knows."""
+"""The codec agrees with cantools on every message that the car knows."""
 
 from functools import cache
 
@@ -19,9 +19,7 @@ MESSAGES = [(path, name) for path in (CAR_DBC, RADAR_DBC) for name in load(path)
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
 def test_pack_and_decode_agree_with_cantools(path, name, data):
-    """A frame packed here has the same meaning for cantools, and a frame decoded here reads the same as with
-    cantools.
-    """
+    """Cantools decodes a packed frame to the same values, and the codec decodes a frame as cantools does."""
     message = load(path)[name]
     reference = load_reference(path).get_message_by_name(name)
     signals = [n for n in message.fields if n not in (COUNTER, CHECKSUM)]
@@ -64,7 +62,7 @@ def test_checksum_of_a_known_frame():
     ],
 )
 def test_unsigned_values_round_and_stay_in_range(value, raw):
-    """A value beyond the field is limited to its end, and NaN reads 0."""
+    """A value outside the field's range is limited to the nearest end, and NaN reads 0."""
     field = load(CAR_DBC)["WHEEL_SPEEDS"].fields["WHEEL_SPEED_FL"]
     assert encode([field], [value]) == raw << field.shift
 
@@ -73,13 +71,13 @@ def test_unsigned_values_round_and_stay_in_range(value, raw):
     ("value", "raw"), [(-1e9, 0x7FFF), (1e9, 0x8000), (-0.1, 1), (float("-inf"), 0x7FFF), (float("nan"), 0)]
 )
 def test_signed_values_stay_in_range(value, raw):
-    """The steering angle counts -0.1 degrees a bit and is limited at both ends of its range."""
+    """One bit of the steering angle is -0.1 degrees, and the angle is limited at both ends of its range."""
     field = load(CAR_DBC)["STEERING_SENSORS"].fields["STEER_ANGLE"]
     assert encode([field], [value]) == raw << field.shift
 
 
 def test_a_packer_forgets_its_last_values():
-    """Frames do not depend on earlier ones: the same values and counter give the same bytes."""
+    """A frame does not depend on earlier ones. The same values and counter give the same bytes."""
     used = Packer(load(CAR_DBC)["ENGINE_DATA"], ("XMISSION_SPEED",))
     for kph in (50.0, 50.0, 51.0, 50.0):
         for counter in (0, 1, 5, 4):
@@ -89,7 +87,7 @@ def test_a_packer_forgets_its_last_values():
 
 @pytest.mark.parametrize("path", [CAR_DBC, RADAR_DBC], ids=lambda path: path.name)
 def test_layouts_are_those_cantools_reads(path):
-    """Addresses, sizes, and the place, sign and scale of every signal agree with cantools."""
+    """The address, the size, and the place, sign and scale of every signal agree with cantools."""
     reference = {message.name: message for message in load_reference(path).messages}
     assert list(load(path)) == list(reference)
     for name, message in load(path).items():
@@ -113,7 +111,7 @@ def test_layouts_are_those_cantools_reads(path):
     ],
 )
 def test_other_layouts_are_refused(tmp_path, signal, complaint):
-    """A DBC with a signal this codec cannot lay out is refused when it is read, not misread later."""
+    """The codec refuses a DBC with an unsupported signal layout when it reads the file."""
     dbc = tmp_path / "other.dbc"
     dbc.write_text(f'VERSION ""\nBU_: A\nBO_ 1 M: 8 A\n {signal}\n')
     with pytest.raises(ValueError, match=rf"other\.dbc:4.*{complaint}"):

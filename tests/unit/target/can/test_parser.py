@@ -1,4 +1,4 @@
-"""The parser accepts values only with the right size, checksum and counter, and notices silence."""
+"""The parser accepts only values with a valid size, checksum and counter, and detects missing messages."""
 
 import pytest
 from selfdrive.can.dbc import load
@@ -36,7 +36,7 @@ def test_values_before_the_first_frame(parser):
 
 
 def test_valid_once_every_message_has_come(parser, speed, wheels):
-    """With one message of two the bus is invalid; both make it valid and their values readable."""
+    """The bus is invalid after one of two messages and valid after both. Then their values are readable."""
     parser.update([speed.pack((50.0,), 0)], 0.0)
     assert not parser.valid
     parser.update([speed.pack((51.0,), 1), wheels.pack((52.0,))], 0.01)
@@ -48,7 +48,7 @@ def test_valid_once_every_message_has_come(parser, speed, wheels):
 
 @pytest.mark.parametrize("bit", range(64))
 def test_any_flipped_bit_is_noticed(parser, speed, bit):
-    """A frame with one wrong bit, at any place, never reaches the values."""
+    """A frame with one flipped bit, at any position, never changes the values."""
     frame = speed.pack((50.0,), 0)
     broken = (int.from_bytes(frame.data, "big") ^ (1 << bit)).to_bytes(8, "big")
     parser.update([frame._replace(data=broken)], 0.0)
@@ -64,7 +64,7 @@ def test_frames_of_others_are_ignored(parser, speed, change):
 
 
 def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
-    """A message that has missed more than ten of its periods is invalid, and valid again once it arrives."""
+    """A message is invalid after more than ten missed periods. The next frame makes it valid again."""
     parser.update([speed.pack((50.0,), 0), wheels.pack((50.0,))], 1.0)
     for step in range(1, 11):
         parser.update([wheels.pack((50.0,))], 1.0 + step / 100)
@@ -76,7 +76,7 @@ def test_silence_of_ten_periods_is_borne_eleven_are_not(parser, speed, wheels):
 
 
 def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
-    """At 50 Hz ten missed periods are 0.2 s."""
+    """At 50 Hz, ten missed periods are 0.2 s."""
     parser.update([wheels.pack((50.0,))], 1.0)
     for step in range(1, 21):
         parser.update([speed.pack((50.0,), step)], 1.0 + step / 100)
@@ -86,21 +86,21 @@ def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
 
 
 def test_a_stuck_counter_is_believed_four_times(parser, speed):
-    """Frames with a stuck counter are dropped from the fifth wrong one on."""
+    """Frames with a stuck counter are rejected from the fifth wrong counter on."""
     for repeat in range(8):
         parser.update([speed.pack((float(repeat),), 0)], repeat / 100)
     assert parser.values["ENGINE_DATA"] == pytest.approx((4.0,))
 
 
 def test_a_lost_frame_does_no_harm(parser, speed):
-    """A gap in the counter alone does not reject the frame after it."""
+    """A gap in the counter does not by itself reject the next frame."""
     parser.update([speed.pack((1.0,), 0)], 0.0)
     parser.update([speed.pack((2.0,), 2)], 0.02)
     assert parser.values["ENGINE_DATA"] == pytest.approx((2.0,))
 
 
 def test_counting_right_again_restores_belief(parser, speed):
-    """After too many wrong counters, one right frame makes the message valid again."""
+    """After too many wrong counters, one correct counter makes the message valid again."""
     for repeat in range(8):
         parser.update([speed.pack((1.0,), 0)], repeat / 100)
     for counter in range(1, 5):

@@ -1,4 +1,4 @@
-"""The commands that the Civic's actuators receive for a demand."""
+"""The commands that the car controller sends to the Civic's actuators."""
 
 import cantools
 import pytest
@@ -20,7 +20,7 @@ class Rig:
         self.car = CarState()
 
     def send(self, cycles=2, enabled=True, **demand):
-        """Repeat a demand for some cycles; return the actuators' commands."""
+        """Repeat a demand for some cycles and return the actuators' commands."""
         for _ in range(cycles):
             control = CarControl(enabled=enabled, actuators=Actuators(**demand))
             frames = self.controller.update(control, self.car, self.frame)
@@ -35,7 +35,7 @@ def rig():
 
 
 def test_gas_is_quantised_like_the_original(rig):
-    """Gas is sent as whole pedal counts: the values that the original's plant decoded."""
+    """Gas is sent in whole pedal counts, with the values that the original's plant decoded."""
     assert rig.send(gas=0.011).gas == pytest.approx(0.01094, abs=1e-5)  # 11 counts
     assert rig.send(gas=0.0359).gas == pytest.approx(0.035743, abs=1e-6)  # 36 counts
     assert rig.send(gas=0.0119).gas == pytest.approx(0.01094, abs=1e-5)  # 11.95 counts, truncated
@@ -45,14 +45,14 @@ def test_gas_is_quantised_like_the_original(rig):
 
 
 def test_brake_rises_slowly_and_falls_at_once(rig):
-    """The brake gains at most 0.01 a cycle and is released within the next brake frame."""
+    """The brake rises by at most 0.01 a cycle and is released within the next brake frame."""
     assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.49, abs=0.011)
     assert rig.send(cycles=50, brake=0.8).brake == pytest.approx(0.79, abs=0.004)
     assert rig.send(cycles=2, brake=0.0).brake == 0.0
 
 
 def test_brake_is_quantised_and_never_full(rig):
-    """Brakes have steps of 1/256, truncated, and at most 255 of them."""
+    """Brake commands are truncated to steps of 1/256 and never exceed 255 steps."""
     assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
     rig.send(brake=0.0)
     assert rig.send(cycles=60, brake=0.3).brake == 74 / 256  # 0.29 is 74.24 counts
@@ -61,7 +61,7 @@ def test_brake_is_quantised_and_never_full(rig):
 
 
 def test_brake_hysteresis():
-    """The brake is on from 0.02, off below 0.005, and changes within 0.01 are ignored."""
+    """The brake switches on at 0.02 and off below 0.005. Changes within 0.01 are ignored."""
     hysteresis = BrakeHysteresis()
     assert hysteresis.update(0.019) == 0.0
     assert hysteresis.update(0.021) == pytest.approx(0.011)
@@ -77,7 +77,7 @@ def test_brake_hysteresis():
     ("steer", "taken"), [(1.0, 4096), (-1.0, -4096), (2.5, 4096), (0.1, 409), (-0.1, -409)]
 )
 def test_steering_torque(rig, steer, taken):
-    """Torque is limited to its range, truncated to counts, and keeps its sign: left is positive."""
+    """Torque is limited to its range and truncated to counts. Positive torque steers left."""
     assert rig.send(steer=steer).steer == pytest.approx(taken / 3840)
 
 
@@ -88,7 +88,7 @@ def test_no_torque_while_the_eps_refuses(rig):
 
 
 def test_disabled_means_zero(rig):
-    """Without engagement nothing reaches the actuators, whatever the demand."""
+    """While the system is not engaged, no demand reaches the actuators."""
     rig.send(cycles=30, gas=0.3, brake=0.3, steer=0.3)
     taken = rig.send(enabled=False, gas=0.3, brake=0.3, steer=0.3)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
@@ -96,15 +96,16 @@ def test_disabled_means_zero(rig):
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
 def test_a_demand_that_is_no_number_is_zero(rig, bad):
-    """A NaN from a broken controller becomes no command, and later demands work."""
+    """A NaN demand is sent as zero, and later demands work."""
     taken = rig.send(gas=bad, brake=bad, steer=bad)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
     assert rig.send(cycles=20, brake=0.1).brake > 0.0
 
 
 def test_what_is_sent_when(rig):
-    """Steering is sent every cycle, gas and brake every second, the dashboard every tenth; all frames are
-    valid.
+    """Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth.
+
+    All frames are valid.
     """
     addresses = []
     for frame in range(20):
@@ -132,7 +133,7 @@ def test_what_is_sent_when(rig):
     ],
 )
 def test_what_the_driver_is_shown(rig, control, shown):
-    """Set speed, lead, lanes and warnings reach the dashboard, as decoded by cantools."""
+    """The dashboard shows the set speed, lead, lanes and warnings, as decoded by cantools."""
     values = {}
     for frame in rig.controller.update(CarControl(**control), rig.car, 0):
         values |= DBC.decode_message(frame.address, frame.data, decode_choices=False)
@@ -140,7 +141,7 @@ def test_what_the_driver_is_shown(rig, control, shown):
 
 
 def test_every_command_frame_is_accepted(rig):
-    """The receiving side, which checks counter and checksum, accepts every frame of a long run."""
+    """In a long run, the receiver's check of counter and checksum accepts every frame."""
     parser = rig.receiver._parser
     for cycle in range(40):
         rig.send(cycles=1, steer=0.01 * cycle, gas=0.01 * cycle)

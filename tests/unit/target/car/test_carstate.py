@@ -25,7 +25,7 @@ def pack(name, counter, **signals):
 
 
 def test_an_ordinary_car(reader, bench):
-    """An ordinary car is in drive, belted, closed, with the main switch on and nothing pressed."""
+    """An ordinary car is in drive, belts fastened, doors closed, main switch on, no button pressed."""
     state = read(reader, bench, v_ego=20.0, steer_angle=radians(12.3), steer_rate=radians(-7.0))
     assert state.can_valid and state.cruise_available and state.gear == "drive"
     assert state.v_ego_raw == pytest.approx(20.0, abs=0.002)
@@ -47,7 +47,7 @@ def test_an_ordinary_car(reader, bench):
 
 
 def test_nothing_received_is_unsafe(reader):
-    """Before any frame, the car counts as unfit for engaging."""
+    """Before the first frame, the car does not count as fit to engage."""
     state = reader.update([], 0.0)
     assert not state.can_valid
     assert state.door_open and state.seatbelt_unlatched and state.esp_disabled and state.steer_error
@@ -55,9 +55,9 @@ def test_nothing_received_is_unsafe(reader):
 
 
 def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
-    """Started at 0, the filter passes 26.8 m/s after 0.2 s, reaches 27.1 m/s after 1.03 s, and settles later.
+    """The speed filter starts at 0, passes 26.8 m/s after 0.2 s and overshoots to 27.1 m/s at 1.03 s.
 
-    The original, with its first reading at 0.12 s, shows 27.108 at 1.15 s with a coasting car.
+    The original gets its first reading at 0.12 s and shows 27.108 at 1.15 s with a coasting car.
     """
     estimates = [read(reader, bench, v_ego=26.8224 - 0.00176 * (k + 12)).v_ego for k in range(600)]
     assert estimates[2] == pytest.approx(8.9335, abs=0.01)
@@ -70,7 +70,10 @@ def test_speed_estimate_starts_at_zero_and_overshoots(reader, bench):
     ("wheels", "gearbox", "expected"), [(0.5, 1.0, 1.0), (3.5, 4.5, 4.0), (8.0, 9.0, 8.0)]
 )
 def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
-    """Below 1 m/s only the gearbox counts, above 6 m/s only the wheels, both in equal parts at 3.5 m/s."""
+    """Below 1 m/s only the gearbox speed counts, above 6 m/s only the wheel speed.
+
+    At 3.5 m/s each counts half.
+    """
     kph = wheels * 3.6
     frames = [
         pack("WHEEL_SPEEDS", 0, **{f"WHEEL_SPEED_{w}": kph for w in ("FL", "FR", "RL", "RR")}),
@@ -80,7 +83,7 @@ def test_wheel_and_gearbox_speed_are_blended(reader, wheels, gearbox, expected):
 
 
 def test_standstill(reader, bench):
-    """Below 0.3 m/s the speed reads 0, but only a car that really stands is at standstill."""
+    """Below 0.3 m/s the speed reads 0, but only a stopped car is at standstill."""
     assert read(reader, bench, v_ego=0.0).standstill
     creeping = read(reader, bench, v_ego=0.29)
     assert not creeping.standstill and creeping.v_ego_raw == 0.0
@@ -89,7 +92,7 @@ def test_standstill(reader, bench):
 
 
 def test_button_events(reader, bench):
-    """Pressing and releasing a button gives one event each; a direct change gives a release and a press."""
+    """Pressing and releasing a button gives one event each. A direct change gives a release and a press."""
     read(reader, bench)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == (ButtonEvent("decel", True),)
     assert read(reader, bench, button=CruiseButton.DECEL_SET).buttons == ()
@@ -125,7 +128,7 @@ def test_setting_button(reader):
     ],
 )
 def test_single_signals(reader, bench, name, signals, field):
-    """Each switch and fault bit alone sets its own field."""
+    """Each switch and each fault bit sets only its own field."""
     assert not getattr(read(reader, bench), field)
     assert getattr(reader.update([pack(name, 1, **signals)], 0.01), field)
 
@@ -141,5 +144,5 @@ def test_brake_switch_needs_two_frames(reader, bench):
     ("code", "gear"), [(1, "park"), (2, "reverse"), (4, "neutral"), (8, "drive"), (63, "unknown")]
 )
 def test_gears(reader, code, gear):
-    """Gear codes have their names, an unknown code has none."""
+    """Each known gear code has a name, and an unknown code has none."""
     assert reader.update([pack("GEARBOX", 0, GEAR_SHIFTER=code)], 0.0).gear == gear

@@ -26,13 +26,14 @@ def kinds(state):
 
 
 def test_no_events_without_cause(car, bench):
-    """A car without faults in drive raises no event."""
+    """A car in drive without faults raises no event."""
     assert update(car, bench, v_ego=20.0).events == ()
 
 
 def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
-    """If CAN is lost after 0.10 s, it is invalid from 0.21 s, and an error from the fifth cycle, 0.25 s,
-    until it is back.
+    """If CAN is lost after 0.10 s, it is invalid from 0.21 s.
+
+    From the fifth invalid cycle, at 0.25 s, it is an error until CAN returns.
     """
     for _ in range(11):
         update(car, bench)
@@ -45,21 +46,21 @@ def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
 
 @pytest.mark.parametrize("button", [CruiseButton.DECEL_SET, CruiseButton.RES_ACCEL])
 def test_engaging_happens_on_release(car, bench, button):
-    """Pressing set or resume does nothing yet; releasing it engages."""
+    """Releasing set or resume engages. Pressing does not."""
     update(car, bench)
     assert update(car, bench, button=button).events == ()
     assert kinds(update(car, bench)) == {"button_enable": {"enable"}}
 
 
 def test_cancel_happens_on_press(car, bench):
-    """Cancel takes effect when pressed, not when let go."""
+    """Cancel takes effect when it is pressed."""
     update(car, bench)
     assert kinds(update(car, bench, button=CruiseButton.CANCEL)) == {"button_cancel": {"user_disable"}}
     assert update(car, bench).events == ()
 
 
 def test_gas_pedal(car, bench):
-    """Pressing the gas disengages once; holding it only delays engaging."""
+    """Pressing the gas disengages once. Holding it only delays engaging."""
     update(car, bench)
     first = car.update([pack("POWERTRAIN_DATA", 1, PEDAL_GAS=9)], 0.01)
     assert [e.kinds for e in first.events] == [("no_entry", "user_disable"), ("pre_enable",)]
@@ -92,14 +93,14 @@ def test_brake_pedal(car, bench):
     ],
 )
 def test_conditions(car, bench, name, signals, event, kind):
-    """Each condition of the car refuses engaging and ends it in its own way."""
+    """Each of the car's conditions refuses to engage and disengages in its own way."""
     update(car, bench)
     raised = kinds(car.update([pack(name, 1, **signals)], 0.01))
     assert {"no_entry", kind} <= raised[event]
 
 
 def test_interfaces_share_nothing(bench):
-    """A second interface starts fresh, whatever the first one has seen."""
+    """A second interface does not depend on what the first one received."""
     used, fresh = CarInterface(), CarInterface()
     for _ in range(20):
         frames = bench.frames(v_ego=20.0)

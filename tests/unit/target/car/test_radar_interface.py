@@ -1,4 +1,4 @@
-"""From radar frames to tracks."""
+"""The radar interface turns radar frames into tracks."""
 
 import pytest
 from selfdrive.car.honda.radar_interface import RadarInterface
@@ -18,7 +18,7 @@ def frames(d_rel=50.0, v_rel=-3.0, **truth):
 
 
 def test_a_track(radar):
-    """A track is read in the radar's steps of 1/16 m and 1/32 m/s; left is positive."""
+    """A track has the radar's resolution of 1/16 m and 1/32 m/s, and left is positive."""
     data = radar.update(frames(d_rel=97.681, v_rel=-8.8902, lateral_offset=0.5), 1.0)
     (point,) = data.points
     assert (point.d_rel, point.v_rel, point.y_rel) == (97.625, -8.875, -0.5)
@@ -26,7 +26,7 @@ def test_a_track(radar):
 
 
 def test_no_cycle_no_data(radar):
-    """Steps without the frame that ends a cycle give None, before and after the first cycle."""
+    """A step without the frame that ends a radar cycle returns None, before and after the first cycle."""
     assert radar.update([], 0.0) is None
     state, track = frames()
     assert radar.update([state], 0.05) is None
@@ -35,7 +35,7 @@ def test_no_cycle_no_data(radar):
 
 
 def test_track_ends_at_255_m(radar):
-    """A distance of 255 m or more ends the track; a nearer one afterwards starts a new track."""
+    """A distance of 255 m or more ends the track. A shorter distance afterwards starts a new track."""
     (first,) = radar.update(frames(d_rel=254.9), 0.0).points
     (same,) = radar.update(frames(d_rel=254.0), 0.05).points
     assert radar.update(frames(d_rel=255.0), 0.1).points == ()
@@ -60,5 +60,5 @@ def test_missing_state_frames(radar):
 
 
 def test_car_frames_are_not_the_radars(radar):
-    """The radar ignores the same addresses on the car's bus."""
+    """The radar ignores frames with its addresses on the car's bus."""
     assert radar.update([frame._replace(bus=0) for frame in frames()], 0.0) is None

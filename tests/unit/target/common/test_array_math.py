@@ -1,4 +1,4 @@
-"""Arithmetic in a fixed order is as exact as numpy's, and follows the written order."""
+"""Arithmetic in a fixed order is as exact as NumPy's."""
 
 import math
 
@@ -11,7 +11,7 @@ RANDOM = np.random.default_rng(4)
 
 
 def test_products_are_those_of_matrices() -> None:
-    """Products equal matrix products within rounding, for any matching shapes."""
+    """Products equal NumPy's matrix products within rounding, for any matching shapes."""
     a, b = RANDOM.normal(size=(3, 5)), RANDOM.normal(size=(5, 2))
     assert array_math.product(a, b) == pytest.approx(a @ b, rel=1e-13)
     assert array_math.dot(a[0], b[:, 1]) == pytest.approx(a[0] @ b[:, 1], rel=1e-13)
@@ -25,7 +25,7 @@ def test_lengths_keep_their_axis() -> None:
 
 
 def test_each_value_is_calculated_alone() -> None:
-    """The function gets floats, in order; the shape stays, even of an empty array."""
+    """The function receives floats in order. The result has the array's shape, even if the array is empty."""
     values = np.array([[1.0, 2.0], [3.0, 4.0]], np.float32)
     asked = []
     found = array_math.each(lambda value: asked.append(value) or -value, values)
@@ -38,7 +38,7 @@ def test_each_value_is_calculated_alone() -> None:
 
 @pytest.mark.parametrize(("kind", "digits"), [(np.float64, 4e-16), (np.float32, 3e-7)])
 def test_logarithm_is_exact_to_the_last_digits(kind: type, digits: float) -> None:
-    """The logarithm is exact for all powers of two, near 1, and to the precision of the given type."""
+    """The logarithm is exact for all powers of two and near 1, to the precision of the array's type."""
     powers = np.ldexp(RANDOM.uniform(0.5, 1.0, 2000), RANDOM.integers(-90, 90, 2000))
     values = np.concatenate((powers, np.linspace(0.6, 1.6, 101))).astype(kind)
     found = array_math.log(values)
@@ -49,7 +49,10 @@ def test_logarithm_is_exact_to_the_last_digits(kind: type, digits: float) -> Non
 
 
 def test_totals_are_added_from_left_to_right() -> None:
-    """Rounding errors accumulate from left to right, unlike in Python's own sum since 3.12."""
+    """Totals are added from left to right, with the rounding errors of that order.
+
+    Python's `sum` differs since 3.12.
+    """
     assert total([1e16, 1.0, -1e16]) == 0.0
     assert total(iter([0.1] * 10)) == 0.9999999999999999
     assert total([]) == 0

@@ -1,4 +1,4 @@
-"""The camera's geometry: one pinhole model for everything."""
+"""All conversions between road and image use one pinhole model."""
 
 from dataclasses import replace
 from math import radians, tan
@@ -15,7 +15,7 @@ ahead, sideways, turned = st.floats(3.0, 300.0), st.floats(-20.0, 20.0), st.floa
 
 
 def test_the_default_is_the_published_calibration():
-    """The horizon of the Caltech frames lies at row 170.7, and lines 3.7 m apart diverge by 1.48 px a row."""
+    """The horizon lies at row 170.7, as in the Caltech frames. Lines 3.7 m apart diverge by 1.48 px a row."""
     assert pytest.approx(170.7, abs=0.05) == CALTECH.horizon
     assert CALTECH.spread() == pytest.approx(1.48, abs=0.005)
     assert CALTECH.pitch == pytest.approx(radians(14.0))
@@ -31,7 +31,7 @@ def test_a_point_on_the_road_is_projected_where_its_row_and_column_are(model, x,
 @CAMERAS
 @given(x=ahead)
 def test_row_and_distance_are_inverse(model, x):
-    """The road in the row of x metres is x metres away, with the scale of its depth."""
+    """The row of a road point x metres ahead converts back to x, with the scale of that depth."""
     row = model.row(x)
     assert model.distance(row) == pytest.approx(x, rel=1e-6, abs=1e-6)
     assert model.metres_per_pixel(row) * (model.cx - model.column(x, 1.0)) == pytest.approx(1.0)
@@ -49,7 +49,7 @@ def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
 
 @CAMERAS
 def test_what_is_as_high_as_the_camera_is_seen_at_the_horizon_row_far_away(model):
-    """Height moves a point up in the image; at the camera's own height it stays at the horizon."""
+    """A higher point lies higher in the image. A point at the camera's height lies at the horizon."""
     far = 1e7
     assert model.project(far, 0.0, model.height)[1] == pytest.approx(model.horizon, abs=1e-3)
     assert model.project(20.0, 0.0, 1.0)[1] < model.project(20.0, 0.0, 0.0)[1]

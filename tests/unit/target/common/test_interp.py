@@ -1,4 +1,4 @@
-"""Tables and limits on plain floats."""
+"""Interpolation tables and limits for plain floats."""
 
 from math import nan
 
@@ -9,21 +9,21 @@ FP = (1.0, 2.0, 4.0)
 
 
 def test_interp_between_and_beyond_breakpoints() -> None:
-    """A table is linear between its points and constant outside."""
+    """A table is linear between its points and constant outside them."""
     assert [interp(x, XP, FP) for x in (-1.0, 0.0, 2.5, 5.0, 7.5, 10.0, 99.0)] == [1, 1, 1.5, 2, 3, 4, 4]
 
 
 def test_interp_takes_the_last_of_equal_breakpoints() -> None:
-    """If a breakpoint repeats, its last value counts, also at the table's beginning."""
+    """If a breakpoint repeats, its last value counts, also at the start of the table."""
     assert interp(0.0, (0.0, 0.0, 1.0), (5.0, 7.0, 8.0)) == 7.0
 
 
 def test_no_number_has_a_defined_place() -> None:
-    """NaN gives the first value of a table, and the upper limit of a range."""
+    """NaN returns the first value of a table and the upper limit of a range."""
     assert interp(nan, XP, FP) == 1.0
     assert clip(nan, -1.0, 1.0) == 1.0
 
 
 def test_clip_limits_both_ways() -> None:
-    """A value outside its range is limited, and one inside is unchanged."""
+    """A value outside the range is limited. A value inside is unchanged."""
     assert [clip(x, -1.0, 2.0) for x in (-3.0, -1.0, 0.5, 2.0, 3.0)] == [-1.0, -1.0, 0.5, 2.0, 2.0]

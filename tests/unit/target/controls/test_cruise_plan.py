@@ -19,20 +19,20 @@ from selfdrive.messages import LeadData
     ],
 )
 def test_limits_over_speed(v_ego: float, following: bool, a_min: float, a_max: float) -> None:
-    """Acceleration limits follow the tables, jerk limits equal them."""
+    """The acceleration limits follow the tables, and the jerk limits equal them."""
     limits = cruise_limits(v_ego, following, 0.0, slow_down=False)
     assert limits == pytest.approx((a_min, a_max, a_min, a_max))
 
 
 def test_jerk_is_never_limited_to_less_than_a_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where the tables allow hardly any acceleration, it may still change by 0.1 m/s^3."""
+    """The jerk limit is at least 0.1 m/s^3, even if the tables allow hardly any acceleration."""
     monkeypatch.setattr(cruise_plan, "A_MIN", (-0.01,) * 5)
     monkeypatch.setattr(cruise_plan, "A_MAX", (0.01,) * 5)
     assert cruise_limits(20.0, False, 0.0, slow_down=False) == (-0.01, 0.01, -0.1, 0.1)
 
 
 def test_turns_leave_less_to_speed_up() -> None:
-    """At 20 m/s lateral and longitudinal acceleration share 1.9 m/s^2; jerk limits stay."""
+    """At 20 m/s, lateral and longitudinal acceleration share 1.9 m/s^2. The jerk limits do not change."""
     limits = cruise_limits(20.0, False, 1.88, slow_down=False)
     assert limits.a_max == pytest.approx((1.9**2 - 1.88**2) ** 0.5)
     assert limits.j_max == pytest.approx(0.5)
@@ -58,5 +58,5 @@ LEAD = {"status": True, "d_rel": 40.0, "v_lead_k": 21.0, "a_lead_k": 0.1}
     ],
 )
 def test_following(change: dict, expected: bool) -> None:
-    """Following means a lead nearer than 45 m that is faster and accelerates."""
+    """The car follows if the lead is nearer than 45 m, faster than the car and accelerating."""
     assert is_following(20.0, LeadData(**(LEAD | change))) is expected

@@ -9,7 +9,7 @@ from selfdrive.messages import ButtonEvent
     ("v_ego", "expected"), [(26.878, 97), (2.9, 40), (9.7, 40), (29.97, 108), (20.0, 72), (50.0, 180)]
 )
 def test_engaging_takes_the_speed_but_at_least_40(v_ego: float, expected: int) -> None:
-    """The set speed is the car's in whole km/h, at least 40."""
+    """Engaging sets the car's speed in whole km/h, but at least 40."""
     assert initial_v_cruise(v_ego) == expected
 
 

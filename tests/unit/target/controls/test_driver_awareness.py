@@ -1,4 +1,4 @@
-"""Six minutes without a driver's action."""
+"""Driver monitoring after six minutes without an action by the driver."""
 
 from selfdrive.controls.lib.driver_awareness import DriverAwareness
 
@@ -9,7 +9,7 @@ def run(cycles: int) -> tuple[DriverAwareness, list[str]]:
 
 
 def test_first_alert_20_s_before_slowing_down_for_4_s() -> None:
-    """The first alert shows from 340 s to 344 s, the second from 360 s on."""
+    """The first alert shows from 340 s to 344 s, and the second shows from 360 s."""
     _, alerts = run(36100)
     first = [k for k, a in enumerate(alerts) if a == "pre_driver_distracted"]
     second = [k for k, a in enumerate(alerts) if a == "driver_distracted"]
@@ -18,7 +18,7 @@ def test_first_alert_20_s_before_slowing_down_for_4_s() -> None:
 
 
 def test_slows_down_only_then() -> None:
-    """The car slows down when the time has run out, until the driver acts."""
+    """The car slows down when the time has run out and continues to do so until the driver acts."""
     awareness, _ = run(35990)
     assert not awareness.absent
     for _ in range(20):

@@ -1,4 +1,4 @@
-"""Forward collision warning and its counters."""
+"""Forward collision warning (FCW) and its counters."""
 
 from dataclasses import replace
 
@@ -19,14 +19,17 @@ def warnings(
 
 
 def test_time_to_collision() -> None:
-    """Gap over closing speed; a braking lead shortens it; opening gaps give the maximum of 5 s."""
+    """Time to collision is the gap over the closing speed, and less if the lead brakes.
+
+    It is at most 5 s, also for a gap that opens.
+    """
     assert time_to_collision(20.0, 0.0, LEAD) == pytest.approx(2.0)
     assert time_to_collision(20.0, 0.0, replace(LEAD, a_lead_k=-2.0)) == pytest.approx(1.7082, abs=1e-3)
     assert time_to_collision(5.0, 0.0, LEAD) == 5.0
 
 
 def test_braking_of_a_slow_lead_counts_little() -> None:
-    """A lead is assumed to take at least 2 s to stop: at 1 m/s its braking counts at most 0.5 m/s^2."""
+    """A lead is assumed to need at least 2 s to stop, so at 1 m/s its braking counts as at most 0.5 m/s^2."""
     slow = replace(LEAD, v_lead=1.0)
     assert time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-9.0)) == pytest.approx(
         time_to_collision(10.0, 0.0, replace(slow, a_lead_k=-0.5))
@@ -34,7 +37,7 @@ def test_braking_of_a_slow_lead_counts_little() -> None:
 
 
 def test_warns_when_all_counters_are_full() -> None:
-    """The counter of blinkers, three seconds, is the last to fill."""
+    """FCW warns when all counters are full. The counter without blinkers, 3 s, fills last."""
     assert warnings() == [pytest.approx(3.0)]
 
 
@@ -56,7 +59,7 @@ BARELY = [
 def test_each_condition_prevents_the_warning(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """Every single condition is needed, exactly up to its limit."""
+    """Each condition alone prevents the warning, exactly up to its limit."""
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == []
     car, lead = car | car_change, lead | lead_change
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == [pytest.approx(3.0, abs=0.06)]
@@ -66,7 +69,7 @@ def test_each_condition_prevents_the_warning(
 def test_a_condition_must_have_held_for_ten_cycles(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """With all else satisfied, ten cycles of the missing condition bring the warning."""
+    """If all other conditions hold, the warning comes after the missing one has held for ten cycles."""
     checker = FcwChecker()
     car, lead = replace(CAR, **car), replace(LEAD, **lead)
     for k in range(80):
@@ -88,12 +91,12 @@ def test_a_condition_must_have_held_for_ten_cycles(
     ],
 )
 def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int) -> None:
-    """The plan must brake hard, or much harder than the car's current braking, within 2.8 s."""
+    """The plan must brake at more than 3 m/s^2, or much harder within 2.8 s than the car does now."""
     assert len(warnings(replace(CAR, a_ego=a_ego), a_plan=a_plan)) == expected
 
 
 def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
-    """With the blinkers long off, the lead itself counts a third per cycle."""
+    """If the blinkers have been off for long, a lead must be seen for 31 cycles before the warning."""
     checker = FcwChecker()
     checker._no_blinker = 10.0
     warned = [checker.update(k * 0.05, CAR, LEAD, BRAKING) for k in range(31)]
@@ -101,7 +104,10 @@ def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
 
 
 def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
-    """The highest speed counts from the radar's first sight; the other counters wait for the camera."""
+    """The lead's highest speed counts from the radar's first detection.
+
+    The other counters wait for the camera.
+    """
     checker = FcwChecker()
     checker.update(0.0, CAR, replace(LEAD, v_lead=9.0, fcw=False), BRAKING)
     standing = replace(LEAD, v_lead=0.0, d_rel=30.0)

@@ -1,4 +1,4 @@
-"""Steering towards the angle of the lateral MPC."""
+"""Lateral control steers towards the angle that the lateral MPC plans."""
 
 from math import nan
 
@@ -14,7 +14,7 @@ LANES = Lanes(ZERO, ZERO, ZERO, 1.0, 1.0, 3.7)
 
 
 class FixedMpc:
-    """Returns the given angles one after another."""
+    """A lateral MPC that returns the given angles one after another."""
 
     def __init__(self, *degrees: float) -> None:
         self.angles = [d * DEG_TO_RAD for d in degrees]
@@ -24,7 +24,7 @@ class FixedMpc:
 
 
 def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[LatControl, CarState]:
-    """Lateral control that has planned the first of `degrees`, with a straight car."""
+    """Build lateral control with the first of `degrees` planned, for a straight wheel."""
     lateral = LatControl(params)
     lateral.mpc = FixedMpc(*degrees)
     car = CarState(v_ego=v_ego)
@@ -33,7 +33,7 @@ def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[La
 
 
 def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
-    """The MPC's angle counts from its cycle, unchanged until the next one."""
+    """The MPC's angle holds from its own cycle until the next angle."""
     lateral, car = control(params, 0.5, 1.0)
     held = []
     for k in range(10):
@@ -45,7 +45,7 @@ def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
 
 
 def test_torque_is_that_of_the_degree_gains(params: CarParams) -> None:
-    """An error of one degree gives 0.8 of torque, and 0.24 more each second, at walking pace."""
+    """At walking pace, an error of one degree gives a torque of 0.8, which grows by 0.24 each second."""
     lateral, car = control(params, 1.0, v_ego=0.3)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0024, abs=1e-5)
     assert lateral.update(car, True) == pytest.approx(0.8 + 0.0048, abs=1e-5)
@@ -60,7 +60,7 @@ def test_feedforward_grows_with_lateral_acceleration(params: CarParams) -> None:
 
 
 def test_an_angle_that_is_no_number_is_full_torque_to_the_left(params: CarParams) -> None:
-    """Without a solution the torque is the upper limit; steering continues normally with the next angle."""
+    """If the MPC has no solution, the torque is its upper limit. The next angle is steered normally."""
     lateral, car = control(params, nan, 1.0)
     assert [lateral.update(car, True) for _ in range(100)] == [1.0] * 100
     assert not lateral.saturated
@@ -82,7 +82,7 @@ def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
 
 @pytest.mark.parametrize(("v_ego", "active"), [(0.29, True), (20.0, False)])
 def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
-    """Nearly at rest and out of control there is no torque, and the integral is reset."""
+    """Nearly at rest or while control is off, there is no torque and the integral is reset."""
     lateral, car = control(params, 1.0)
     first, *_ = [lateral.update(car, True) for _ in range(100)]
     assert lateral.update(CarState(v_ego=v_ego), active) == 0.0
@@ -93,7 +93,7 @@ def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, ac
     ("v_ego", "degrees", "told"), [(10.1, 5.0, True), (10.0, 5.0, False), (20.0, 0.5, False)]
 )
 def test_saturation_is_told_above_10_mps(params: CarParams, v_ego: float, degrees: float, told: bool) -> None:
-    """More than 0.8 s beyond full torque is reported, above 10 m/s only."""
+    """Saturation is reported after more than 0.8 s of full torque, but only above 10 m/s."""
     lateral, car = control(params, degrees, v_ego=v_ego)
     for _ in range(85):
         lateral.update(car, True)

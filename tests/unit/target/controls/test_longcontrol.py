@@ -1,4 +1,4 @@
-"""Gas and brake in all states of longitudinal control."""
+"""Gas and brake in every state of longitudinal control."""
 
 import pytest
 from selfdrive.car.params import CarParams
@@ -21,7 +21,7 @@ def follow(control: LongControl, car: CarState, p: Plan, cycles: int = 1) -> tup
 
 
 def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
-    """Out of control there is no gas or brake, and the target is the car's speed, at least 0.3."""
+    """While control is off, gas and brake are zero. The target is the car's speed, at least 0.3 m/s."""
     control = LongControl(params)
     assert control.update(False, at(20.0), plan(30.0)) == (0.0, 0.0)
     assert (control.state, control.v_pid) == (OFF, 20.0)
@@ -44,14 +44,17 @@ def test_off_gives_nothing_and_follows_the_car(params: CarParams) -> None:
 def test_output_of_the_loop(
     params: CarParams, v_ego: float, v_target: float, a_target: float, gas: float, brake: float
 ) -> None:
-    """Acceleration / 4.8 with the limits of speed, and brake against creeping below 2.3 m/s."""
+    """The output is acceleration / 4.8 within the limits of the speed.
+
+    Below 2.3 m/s it brakes against creeping.
+    """
     assert follow(LongControl(params), at(v_ego), plan(v_target, a_target)) == pytest.approx(
         (gas, brake), abs=1e-5
     )
 
 
 def stopped(params: CarParams) -> LongControl:
-    """A control that has braked the car to rest and holds it."""
+    """Return a control that has braked the car to rest and holds it."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.2))
     follow(control, at(0.0, standstill=True), plan(0.2), 400)
@@ -77,7 +80,10 @@ def test_foot_on_the_brake_stops_too(params: CarParams) -> None:
 
 
 def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
-    """At rest the brake rises by 0.2 a second to 0.5 and stays; while the car rolls it continues to rise."""
+    """At rest the brake rises by 0.2 a second to 0.5 and stays there.
+
+    While the car rolls, it rises further.
+    """
     control = LongControl(params)
     follow(control, at(0.3), plan(0.2))
     start = control.output
@@ -91,7 +97,7 @@ def test_brake_ramps_to_hold_and_no_further(params: CarParams) -> None:
 
 
 def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
-    """The brake is released by 0.8 a second to 0.2, then the loop takes over."""
+    """When the car moves off, the brake falls by 0.8 a second to 0.2. Then the control loop takes over."""
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=0.5))
     assert control.state == STOPPING
@@ -105,7 +111,7 @@ def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
 
 
 def test_moving_off_may_be_given_up(params: CarParams) -> None:
-    """A lead that stops again while the brake is released stops the car again."""
+    """If the lead stops again while the brake is released, the car stops again."""
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=1.0), 3)
     follow(control, at(0.0, standstill=True), plan(0.0))
@@ -122,7 +128,7 @@ def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
 
 
 def test_stopping_does_not_wind_up(params: CarParams) -> None:
-    """The stopping brake ends at its limit, however long the car rolls, and is released from there."""
+    """The stopping brake ends at its limit, however long the car rolls. It is released from that limit."""
     control = LongControl(params)
     follow(control, at(0.4), plan(0.0), 1000)
     assert control.state == STOPPING

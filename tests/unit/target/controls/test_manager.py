@@ -1,4 +1,4 @@
-"""Order of the parts, and their start."""
+"""The manager starts the parts and calls them in order."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ from selfdrive.messages import RadarData
 
 
 class Log(list):
-    """The calls in order."""
+    """Records the calls in order."""
 
     def call(self, name: str, result=None):
         def called(*arguments):
@@ -21,7 +21,7 @@ class Log(list):
 
 @pytest.fixture
 def parts(params: CarParams) -> SimpleNamespace:
-    """A manager with parts that only record their calls."""
+    """Build a manager with parts that only record their calls."""
     log = Log()
     radar = SimpleNamespace(update=log.call("radar", RadarData(0.0)))
     visiond = SimpleNamespace(update=log.call("visiond"), latest="model")
@@ -38,7 +38,7 @@ def run(parts: SimpleNamespace, steps: int, view: str | None = None) -> list:
 
 
 def test_camera_then_radar_then_controls(parts: SimpleNamespace) -> None:
-    """In one step the camera is read first, then the radar; the controls use both."""
+    """In each step the camera is read first and the radar second. The controls use both results."""
     assert run(parts, START_STEP + 2, "view") == ["sent"]
     t = (START_STEP + 1) * 0.01
     assert parts.log[-4:] == [
@@ -50,7 +50,7 @@ def test_camera_then_radar_then_controls(parts: SimpleNamespace) -> None:
 
 
 def test_controls_start_late_and_without_frames(parts: SimpleNamespace) -> None:
-    """The control loop starts 0.11 s after the car; its first cycle has no frames or leads yet."""
+    """The control loop starts 0.11 s after the car. In its first cycle it has no frames or leads."""
     assert run(parts, START_STEP) == []
     assert "controlsd" not in [name for name, *_ in parts.log]
     parts.manager.step(START_STEP * 0.01, ["frame"], None)
@@ -58,9 +58,7 @@ def test_controls_start_late_and_without_frames(parts: SimpleNamespace) -> None:
 
 
 def test_old_leads_stay_until_new_ones(parts: SimpleNamespace) -> None:
-    """Without a complete radar cycle the last leads are passed on, so that the planner can judge
-    their age.
-    """
+    """If the radar cycle is incomplete, the last leads are passed on. The planner checks their age."""
     run(parts, START_STEP + 2)
     parts.radar.update = parts.log.call("radar", None)
     parts.manager.step(0.2, [], None)

@@ -1,4 +1,4 @@
-"""Lane width, probabilities and the path between the lines."""
+"""The path planner estimates lane width, line probabilities and the path between the lines."""
 
 import pytest
 from selfdrive.controls.lib.pathplanner import ModelFit, PathPlanner
@@ -23,7 +23,7 @@ def planned(*models: ModelData, v_ego: float = 20.0) -> PathPlanner:
 
 
 def test_middle_of_a_lane_is_followed() -> None:
-    """In a lane of usual width the path is its middle, with both lines trusted."""
+    """In a lane of usual width, the path is the lane's middle and both lines are trusted."""
     planner = planned(model(2.05, -1.65, 0.2))
     assert planner.d_poly == pytest.approx((0.0, 0.0, 0.0, 0.2), abs=1e-9)
     assert (planner.lanes.left_prob, planner.lanes.right_prob) == (1.0, 1.0)
@@ -36,21 +36,21 @@ def test_lane_and_path_count_alike() -> None:
 
 
 def test_without_lines_the_model_path_is_followed() -> None:
-    """Lines with zero probability have no weight."""
+    """Lines with zero probability have no weight, so the path is the model's path."""
     planner = planned(model(path=0.6, probs=(0.0, 0.0)))
     assert planner.d_poly[3] == pytest.approx(0.6)
     assert planner.c_prob == 0.0
 
 
 def test_unsure_lines_count_together() -> None:
-    """Two lines of 50 % make the middle 75 % certain, which is weighed against the model's path."""
+    """If both lines have a probability of 50 %, the middle has a weight of 75 % against the model's path."""
     planner = planned(model(path=0.7, probs=(0.5, 0.5)))
     assert planner.c_prob == pytest.approx(0.75)
     assert planner.d_poly[3] == pytest.approx(0.7 / 1.75)
 
 
 def test_one_line_is_enough() -> None:
-    """With the left line alone the middle is half a width to its right."""
+    """If only the left line is seen, the middle is half a lane width to its right."""
     planner = planned(model(left=2.0, right=-5.0, path=0.0, probs=(1.0, 0.0)))
     assert planner.c_poly[3] == pytest.approx(2.0 - planner.lane_width / 2.0)
 
@@ -70,7 +70,10 @@ def test_width_is_learnt_slowly() -> None:
 
 
 def test_width_unseen_is_that_of_usual_roads() -> None:
-    """Without lines the certainty falls by 5 % a message and the width approaches the speed's usual one."""
+    """Without lines, each message lowers the certainty by 5 %.
+
+    The width approaches the usual one for the speed.
+    """
     blind = [model(probs=(0.0, 0.0)) for _ in range(200)]
     assert planned(*blind[:10], v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
     assert planned(*blind, v_ego=31.0).lane_width == pytest.approx(3.8, abs=1e-3)

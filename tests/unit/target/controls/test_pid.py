@@ -1,4 +1,4 @@
-"""PI control."""
+"""The PI controller with feedforward, limits and saturation check."""
 
 import pytest
 from selfdrive.controls.lib.pid import PIController
@@ -9,19 +9,22 @@ def make(kp: float = 1.0, ki: float = 1.0, **options) -> PIController:
 
 
 def test_terms_add_up() -> None:
-    """Control is gain times error, plus its integral, plus feedforward."""
+    """Control is the sum of gain times error, integral and feedforward."""
     pid = make(kp=0.2, ki=0.5)
     assert pid.update(1.0, 0.0, speed=0.0, feedforward=0.1) == pytest.approx(0.2 + 0.005 + 0.1)
 
 
 def test_gains_follow_speed() -> None:
-    """Gains are taken from their tables at the speed."""
+    """The gains are interpolated from their tables at the given speed."""
     pid = PIController(((0.0, 10.0), (1.0, 0.5)), ((0.0,), (0.0,)))
     assert pid.update(0.4, 0.0, speed=5.0) == pytest.approx(0.3)
 
 
 def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
-    """At a limit the integral stops; an error in the other direction counts from the first cycle."""
+    """At a limit the integral stops growing.
+
+    An error in the other direction reduces it from the first cycle.
+    """
     pid = make()
     for _ in range(500):
         pid.update(3.0, 0.0, speed=0.0)
@@ -32,7 +35,7 @@ def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_integrator_may_return_from_beyond(side: int) -> None:
-    """An integral of the other sign is reduced even while control is beyond the limit."""
+    """An integral of the opposite sign is reduced even while control exceeds its limit."""
     pid = make()
     pid.i = -0.5 * side
     pid.update(3.0 * side, 0.0, speed=0.0)
@@ -40,7 +43,7 @@ def test_integrator_may_return_from_beyond(side: int) -> None:
 
 
 def test_limits_apply_after_conversion() -> None:
-    """The converted control is limited, and anti-windup uses the converted one."""
+    """The limit and the anti-windup apply to the converted control value."""
     pid = make(convert=lambda control, speed: control / 10.0)
     assert pid.update(5.0, 0.0, speed=0.0) == pytest.approx(0.505)
     assert pid.i > 0.0
@@ -48,7 +51,7 @@ def test_limits_apply_after_conversion() -> None:
 
 
 def test_override_unwinds() -> None:
-    """While the driver overrides, the integrator goes to zero at 0.3 per second."""
+    """While the driver overrides, the integral falls to zero at 0.3 per second."""
     pid = make()
     pid.i = -0.3
     for _ in range(50):
@@ -66,7 +69,7 @@ def saturate(cycles: int, error: float = 2.0, **options) -> PIController:
 
 
 def test_saturation_is_told_after_more_than_800_ms() -> None:
-    """Eighty cycles beyond a limit are tolerated, the eighty-first is reported."""
+    """Saturation is reported in the eighty-first cycle at a limit, not before."""
     assert not saturate(79).saturated
     assert saturate(82).saturated
 
@@ -80,7 +83,7 @@ def test_saturation_needs_error_hands_off_and_check() -> None:
 
 
 def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
-    """The count, at most 1 s, falls within limits at the rate at which it rose."""
+    """The saturation count is at most 1 s. Within the limits it falls as fast as it rose."""
     pid = saturate(300)
     for _ in range(10):
         pid.update(0.0, 0.0, speed=0.0)

@@ -28,7 +28,7 @@ class FixedMpc:
 
 
 class Drive:
-    """A planner with fixed controllers at 20 m/s."""
+    """A planner at 20 m/s whose controllers return fixed solutions."""
 
     def __init__(self, params: CarParams, mpc1: FixedMpc | None = None, mpc2: FixedMpc | None = None) -> None:
         self.planner = Planner(params, ModelFit())
@@ -66,7 +66,7 @@ def started(params: CarParams, *mpcs: FixedMpc) -> Drive:
 
 
 def test_out_of_control_the_plan_is_the_car(params: CarParams) -> None:
-    """Not engaged, the plan starts from the car's speed and does not build on its own gains."""
+    """While control is off, each plan starts from the car's speed, not from the previous plan."""
     drive = Drive(params)
     plan = drive.run(1, "off")[-1]
     assert (plan.v_target, plan.a_target, plan.source) == (20.0, 0.0, "cruise")
@@ -75,7 +75,7 @@ def test_out_of_control_the_plan_is_the_car(params: CarParams) -> None:
 
 
 def test_moving_off_starts_at_walking_pace(params: CarParams) -> None:
-    """While the brake is released the plan stays at 0.3 m/s with 0.5 m/s^2."""
+    """While the brake is released, the plan stays at 0.3 m/s with 0.5 m/s^2."""
     drive = Drive(params)
     drive.car = CarState(v_ego=0.0)
     plan = drive.run(1, "starting")[-1]
@@ -83,7 +83,7 @@ def test_moving_off_starts_at_walking_pace(params: CarParams) -> None:
 
 
 def test_cruise_within_limits(params: CarParams) -> None:
-    """Towards a higher set speed, acceleration rises by its limit per second, up to its limit."""
+    """Towards a higher set speed, acceleration rises at the jerk limit up to the acceleration limit."""
     plans = started(params).run(500, kph=100.0)
     steps = [after.a_target - before.a_target for before, after in pairwise(plans)]
     assert max(steps) <= 0.5 * 0.01 * 1.5
@@ -91,7 +91,7 @@ def test_cruise_within_limits(params: CarParams) -> None:
 
 
 def test_turns_leave_less_to_speed_up(params: CarParams) -> None:
-    """At 20 m/s a bend of 1.88 m/s^2 leaves 0.27 m/s^2 of the combined 1.9 m/s^2."""
+    """At 20 m/s, a bend of 1.88 m/s^2 leaves 0.27 m/s^2 of the total of 1.9 m/s^2."""
     drive = started(params)
     angle = 1.88 / 20.0**2 * params.steer_ratio * params.wheelbase
     drive.car = CarState(v_ego=20.0, a_ego=0.3, steering_angle=angle)
@@ -99,7 +99,7 @@ def test_turns_leave_less_to_speed_up(params: CarParams) -> None:
 
 
 def test_keeping_up_with_a_lead_allows_more(params: CarParams) -> None:
-    """Behind a near lead that pulls away, 0.7 m/s^2 are allowed at 20 m/s."""
+    """Behind a near lead that pulls away, the plan allows 0.7 m/s^2 at 20 m/s."""
     drive = started(params)
     drive.lead = LeadData(status=True, d_rel=30.0, v_lead=22.0, v_lead_k=22.0, a_lead_k=0.5)
     assert max(plan.a_target for plan in drive.run(300, kph=100.0)) == pytest.approx(0.7, abs=0.01)
@@ -114,7 +114,10 @@ def test_cruise_never_goes_backwards(params: CarParams) -> None:
 
 
 def test_the_slowest_wins(params: CarParams) -> None:
-    """The plan that is slowest in 0.2 s is selected, if it is for a lead."""
+    """The planner selects the plan that is slowest in 0.2 s.
+
+    Only a plan for a lead competes with cruising.
+    """
     slow, slower = FixedMpc(-0.1, -0.5, True), FixedMpc(-0.2, -1.0, True)
     assert started(params, slow, slower).run(1)[-1].source == "mpc2"
     assert started(params, slower, slow).run(1)[-1].source == "mpc1"
@@ -123,7 +126,7 @@ def test_the_slowest_wins(params: CarParams) -> None:
 
 
 def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> None:
-    """Between replans acceleration is linear to the goal; the next plan starts from the current state."""
+    """Between replans, acceleration is linear to the goal. The next plan starts from the current state."""
     mpc = FixedMpc(-0.1, -1.0, True)
     drive = started(params, mpc)
     plans = drive.run(6)
@@ -134,7 +137,7 @@ def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> Non
 
 
 def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
-    """Without new radar states the plan is followed for 0.22 s and then held."""
+    """Without new radar states, the plan is followed for 0.22 s and then held."""
     drive = started(params, FixedMpc(-0.1, -1.0, True))
     targets = [plan.a_target for plan in drive.run(1) + drive.run(40, radar=False)]
     assert targets[:22] == sorted(set(targets), reverse=True)
@@ -154,7 +157,7 @@ def test_absent_driver_slows_the_car(params: CarParams) -> None:
 
 
 def errors(drive: Drive, plans: list[Plan]) -> dict[str, int]:
-    """The first cycle of each error event."""
+    """Return the first cycle of each error event."""
     first: dict[str, int] = {}
     for k, plan in enumerate(plans):
         for event in plan.events:
@@ -170,7 +173,7 @@ def test_silence_of_more_than_half_a_second_is_an_error(params: CarParams) -> No
 
 
 def test_nothing_yet_is_an_error_too(params: CarParams) -> None:
-    """Before the first messages engaging is refused."""
+    """Before the first messages, the car does not engage."""
     plan = Planner(params, ModelFit()).update(0.1, CarState(), None, "off", 255.0, False)
     assert [event.name for event in plan.events] == ["model_error", "radar_error"]
 
@@ -185,7 +188,7 @@ def test_radar_errors_are_told_at_once(params: CarParams) -> None:
 
 
 def test_warning_goes_with_the_lead_and_not_with_the_brake(params: CarParams) -> None:
-    """A collision warning is passed on unless the driver already brakes; a new lead restarts the counters."""
+    """A collision warning is passed on unless the driver already brakes. A new lead restarts the counters."""
     drive = Drive(params)
     resets = []
     drive.planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: resets.append(1))

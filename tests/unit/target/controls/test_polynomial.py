@@ -1,4 +1,4 @@
-"""Cubics and their fit."""
+"""Cubic polynomials and their least-squares fit."""
 
 import math
 import random
@@ -31,7 +31,7 @@ def test_fit_is_least_squares() -> None:
 
 @pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
-    """The bits agree for any points, also for too few or too many, infinite ones, or whole numbers."""
+    """The compiled fit has the same bits for too few or too many points, infinite values and integers."""
     compiled.use(all_compiled)
     fast = build_fit()
     compiled.use(None)
@@ -58,7 +58,7 @@ def test_slope() -> None:
 
 
 def test_shift_and_blend() -> None:
-    """A curve is shifted sideways; a blend is the weighted mean, and zero without weight."""
+    """`shift` moves a curve sideways. `blend` is the weighted mean, and zero if the weights are zero."""
     assert value(shifted(CURVE, 0.5), 30.0) == pytest.approx(value(CURVE, 30.0) + 0.5)
     assert value(blend(CURVE, 3.0, ZERO, 1.0), 10.0) == pytest.approx(0.75 * value(CURVE, 10.0))
     assert blend(CURVE, 0.0, CURVE, 0.0) == ZERO

@@ -1,4 +1,4 @@
-"""Tracks and clusters."""
+"""Radar tracks and clusters of tracks."""
 
 import pytest
 from selfdrive.controls.lib.radar_helpers import Cluster, Track, cluster_tracks
@@ -23,7 +23,7 @@ def step(
 def test_stationary_is_slower_than_4_while_the_car_is_faster(
     v_rel: float, v_ego: float, stationary: bool
 ) -> None:
-    """An object slower than 4 m/s is stationary if the car itself is faster than 4 m/s."""
+    """An object slower than 4 m/s is stationary if the car is faster than 4 m/s."""
     assert track(v_rel=v_rel, v_ego=v_ego).stationary is stationary
 
 
@@ -42,7 +42,7 @@ def test_a_standing_object_may_start() -> None:
 
 
 def test_oncoming_may_change() -> None:
-    """Oncoming means currently faster than 3.9 m/s towards the car."""
+    """An object is oncoming while it moves towards the car at more than 3.9 m/s."""
     t = track(v_rel=-24.0)
     assert t.oncoming
     step(t, -23.0)
@@ -50,7 +50,7 @@ def test_oncoming_may_change() -> None:
 
 
 def test_camera_clears_stationary_after_three_fusions() -> None:
-    """Three fusions with the camera are trusted, two are not."""
+    """Three fusions with the camera make a stationary object trusted. Two do not."""
     t = track(v_rel=-20.0)
     t.fuse()
     t.fuse()
@@ -60,7 +60,7 @@ def test_camera_clears_stationary_after_three_fusions() -> None:
 
 
 def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
-    """A lead that brakes with 2 m/s^2 is measured as such."""
+    """The estimated acceleration of a lead that brakes at 2 m/s^2 is -2 m/s^2."""
     t = track(v_rel=0.0)
     for k in range(1, 61):
         step(t, -0.1 * k)
@@ -70,14 +70,14 @@ def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
 
 
 def test_relative_acceleration_is_limited() -> None:
-    """A jump of the speed counts at most 10 m/s^2, low-passed."""
+    """A jump in speed counts as at most 10 m/s^2, after a low-pass filter."""
     t = track(v_rel=0.0)
     step(t, -5.0)
     assert t.a_rel == pytest.approx(-10.0 * 0.1358, abs=0.01)
 
 
 def test_lateral_speed_is_not_learnt_while_the_driver_steers() -> None:
-    """Moving towards the path gives lateral speed, unless the driver's steering moves the path."""
+    """An object moving towards the path has lateral speed, unless the driver's steering moves the path."""
     free, steered = track(d_path=3.0), track(d_path=3.0)
     for k in range(1, 21):
         step(free, 0.0, d_path=3.0 - 0.05 * k)
@@ -107,8 +107,9 @@ def lead(d_rel: float = 50.0, d_path: float = 0.0, v_lat: float = 0.0, v_rel: fl
     ],
 )
 def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> None:
-    """A lead is within 1.5 m of the path, including its lateral speed, and is neither stationary nor
-    oncoming.
+    """A lead is within 1.5 m of the path, after its lateral speed is considered.
+
+    It is not stationary or oncoming.
     """
     assert cluster.is_lead(20.0) is expected
 
@@ -121,7 +122,7 @@ def test_one_moving_track_makes_the_vehicle_a_lead(v_rel: float) -> None:
 
 
 def test_second_lead_is_apart() -> None:
-    """A second lead is more than 8 m further, or more than 1 m/s different."""
+    """The second lead is more than 8 m further away or differs by more than 1 m/s."""
     first = lead(d_rel=40.0)
     assert not lead(d_rel=48.0).is_apart(first)
     assert lead(d_rel=48.1).is_apart(first)
@@ -129,7 +130,10 @@ def test_second_lead_is_apart() -> None:
 
 
 def test_clusters_are_what_lies_within_two_and_a_half() -> None:
-    """Tracks near each other are one vehicle; lateral distance counts double, speed counts as distance."""
+    """Near tracks form one vehicle.
+
+    Lateral distance counts double, and a speed difference counts as distance.
+    """
     tracks = [
         track(d_rel=40.0),
         track(d_rel=42.0),
@@ -142,12 +146,14 @@ def test_clusters_are_what_lies_within_two_and_a_half() -> None:
 
 @pytest.mark.parametrize(("gap", "vehicles"), [(2.4, 1), (2.6, 2)])
 def test_clusters_reach_two_and_a_half(gap: float, vehicles: int) -> None:
-    """Two tracks 2.4 m apart are one vehicle, 2.6 m apart they are two."""
+    """Tracks 2.4 m apart are one vehicle. Tracks 2.6 m apart are two."""
     assert len(cluster_tracks([track(d_rel=40.0), track(d_rel=40.0 + gap)])) == vehicles
 
 
 def test_centroids_keep_a_chain_apart() -> None:
-    """A long chain is not one vehicle: distances are to the centre of the merged tracks."""
+    """A long chain of tracks is not one vehicle, because distances are measured to the centre of the merged
+    tracks.
+    """
     clusters = cluster_tracks([track(d_rel=d) for d in (40.0, 42.0, 44.0, 46.0)])
     assert sorted(c.d_rel for c in clusters) == [41.0, 45.0]
 
@@ -158,7 +164,10 @@ def test_nothing_gives_no_clusters() -> None:
 
 
 def test_message_has_means_from_the_bumper_and_the_best_fusion() -> None:
-    """The lead's message has the means of its tracks; its distance is reduced by the radar's position."""
+    """The lead's message has the means of its tracks.
+
+    Its distance is reduced by the position of the radar.
+    """
     near, far = track(d_rel=40.0, v_rel=-1.0), track(d_rel=42.0, v_rel=-2.0)
     for _ in range(20):
         far.fuse()

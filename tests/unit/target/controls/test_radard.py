@@ -33,7 +33,7 @@ def point(track_id: int = 1, d_rel: float = 50.0, y_rel: float = 0.0, v_rel: flo
 
 
 class Drive:
-    """radard on a straight road at 20 m/s."""
+    """Runs radard on a straight road at 20 m/s."""
 
     def __init__(self, params: CarParams, **controls) -> None:
         self.radard = Radard(params, ModelFit())
@@ -46,8 +46,9 @@ class Drive:
 
 
 def test_lead_speed_starts_as_the_original(params: CarParams) -> None:
-    """There is no lead while the speeds of 0.1 s ago are unknown; then come the original's filtered
-    speeds.
+    """There is no lead while the speeds of 0.1 s ago are unknown.
+
+    Then the filtered speeds match the original's.
     """
     radard = Radard(params, ModelFit())
     leads = []
@@ -67,7 +68,10 @@ def test_distance_is_from_the_bumper(params: CarParams) -> None:
 
 
 def test_closest_lead_and_the_next(params: CarParams) -> None:
-    """The closest vehicle on the path is first, the next one second; vehicles off the path do not count."""
+    """The closest vehicle on the path is the first lead, the next one the second.
+
+    Vehicles off the path do not count.
+    """
     drive = Drive(params)
     state = drive.see(point(1, 70.0), point(2, 40.0), point(3, 43.0), point(4, 20.0, y_rel=3.0), cycles=3)
     assert state.lead_one.d_rel == pytest.approx(40.0)
@@ -75,14 +79,14 @@ def test_closest_lead_and_the_next(params: CarParams) -> None:
 
 
 def test_path_moved_away_loses_the_lead(params: CarParams) -> None:
-    """A path more than 1.5 m from the vehicle loses the lead."""
+    """If the path moves more than 1.5 m away from a vehicle, the vehicle is no longer a lead."""
     drive = Drive(params)
     assert drive.see(point(), cycles=3).lead_one.status
     assert not drive.see(point(), vision=model(path=2.0), cycles=3).lead_one.status
 
 
 def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None:
-    """Out of control, or while the driver steers, objects are compared with the steering circle."""
+    """While control is off or the driver steers, objects are compared with the steering circle."""
     straight = {"steering_angle": 0.5}
     assert Drive(params, **straight).see(point(), cycles=3).lead_one.status
     assert not Drive(params, active=False, **straight).see(point(), cycles=3).lead_one.status
@@ -99,7 +103,7 @@ def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, 
 
 
 def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> None:
-    """A stationary object counts once the camera has seen it three times at the same place."""
+    """A stationary object is a lead once the camera has seen it three times at the same place."""
     drive = Drive(params)
     drive.see(point(9, 90.0), cycles=4)  # the speed history fills
     standing = point(v_rel=-20.0)
@@ -113,7 +117,7 @@ def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> N
 
 
 def test_twenty_fusions_make_a_lead_good_for_warnings(params: CarParams) -> None:
-    """A lead may raise a collision warning after twenty fusions with the camera."""
+    """A lead can raise a collision warning after twenty fusions with the camera."""
     drive = Drive(params)
     assert not drive.see(point(), cycles=19).lead_one.fcw
     assert drive.see(point(), cycles=2).lead_one.fcw

@@ -1,4 +1,4 @@
-"""Profiles towards a speed under acceleration and jerk limits."""
+"""Speed profiles under limits of acceleration and jerk."""
 
 import pytest
 from hypothesis import given
@@ -17,19 +17,19 @@ def drive(v: float, a: float, target: float, steps: int, limits: Limits = LIMITS
 
 
 def test_first_step_from_rest_in_acceleration() -> None:
-    """From a constant speed, acceleration rises with the jerk limit."""
+    """From constant speed, acceleration changes at the jerk limit."""
     assert smooth_speed(20.0, 0.0, 25.0, LIMITS, 0.2) == pytest.approx((20.02, 0.2))
     assert smooth_speed(20.0, 0.0, 15.0, LIMITS, 0.2) == pytest.approx((19.98, -0.2))
 
 
 def test_wrong_way_is_left_three_times_as_fast() -> None:
-    """Acceleration away from the target is reduced with three times the jerk."""
+    """While the car accelerates away from the target, the jerk limit is three times as high."""
     _, a = smooth_speed(20.0, -0.5, 25.0, LIMITS, 0.1)
     assert a == pytest.approx(-0.2)
 
 
 def test_beyond_the_limit_comes_back_with_jerk() -> None:
-    """An acceleration above its limit falls to it with the jerk limit, then holds."""
+    """An acceleration above its limit returns to the limit at maximum jerk and stays there."""
     assert smooth_speed(20.0, 1.5, 40.0, LIMITS, 0.2)[1] == pytest.approx(1.3)
     assert smooth_speed(20.0, 1.1, 40.0, LIMITS, 0.5)[1] == pytest.approx(1.0)
 
@@ -40,7 +40,9 @@ def test_beyond_the_limit_comes_back_with_jerk() -> None:
     target=st.floats(0.0, 40.0),
 )
 def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: float) -> None:
-    """From any state, acceleration and jerk stay within their limits and the target is reached."""
+    """From any state, acceleration stays within its limits, jerk within three times its limit, and the speed
+    reaches the target.
+    """
     before, path = a, drive(v, a, target, 1200)
     for _, now in path:
         assert -1.0 - 1e-6 <= now <= 1.0 + 1e-6
@@ -58,7 +60,7 @@ def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: floa
     once=st.floats(0.01, 30.0),
 )
 def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int, once: float) -> None:
-    """For a time far ahead, the profile agrees with many small steps."""
+    """One large step reaches the same state as many small steps."""
     limits = Limits(a_min=-0.8, a_max=0.8, j_min=-0.7, j_max=0.7)
     v_far, a_far = smooth_speed(v, side * a, v + side * gain, limits, once)
     (v_near, a_near), *_ = reversed(drive(v, side * a, v + side * gain, 200, limits, once / 200))
@@ -67,6 +69,6 @@ def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int
 
 
 def test_a_ceiling_below_zero_slows_down_towards_a_higher_target() -> None:
-    """With an upper limit of -0.2 the car slows down although the target is higher."""
+    """With an upper acceleration limit of -0.2, the car slows down although the target is higher."""
     v, a = drive(20.0, 0.0, 30.0, 100, Limits(-0.5, -0.2, -0.5, 0.5))[-1]
     assert a == pytest.approx(-0.2) and v == pytest.approx(19.02, abs=0.05)

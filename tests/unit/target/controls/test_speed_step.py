@@ -1,7 +1,7 @@
-"""What a step of the radar's relative speed does to the lead's history and to the collision warning.
+"""The effect of a step in the radar's relative speed on the lead's history and the collision warning.
 
-In the original, a distance jump of more than 2.5 m, or a lost lead, resets everything. A jump of the relative
-speed resets nothing, unless the plan cannot follow it. These rules were measured on openpilot v0.4.2; the
+In the original, a distance jump of more than 2.5 m or a lost lead resets everything. A jump of the relative
+speed resets nothing, unless the plan cannot follow it. We measured these rules on openpilot v0.4.2. The
 numbers of cycles here follow from them and from this controller.
 """
 
@@ -29,7 +29,7 @@ STRAIGHT = [PathData((y,) * 50, 1.0, 1.0) for y in (0.0, 1.85, -1.85)]
 
 
 class Cycle(NamedTuple):
-    """The findings of one radar cycle."""
+    """The results of one radar cycle."""
 
     state: RadarState
     fusions: int
@@ -38,9 +38,9 @@ class Cycle(NamedTuple):
 
 
 def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float = 0.0) -> list[Cycle]:
-    """radard and planner, not engaged, behind a lead with these relative speeds from the radar.
+    """Run radard and planner, not engaged, behind a lead with these relative speeds from the radar.
 
-    `jump` is added to its distance from the first cycle with another speed.
+    `jump` is added to the lead's distance from the first cycle with another speed.
     """
     radard, planner = Radard(params, ModelFit()), Planner(params, ModelFit())
     car, controls = CarState(v_ego=V_EGO), ControlsState(v_ego=V_EGO, active=True)
@@ -59,7 +59,7 @@ def drive(params: CarParams, v_rel: list[float], gap: float = 60.0, jump: float 
 
 
 def test_nothing_begins_anew(params: CarParams) -> None:
-    """The track continues, its filter converges, and the plan keeps its lead."""
+    """After a speed step the track continues, its filter converges and the plan keeps its lead."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert not any(cycle.new_lead for cycle in found[10:])
     before, after, settled = (found[k].state.lead_one for k in (59, 60, 99))
@@ -69,7 +69,7 @@ def test_nothing_begins_anew(params: CarParams) -> None:
 
 
 def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
-    """A difference of more than 10 m/s between camera and radar stops fusion; counted fusions stay."""
+    """Fusion stops while camera and radar differ by more than 10 m/s. Fusions counted before remain."""
     found = drive(params, [-2.0] * 60 + [18.0] * 40 + [-2.0] * 40)
     assert found[59].fusions >= 20 and found[59].state.lead_one.fcw
     assert found[99].fusions == found[59].fusions and found[99].state.lead_one.fcw
@@ -77,15 +77,16 @@ def test_fusions_pause_while_the_camera_disagrees(params: CarParams) -> None:
 
 
 def test_a_warning_needs_half_a_second_after_the_step(params: CarParams) -> None:
-    """A short time to collision must last ten cycles after the step, and the other counts continue."""
+    """After the step, a short time to collision must last ten cycles. The other counters continue."""
     found = drive(params, [-2.0] * 80 + [-10.0] * 40, gap=30.0)
     assert not any(cycle.new_lead for cycle in found[10:])
     assert [k for k, cycle in enumerate(found) if cycle.fcw] == [89]
 
 
 def test_a_step_that_the_plan_cannot_follow_begins_anew(params: CarParams) -> None:
-    """A solution that goes 50 m through the lead is discarded, the next lead is a new one, and the longest
-    count, 3 s without blinker, restarts there.
+    """A plan that passes 50 m through the lead is discarded, and the next lead is new.
+
+    The longest count, 3 s without blinker, restarts.
     """
     found = drive(params, [-2.0] * 80 + [-20.0] * 80, gap=50.0)
     assert [k for k, cycle in enumerate(found) if cycle.new_lead and k >= 80] == [81]
@@ -93,8 +94,9 @@ def test_a_step_that_the_plan_cannot_follow_begins_anew(params: CarParams) -> No
 
 
 def test_a_jump_of_the_distance_begins_anew(params: CarParams) -> None:
-    """A jump of more than 2.5 m means another lead, and its 30 cycles in sight and 3 s without blinker
-    restart.
+    """A jump of more than 2.5 m means another lead.
+
+    The counts of 30 cycles in sight and 3 s without blinker restart.
     """
     found = drive(params, [-2.0] * 80 + [-18.0] * 40, jump=-3.0)
     assert found[80].new_lead

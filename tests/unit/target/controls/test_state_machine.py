@@ -14,7 +14,7 @@ CAN = Event("can_error", (ev.NO_ENTRY, ev.IMMEDIATE_DISABLE))
 
 
 class Drive:
-    """A state machine with its alerts, moved by events."""
+    """A state machine and its alerts. Events move it from state to state."""
 
     def __init__(self, *steps: tuple[Event, ...]) -> None:
         self.machine = StateMachine()
@@ -47,7 +47,7 @@ class Drive:
     ],
 )
 def test_engaging(events: tuple[Event, ...], state: str) -> None:
-    """A button engages unless something refuses entry; with the foot on the gas it waits."""
+    """A button engages the car unless an event refuses it. While the gas is pressed, the car waits."""
     drive = Drive()
     assert drive.step(*events) == (state != "disabled")
     assert drive.state == state
@@ -70,7 +70,10 @@ def test_refusal_says_why() -> None:
     ],
 )
 def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: str) -> None:
-    """Driver and faults disengage at once, soft reasons after a notice; the reason is shown."""
+    """The driver and faults disengage at once, and soft reasons after a notice.
+
+    The alert shows the reason.
+    """
     drive = Drive(first, (event,))
     assert drive.state == state
     assert alert in drive.alerts.active
@@ -85,12 +88,12 @@ def test_pre_enabled_ends_with_the_gas_pedal() -> None:
 
 
 def test_driver_beats_fault() -> None:
-    """If the driver disengages in the cycle of a fault, it counts as the driver's action."""
+    """If the driver disengages in the same cycle as a fault, the alert names the driver's action."""
     assert Drive((ENGAGE,), (CAN, BRAKE)).alerts.active[0] == "disable"
 
 
 def test_soft_disabling_is_active_for_300_cycles() -> None:
-    """The car is controlled for another 3 s and then no more."""
+    """After a soft disabling, the car is controlled for 3 s and then released."""
     drive = Drive((ENGAGE,), (DOOR,))
     active = []
     for _ in range(310):
@@ -100,7 +103,7 @@ def test_soft_disabling_is_active_for_300_cycles() -> None:
 
 
 def test_soft_disabling_ends_with_its_reason() -> None:
-    """Once the reason is gone the car stays controlled, and the next soft disabling has its full 3 s."""
+    """If the reason disappears, the car stays controlled, and the next soft disabling again takes 3 s."""
     drive = Drive((ENGAGE,), (DOOR,), (DOOR,), ())
     assert drive.state == "enabled"
     for _ in range(300):
@@ -109,7 +112,7 @@ def test_soft_disabling_ends_with_its_reason() -> None:
 
 
 def test_a_fault_ends_soft_disabling() -> None:
-    """Immediate reasons do not wait for the 3 s."""
+    """A reason for immediate disabling does not wait for the 3 s."""
     assert Drive((ENGAGE,), (DOOR,), (DOOR, CAN)).state == "disabled"
 
 

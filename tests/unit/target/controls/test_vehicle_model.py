@@ -6,12 +6,12 @@ from selfdrive.controls.lib.vehicle_model import VehicleModel
 
 
 def test_standing_it_is_geometry(params: CarParams) -> None:
-    """Near standstill, curvature is road-wheel angle over wheelbase."""
+    """Near standstill, curvature is the road-wheel angle over the wheelbase."""
     assert VehicleModel(params).curvature(1.3, 0.0) == pytest.approx(0.1 / 2.7)
 
 
 def test_understeer_needs_more_angle_when_fast(params: CarParams) -> None:
-    """With the stiffer axle at the back the same curve needs more angle at speed."""
+    """If the rear axle is stiffer, the same curve needs a larger angle at higher speed."""
     model = VehicleModel(params)
     assert model.slip_factor < 0.0
     assert model.steering_angle(0.002, 30.0) > model.steering_angle(0.002, 10.0)

@@ -1,4 +1,4 @@
-"""Matching the camera's lead with radar tracks."""
+"""Matching of the camera's lead with radar tracks."""
 
 import numpy as np
 import pytest
@@ -31,7 +31,9 @@ def track(d_rel: float = 50.0, y_rel: float = 0.0, v_rel: float = 0.0) -> Track:
     ],
 )
 def test_match_needs_place_and_speed(other: Track, matches: bool) -> None:
-    """Half the distance and twice the side must be within 4 m, the speed within 10 m/s."""
+    """A match needs half the distance error and twice the lateral error within 4 m, and the speed error
+    within 10 m/s.
+    """
     assert (seen().best_match([other], ZERO) is other) is matches
 
 
@@ -42,14 +44,14 @@ def test_the_best_of_several() -> None:
 
 
 def test_it_is_taken_to_be_on_the_path() -> None:
-    """In a bend, the camera's lead is searched on the path."""
+    """In a bend, the camera's lead is assumed to be on the path."""
     bend = (0.0, 0.001, 0.0, 0.0)
     off, on = track(y_rel=0.0), track(y_rel=2.5)
     assert seen().best_match([off, on], bend) is on
 
 
 def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
-    """Distance and speed are those of a Kalman filter with R = std^2 and Q = diag(0.5, 1) a cycle."""
+    """Distance and speed are those of a Kalman filter with R = std^2 and, per cycle, Q = diag(0.5, 1)."""
     point, std = VisionPoint(), 3.0
     a, x, p = np.array([[1.0, 0.05], [0.0, 1.0]]), np.zeros(2), 1e2 * np.eye(2)
     for k in range(30):
@@ -63,13 +65,13 @@ def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
 
 
 def test_an_unsure_lead_matches_nothing() -> None:
-    """A lead of 70 % or less is not used, one of 71 % is."""
+    """A lead with a probability of 70 % is not used. A lead with 71 % is used."""
     assert seen(prob=0.7).best_match([track()], ZERO) is None
     assert seen(prob=0.71).best_match([track()], ZERO) is not None
 
 
 def test_becoming_sure_starts_at_the_seen_distance() -> None:
-    """The first certain distance is used directly, without an earlier speed."""
+    """The first certain distance is used directly, with no speed from before."""
     point = seen(d_rel=80.0)
     point.update(LeadVision(30.0, 0.5, 0.1))
     point.update(LeadVision(30.0, 0.9, 0.1))
