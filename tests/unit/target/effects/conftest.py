@@ -8,7 +8,7 @@ from selfdrive.common.camera_model import CameraModel
 
 
 class Moment(NamedTuple):
-    """What effects know about the world."""
+    """The time, distance and speed that an effect knows about an image."""
 
     t: float
     position: float
@@ -23,7 +23,7 @@ def camera():
 
 @pytest.fixture(scope="session")
 def moment():
-    """The n-th of 20 pictures a second, at a speed (m/s)."""
+    """Return the n-th of 20 images a second at a speed (m/s)."""
 
     def make(number=0, speed=26.8):
         return Moment(1.5 + 0.05 * number, 40.0 + 0.05 * number * speed, speed)

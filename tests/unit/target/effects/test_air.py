@@ -1,4 +1,4 @@
-"""Fog by Koschmieder's law, with the camera's depth."""
+"""Fog follows Koschmieder's law, with the distances that the camera sees."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ UDACITY = CameraModel.from_view(width=640, rows=480, horizon=200.0, focal=600.0,
 
 @pytest.mark.parametrize("model", [CameraModel(), UDACITY])
 def test_way_of_light_is_the_distance_to_the_road(model):
-    """Straight ahead it is the hypotenuse of the camera's height and the distance on the road."""
+    """Straight ahead, the path's length follows from the camera's height and the distance on the road."""
     way = ways(model)
     for x in (5.0, 20.0, 60.0):
         row, column = model.row(x), model.column(x, 0.0)
@@ -39,7 +39,7 @@ def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
 
 
 def test_fog_follows_the_law_in_every_row(camera, moment, road):
-    """Every pixel is its attenuated light plus airlight; high above the horizon only airlight remains."""
+    """Every pixel is attenuated light plus airlight. High above the horizon only airlight remains."""
     visibility = 60.0
     seen = Fog(visibility, 0, camera).apply(road, moment()).astype(float)
     kept = 0.05 ** (ways(camera) / visibility)

@@ -1,4 +1,4 @@
-"""Rain, fog, snow and occlusion as coded: how much they draw, where, and that each frame is drawn again."""
+"""Rain, fog, snow and occlusion as coded: amounts, positions, and a new drawing for each frame."""
 
 import cv2
 import numpy as np
@@ -16,7 +16,7 @@ def black(camera):
 
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_each_picture_is_drawn_anew(effect, camera, moment, road):
-    """Equal frame numbers give the same image in another run; other numbers give unrelated ones."""
+    """A frame number gives the same drawing in every run. Different numbers give unrelated drawings."""
     one, other = effect(7, 3, camera), effect(7, 3, camera)
     later = other.apply(road, moment(5))
     assert np.array_equal(one.apply(road, moment(5)), later)
@@ -27,9 +27,7 @@ def test_each_picture_is_drawn_anew(effect, camera, moment, road):
 
 @pytest.mark.parametrize("level", [2, 10])
 def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, level):
-    """There are 1,000 streaks of 32 pixels for each level on four times the image area, brighter with each
-    overlap.
-    """
+    """For each level there are 1,000 streaks of 32 pixels on four times the image area. Overlaps add up."""
     rain = CodedRain(level, 3, camera).apply(black, moment())
     assert rain[rain > 0].min() == round(255 * 0.11)
     expected = 1000 * level * 31 / (4 * black.size)  # a streak has one pixel in each row
@@ -38,8 +36,9 @@ def test_rain_covers_what_a_quarter_of_the_streaks_do(camera, moment, black, lev
 
 @pytest.mark.parametrize("level", [3, 10])
 def test_fog_is_white_pixels_blurred(camera, moment, black, level):
-    """There are 15,000 for each level, some at the same place; the road's share of the light is 0.9
-    - 0.05 t.
+    """Each level has 15,000 white pixels, some at the same place.
+
+    The road's share of the light is 0.9 - 0.05 t.
     """
     fog = CodedFog(level, 3, camera).apply(black, moment())
     covered = 1.0 - np.exp(-15_000 * level / black.size)
@@ -50,14 +49,17 @@ def test_fog_is_white_pixels_blurred(camera, moment, black, level):
 
 @pytest.mark.parametrize("level", [1, 10])
 def test_snow_is_fog_and_blocks(camera, moment, black, level):
-    """There are 250 blocks of 2 x 2 for each level; blurring preserves their light."""
+    """Each level has 250 blocks of 2 x 2 pixels. Blurring keeps their total light."""
     snow, fog = (effect(level, 3, camera).apply(black, moment()) for effect in (CodedSnow, CodedFog))
     blocks = (snow.mean() - fog.mean()) * black.size / (4 * 255)
     assert blocks == pytest.approx(250 * level, rel=0.15)
 
 
 def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
-    """Black blobs lie in the lower half, with a rim of up to grey 150, and the road beyond is unchanged."""
+    """Black blobs lie in the lower half and have a rim of up to grey 150.
+
+    The rest of the road is unchanged.
+    """
     seen = CodedOcclusion(10, 3, camera).apply(road, moment())
     changed = seen != road
     assert changed.any() and not changed[: camera.rows // 2 - 60].any()
@@ -65,7 +67,7 @@ def test_occlusion_lies_on_the_road_and_has_a_rim(camera, moment, road):
 
 
 def test_a_flake_is_a_blurred_block():
-    """A flake has the same levels as a blurred block in a large image, for any layer's blur."""
+    """A flake has the levels of a blurred block in a large image, whatever the layer's blur."""
     block = np.zeros((40, 40), np.uint8)
     block[19:21, 19:21] = 255
     for layer in range(1, 11):
@@ -76,7 +78,7 @@ def test_a_flake_is_a_blurred_block():
 
 
 def test_gaussians_end_at_two_sigma():
-    """A point's light ends at two sigma."""
+    """The light of a single point ends at two sigma."""
     point = np.zeros((41, 41), np.float32)
     point[20, 20] = 255.0
     for sigma, reach in ((0.6, 2), (1.5, 3), (7.0, 14)):

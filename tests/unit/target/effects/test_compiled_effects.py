@@ -1,4 +1,4 @@
-"""Effects in C have the Python code's bits, at any level and size, whole and in part."""
+"""Effects compiled from C return the bits of the Python code, for any level, size and region."""
 
 import shutil
 import subprocess
@@ -71,7 +71,7 @@ def compile_effects(folder, *options):
 
 @pytest.fixture
 def both(folder):
-    """An effect in Python and in C. The latter is skipped if OpenCV computes differently."""
+    """Return an effect in Python and in C. Skip the test if OpenCV computes other bits than the C code."""
 
     def made(kind, amount, seed, camera):
         compiled.use(None)
@@ -99,9 +99,7 @@ def pictures(random, shape):
 @pytest.mark.parametrize("size", CAMERAS)
 @pytest.mark.parametrize("kind", COMPILED)
 def test_compiled_effects_have_the_same_bits(both, kind, size):
-    """The bits agree for the whole image and any region, mild and strong, with any seed, early, late, slow
-    and fast.
-    """
+    """The bits agree for whole images and regions, mild and strong levels, and any seed, time and speed."""
     camera, random = CAMERAS[size], np.random.default_rng(7)
     amounts = LEVELS[kind]
     for seed, amount in enumerate({amounts[0], amounts[len(amounts) // 2], amounts[-1]}):
@@ -136,7 +134,7 @@ def test_processors_without_wide_vectors_draw_the_same(folder, tmp_path, camera,
 
 @pytest.mark.parametrize("speed", [np.float64(20.0), np.nan, np.inf, -5.0, 1e30])
 def test_impossible_speeds_are_drawn_alike(both, camera, speed):
-    """Impossible speeds give the same drawing, including NaN, which a fault may cause."""
+    """Impossible speeds, including NaN, give the same drawing, because a fault can cause them."""
     plain, fast = both(effects.Snow, 10, 1, camera)
     picture = np.full((camera.rows, camera.width), 90, np.uint8)
     scene = Moment(3.0, 77.0, speed)
@@ -146,7 +144,7 @@ def test_impossible_speeds_are_drawn_alike(both, camera, speed):
 
 @pytest.mark.parametrize(("sigma", "size"), [(0.5, 0), (1.2, 0), (5.0, 0), (7.0, 29), (0.0, 3), (0.0, 31)])
 def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
-    """The bits agree for images of any size, even smaller than the kernel, and for cut and flipped ones."""
+    """The bits agree for slices, flipped images and any size, even one smaller than the kernel."""
     compiled.use(folder)
     fast, plain, random = build_gaussian(sigma, size), Gaussian(sigma, size), np.random.default_rng(3)
     compiled.use(None)
@@ -159,9 +157,7 @@ def test_compiled_blurs_have_the_same_bits(folder, sigma, size):
 
 
 def test_droplets_are_numpys_whatever_was_drawn_before(folder):
-    """The drawn numbers are numpy's, from a new generator and from one with half a number left; few
-    and many.
-    """
+    """The random numbers are NumPy's, even if the generator has half a number left from before."""
     compiled.use(folder)
     fast, by = compiled_scattered.build_scattered()
     compiled.use(None)
@@ -177,7 +173,7 @@ def test_droplets_are_numpys_whatever_was_drawn_before(folder):
 
 @pytest.mark.parametrize("source", C_SOURCES, ids=lambda source: source.stem)
 def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, source):
-    """If any Python file that the C code replaces has a fault, the library is not used."""
+    """If any Python file that the C code replaces has changed, the library is not used."""
     compiled.use(folder)
     assert compiled.library(source) is not None
     named = compiled.stands_for(source.read_bytes())
@@ -193,7 +189,7 @@ def test_an_edited_effect_is_drawn_by_python(folder, tmp_path, monkeypatch, sour
 
 
 def test_another_opencv_is_left_alone(folder, monkeypatch):
-    """If OpenCV has other bits than the compiled code, Python calls OpenCV, and no library is named."""
+    """If OpenCV's bits differ from the compiled code's, Python calls OpenCV and the run names no library."""
     compiled.use(folder)
     darker = Gaussian.__call__
     monkeypatch.setattr(Gaussian, "__call__", lambda blur, picture: darker(blur, picture) // 2)
@@ -213,7 +209,7 @@ def test_another_opencv_is_left_alone(folder, monkeypatch):
 
 
 def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
-    """With numpy's numbers in the camera, numpy computes in double precision."""
+    """With NumPy scalars in the camera, Python draws, because NumPy then computes in double precision."""
     compiled.use(folder)
     camera = replace(CameraModel(), cx=np.float64(317.9))
     assert precipitation.build_parts(camera)[1] == ""
@@ -223,19 +219,19 @@ def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.PaperRain, effects.PaperSnow, effects.Rain, effects.Snow])
 def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    """Record and trace of closed-loop runs are the same with and without compiled code."""
+    """The record and trace of closed-loop runs have the same bytes with and without compiled code."""
     same_runs(folder, tmp_path, monkeypatch, kind, PAPER)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
 def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    """The same holds for the detector as coded."""
+    """The same holds for runs with the detector as coded."""
     same_runs(folder, tmp_path, monkeypatch, kind, AS_CODED)
 
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
-    """Run twice through weather of medium strength."""
+    """Run a scenario in medium weather twice, with and without compiled code."""
     look, scenario = PictureCamera.look, load_scenario(SCENARIO)
     amount = LEVELS[kind][4]
 

@@ -1,4 +1,4 @@
-"""Properties of all effects: pure, seeded, within grey levels, and strict about input."""
+"""Every effect is pure and seeded, keeps grey levels in range, and rejects invalid input."""
 
 from dataclasses import replace
 from functools import cache
@@ -33,7 +33,7 @@ every = pytest.mark.parametrize("effect", ALL)
 
 
 def fresh(effect, camera, seed=3):
-    """A new instance of the effect at its highest level."""
+    """Return a new instance of the effect at its highest level."""
     return effect(LEVELS[effect][-1], seed, camera)
 
 
@@ -41,7 +41,7 @@ strongest = cache(fresh)  # for tests that may share one, like the frames of a r
 
 
 def test_levels_name_every_exported_effect():
-    """Pages and benchmarks use levels, so every exported effect has them."""
+    """Every exported effect has levels, because pages and benchmarks use them."""
     assert {effect.__name__ for effect in LEVELS} == set(effects.__all__)
 
 
@@ -57,7 +57,7 @@ def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
 
 @every
 def test_input_stays_and_output_is_new(effect, camera, moment, road):
-    """A read-only image stays unchanged; the result is a new image of the same type and size."""
+    """A read-only image stays unchanged. The result is a new image of the same type and size."""
     before = road.copy()
     after = strongest(effect, camera).apply(road, moment())
     assert after.dtype == np.uint8 and after.shape == road.shape
@@ -67,7 +67,7 @@ def test_input_stays_and_output_is_new(effect, camera, moment, road):
 
 @every
 def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
-    """A returned result is never overwritten."""
+    """An effect never overwrites an earlier result."""
     made = strongest(effect, camera)
     first = made.apply(road, moment())
     kept = first.copy()
@@ -96,7 +96,7 @@ def regions(shape, random):
 @pytest.mark.parametrize("model", CAMERAS, ids=["640x480", "352x264", "333x251"])
 @every
 def test_a_part_is_that_of_the_whole(effect, model, moment):
-    """Any region of a changed image has the same bits as in the whole, even after two effects."""
+    """A region of a changed image has the same bits as in the whole image, even after two effects."""
     random = np.random.default_rng(7)
     noise = random.integers(0, 256, (model.rows, model.width), np.uint8)
     for amount in (LEVELS[effect][0], LEVELS[effect][-1]):
@@ -114,21 +114,21 @@ def test_a_part_is_that_of_the_whole(effect, model, moment):
 
 @pytest.mark.parametrize("effect", RANDOM)
 def test_seed_decides_what_is_random(effect, camera, moment, road):
-    """Another seed gives another image, even if two seeds differ only beyond 32 bits."""
+    """Another seed gives another image, even if the seeds differ only beyond 32 bits."""
     one, other = (fresh(effect, camera, seed).apply(road, moment()) for seed in (1, 1 + 2**32))
     assert not np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("effect", STILL)
 def test_still_effects_do_not_move(effect, camera, moment, road):
-    """Effects fixed to the lens, or without motion, are the same at any moment and speed."""
+    """An effect that is fixed to the lens or does not move is the same at any time and speed."""
     made = strongest(effect, camera)
     assert np.array_equal(made.apply(road, moment()), made.apply(road, moment(17, speed=5.0)))
 
 
 @pytest.mark.parametrize("effect", MOVING)
 def test_moving_effects_move(effect, camera, moment, road):
-    """The next image differs."""
+    """The next image of a moving effect differs."""
     made = strongest(effect, camera)
     assert not np.array_equal(made.apply(road, moment()), made.apply(road, moment(1)))
 
@@ -136,7 +136,7 @@ def test_moving_effects_move(effect, camera, moment, road):
 @every
 @pytest.mark.parametrize("level", [0, 255])
 def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, level):
-    """Levels are limited and do not wrap: where black turns bright, white does not turn dark."""
+    """Levels are limited: a brightened white pixel does not wrap round to black."""
     flat = np.full((camera.rows, camera.width), level, dtype=np.uint8)
     after = strongest(effect, camera).apply(flat, moment()).astype(int)
     grey = strongest(effect, camera).apply(np.full_like(flat, 128), moment()).astype(int)
@@ -161,7 +161,7 @@ def test_odd_sizes_work(effect, camera, moment):
 
 @every
 def test_wrong_amounts_are_refused(effect, camera):
-    """An amount beyond the limits, or NaN, is an error that names effect, amount and limits."""
+    """An amount outside the limits, or NaN, raises an error with the effect, the amount and the limits."""
     for amount in (effect.LEAST - 1.0, 2.0 * effect.MOST + 1.0, nan, inf):
         with pytest.raises(ConfigError, match=f"{effect.__name__}: amount .*, expected .*{effect.MOST:g}"):
             effect(amount, 0, camera)
@@ -169,14 +169,14 @@ def test_wrong_amounts_are_refused(effect, camera):
 
 @pytest.mark.parametrize("effect", [effects.PaperOcclusion, effects.AveragingBlur])
 def test_counted_amounts_are_whole(effect, camera):
-    """A number of blobs or pixels must be whole."""
+    """A number of blobs or pixels must be an integer."""
     with pytest.raises(ConfigError, match=r"amount 2\.5, expected a whole number"):
         effect(2.5, 0, camera)
 
 
 @pytest.mark.parametrize("effect", [effects.GaussianBlur, effects.MedianBlur])
 def test_kernels_with_a_middle_are_odd(effect, camera):
-    """An even kernel has no middle."""
+    """A kernel size must be odd, because an even kernel has no middle."""
     with pytest.raises(ConfigError, match="amount 4, expected an odd number"):
         effect(4, 0, camera)
 
@@ -184,7 +184,7 @@ def test_kernels_with_a_middle_are_odd(effect, camera):
 @every
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_wrong_seeds_are_refused(effect, camera, seed):
-    """A seed is a whole number, 0 or above."""
+    """A seed must be an integer of at least 0."""
     with pytest.raises(ConfigError, match="seed"):
         effect(LEVELS[effect][0], seed, camera)
 
@@ -198,7 +198,7 @@ def test_wrong_seeds_are_refused(effect, camera, seed):
     ],
 )
 def test_pictures_of_another_camera_are_refused(camera, moment, picture):
-    """Type and size must be those of the camera's grey frames; the error gives both."""
+    """An image must have the type and size of the camera's grey frames. The error names both."""
     with pytest.raises(
         ConfigError, match=r"Brightness: a picture of .* expected uint8 and shape \(480, 640\)"
     ):
@@ -207,7 +207,7 @@ def test_pictures_of_another_camera_are_refused(camera, moment, picture):
 
 @every
 def test_severity_grows_with_the_level(effect, camera, moment, road):
-    """An image of a stronger level is further from the clean one."""
+    """A higher level changes the image more."""
     amounts = LEVELS[effect]
     chosen = sorted({0, len(amounts) // 2, len(amounts) - 1})
     errors = []

@@ -7,7 +7,7 @@ from selfdrive.sim.effects import LensMud
 
 @pytest.mark.parametrize("coverage", [0.0, 0.1, 0.5])
 def test_mud_covers_its_share(coverage, camera, moment):
-    """The share of light lost, apart from the mud's own level, is the amount."""
+    """The amount is the share of light lost, apart from the mud's own brightness."""
     mud = LensMud(coverage, 0, camera)
     flat = np.full((camera.rows, camera.width), 255, np.uint8)
     dark = np.zeros_like(flat)

@@ -7,7 +7,7 @@ from selfdrive.sim.effects.light import level_rays
 
 
 def test_rays_meet_the_horizon(camera):
-    """Rays of the horizon's row are level; those of a road's row fall by height over distance."""
+    """The horizon's row has level rays. The ray of a road row falls by height over distance."""
     rays = level_rays(camera)
     fall = rays[:, round(camera.cx), 1] / rays[:, round(camera.cx), 2]
     assert np.interp(camera.horizon, np.arange(camera.rows), fall) == pytest.approx(0.0, abs=1e-4)
@@ -16,7 +16,7 @@ def test_rays_meet_the_horizon(camera):
 
 
 def test_glare_falls_off_with_the_square_of_the_angle(camera):
-    """Twice as far from the sun there is a quarter of the veil; it grows with the scatter."""
+    """At twice the angle from the sun, the veil is a quarter as bright. It grows with the scatter."""
     veil = SunGlare(0.5, 3, camera).ready()._light.astype(float)
     more = SunGlare(1.0, 3, camera).ready()._light.astype(float)
     sky = veil[: int(camera.horizon)]
@@ -33,7 +33,10 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
 
 
 def test_noise_is_that_of_electrons(camera, moment):
-    """Mean and spread follow from electrons and read noise, and shrink in bright light."""
+    """The noise's mean and spread follow from electrons and read noise.
+
+    Both effects shrink in bright light.
+    """
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     for lux in (100000.0, 100.0, 20.0):
         seen = LowLight(lux, 0, camera).apply(flat, moment()).astype(float)
@@ -45,7 +48,7 @@ def test_noise_is_that_of_electrons(camera, moment):
 
 
 def test_darkness_comes_where_gain_ends(camera, moment, road):
-    """Down to the largest gain the image keeps its brightness; below, it fades with the light."""
+    """The image keeps its brightness down to the largest gain. In less light it becomes darker."""
     means = [LowLight(lux, 0, camera).apply(road, moment()).mean() for lux in (300.0, 15.0, 5.0, 0.5)]
     assert means[0] == pytest.approx(road.mean(), abs=1.0) and means[1] == pytest.approx(road.mean(), abs=3.0)
     assert means[2] < 0.6 * means[1] and means[3] < 0.2 * means[1]

@@ -1,4 +1,4 @@
-"""The paper's effects: its numbers of streaks, blocks and blobs, its parameters, and motion."""
+"""The paper's effects have its parameters, its motion and its numbers of streaks, blocks and blobs."""
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ def black(camera):
 @pytest.mark.parametrize("thickness", [1, 3, 10, 2.5])
 @pytest.mark.parametrize(("effect", "each"), [(PaperRain, 1000), (PaperSnow, 100)])
 def test_thickness_counts(effect, each, thickness, camera):
-    """There are 1,000 streaks and 100 blocks for each thickness, over any layers: 10,000 streaks at 10."""
+    """Each unit of thickness adds 1,000 streaks and 100 blocks over all layers, so 10 has 10,000 streaks."""
     made = effect(thickness, 0, camera)
     assert {PaperRain: STREAKS, PaperSnow: BLOCKS}[effect] == each
     assert sum(made._count(each, layer, 5) for layer in range(5)) == each * thickness
 
 
 def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
-    """The number of separate streaks is the requested one, except for those that touch."""
+    """The number of separate streaks is the requested number, less the streaks that touch."""
     cv2 = pytest.importorskip("cv2")
     monkeypatch.setattr("selfdrive.sim.effects.paper_weather.STREAKS", 100)
     picture = PaperRain(1, 0, camera).apply(black(camera), moment())
@@ -31,7 +31,7 @@ def test_sparse_streaks_can_be_counted(camera, moment, monkeypatch):
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_falling_keeps_what_falls(effect, camera, moment):
-    """A drop that leaves the image enters it again, so a layer's levels stay the same."""
+    """A drop that leaves the image enters it again at the other side, so a layer keeps its grey levels."""
     made = effect(3, 0, camera).ready()
     everything = whole((camera.rows, camera.width))
     for tile in made._tiles:
@@ -41,7 +41,7 @@ def test_falling_keeps_what_falls(effect, camera, moment):
 
 @pytest.mark.parametrize("effect", [PaperRain, PaperSnow])
 def test_drops_fall(effect, camera, moment):
-    """From frame to frame every layer moves down, near ones faster, by less than half the image."""
+    """From frame to frame every layer moves down by less than half the image. Near layers move faster."""
     made = effect(1, 0, camera).ready()
     ways = []
     for tile in made._tiles:
@@ -59,13 +59,13 @@ def test_drops_fall(effect, camera, moment):
 
 
 def test_more_rain_holds_all_of_less(camera, moment):
-    """A higher level of one seed only adds drops."""
+    """With the same seed, a higher level only adds drops."""
     less, more = (PaperSnow(level, 0, camera)._blocks(np.random.default_rng(1), 0) for level in (2, 6))
     assert (more >= less).all() and more.sum() > 2 * less.sum()
 
 
 def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
-    """Without a streak, contrast is 0.75 of the frame's at thickness 1, and 0.65 at 10."""
+    """Where no streak is, contrast is 0.75 of the original at thickness 1 and 0.65 at 10."""
     for thickness, alpha in ((1, 0.75), (10, 0.65)):
         made = PaperRain(thickness, 0, camera)
         flat = np.full_like(road, 100)
@@ -73,7 +73,7 @@ def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
 
 
 def test_fog_reduces_contrast_evenly(camera, moment):
-    """Two levels 100 apart are 90 apart at thickness 1 and 40 at 10, with the same noise for both."""
+    """Fog reduces a difference of 100 levels to 90 at thickness 1 and to 40 at 10, for the same noise."""
     for thickness, alpha in ((1, 0.9), (10, 0.4)):
         made = PaperFog(thickness, 0, camera)
         dark, bright = (
@@ -84,7 +84,7 @@ def test_fog_reduces_contrast_evenly(camera, moment):
 
 
 def test_fog_noise_is_uniform_and_blurred(camera, moment):
-    """All pixels of fog 10 have noise of 0 to 255; its mean remains and its grain is blurred."""
+    """Fog 10 adds noise of 0 to 255 to all pixels. Blurring keeps its mean and smooths its grain."""
     fog = PaperFog(10, 0, camera).apply(black(camera), moment()).astype(float)
     assert abs(fog.mean() - 127.5) < 1.0
     # 73.6 / (2 * sqrt(pi) * sigma) for sigma = 7
@@ -93,8 +93,9 @@ def test_fog_noise_is_uniform_and_blurred(camera, moment):
 
 @pytest.mark.parametrize("blobs", [1, 4, 10])
 def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
-    """There are at most as many dark blobs as requested, of 5 to 50 pixels' radius, and more blobs include
-    the fewer.
+    """There are at most as many dark blobs as requested, with radii of 5 to 50 px.
+
+    A higher number keeps all the fewer blobs.
     """
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     share = 1.0 - PaperOcclusion(blobs, 4, camera).apply(white, moment()).astype(float) / 200.0
@@ -105,7 +106,7 @@ def test_blobs_are_counted_and_of_the_papers_size(blobs, camera, moment):
 
 
 def test_blobs_lie_on_the_road(camera, moment):
-    """No blob's middle is above the horizon, so each hides part of the road."""
+    """The middle of each blob lies below the horizon, so each blob hides part of the road."""
     white = np.full((camera.rows, camera.width), 200, np.uint8)
     for seed in range(20):
         seen = PaperOcclusion(10, seed, camera).apply(white, moment())
@@ -113,7 +114,7 @@ def test_blobs_lie_on_the_road(camera, moment):
 
 
 def test_motion_smear_has_the_papers_length_and_angle():
-    """The smear of snow is 5 pixels long at 75 degrees: mostly up, a little to the right."""
+    """Snow's motion blur is 5 pixels long at 75 degrees: mostly up and slightly to the right."""
     kernel = motion_kernel(5, 75.0)
     rows, columns = np.nonzero(kernel > 0.01)
     assert kernel.sum() == pytest.approx(1.0, abs=1e-6)
@@ -123,7 +124,7 @@ def test_motion_smear_has_the_papers_length_and_angle():
 
 
 def test_contrast_and_brightness_saturate(camera, moment, road):
-    """A gain of 3 makes asphalt white, so that marks vanish; a bias of 100 does not."""
+    """A gain of 3 turns asphalt white, so the marks disappear. A bias of 100 does not."""
     strong = Contrast(3.0, 0, camera).apply(road, moment())[300:]
     bright = Brightness(100, 0, camera).apply(road, moment())[300:]
     assert strong.min() == 255

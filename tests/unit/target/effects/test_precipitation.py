@@ -1,4 +1,4 @@
-"""Rain and snow in space: numbers, sizes and speeds, and the motion of single particles."""
+"""Rain and snow in three dimensions: numbers, sizes, speeds and motion of the particles."""
 
 from dataclasses import replace
 
@@ -10,13 +10,13 @@ from selfdrive.sim.picture import whole
 
 
 def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
-    """Particles of one kind."""
+    """Return particles of one kind only."""
     boxes = [Box(reach, np.full(number, size), np.full(number, speed))]
     return Particles(np.random.default_rng(2), camera, boxes)
 
 
 def test_rain_has_marshall_and_palmers_spectrum(camera):
-    """The number of drops in a box follows 8000 * exp(-slope * D), with more small ones."""
+    """The number of drops in a box follows 8000 * exp(-slope * D), so small drops are more frequent."""
     rain = Rain(25.0, 0, camera).ready()
     slope = 4.1 * 25.0**-0.21
     sizes_of_all = 1000.0 * rain._particles._size
@@ -31,7 +31,7 @@ def test_rain_has_marshall_and_palmers_spectrum(camera):
 
 
 def test_drops_fall_at_their_terminal_speed(camera):
-    """A drop of 2 mm falls at 6.5 m/s, one of 5 mm at 9.1 m/s (measured by Gunn and Kinzer, 1949)."""
+    """A drop of 2 mm falls at 6.5 m/s and one of 5 mm at 9.1 m/s (measured by Gunn and Kinzer, 1949)."""
     _, speeds = Rain(10.0, 0, camera).flown(np.array([2.0, 5.0]))
     assert speeds == pytest.approx([6.5, 9.1], rel=0.02)
 
@@ -43,7 +43,7 @@ def test_flakes_are_slow_and_large(camera):
 
 
 def test_the_same_particles_come_nearer(camera, moment):
-    """Particles ahead grow out of the focus of expansion and move according to their distance."""
+    """Particles ahead move away from the focus of expansion and grow, as their distance requires."""
     straight = replace(camera, pitch=0.0)
     particles = alone(straight)
     before = particles.streaks(moment()._replace(position=0.0), 0.0)
@@ -74,7 +74,7 @@ def test_falling_particles_sink(camera, moment):
 
 
 def test_streaks_are_the_way_in_the_exposure(camera, moment):
-    """A streak ends at the particle's position when the shutter closes, and is longer at speed."""
+    """A streak ends where the particle is when the shutter closes. At higher speed it is longer."""
     particles = alone(camera, speed=5.0)
     now = moment()
     closed = now._replace(t=now.t + 0.002, position=now.position + 0.002 * now.v_ego)
@@ -90,7 +90,7 @@ def test_streaks_are_the_way_in_the_exposure(camera, moment):
 
 
 def test_boxes_repeat_without_gaps(camera, moment):
-    """About equally many particles are in view at any time and place."""
+    """The number of particles in view is about the same at any time and place."""
     particles = alone(camera, speed=7.0, number=3000)
     counts = [particles.streaks(moment(number), 0.001).width.size for number in range(0, 600, 40)]
     assert min(counts) > 0.7 * max(counts)
@@ -98,7 +98,7 @@ def test_boxes_repeat_without_gaps(camera, moment):
 
 @pytest.mark.parametrize("width", [0.4, 1.2, 2.0, 5.0])
 def test_streaks_take_the_light_of_their_area(width, camera):
-    """A particle always covers pi / 4 * width^2 pixels of light, on any of the grids."""
+    """A particle takes the light of pi / 4 * width^2 pixels, on every grid."""
     start = np.array([[100.3, 300.0, 500.7], [200.1, 240.5, 300.9]], np.float32)
     streaks = Streaks(start, start + np.float32(6.3), np.full(3, width, np.float32))
     taken = Cover(camera).taken(streaks, whole((camera.rows, camera.width))).astype(float) / 255.0

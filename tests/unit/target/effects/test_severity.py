@@ -1,4 +1,4 @@
-"""Measures of severity on images with known values, and the page based on them."""
+"""Measures of severity on images with known values, and the page of these measures."""
 
 import re
 from math import inf
@@ -15,7 +15,7 @@ REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
 @pytest.fixture
 def gauge(camera):
-    """Measure the plain road."""
+    """Return a gauge that measures the plain road."""
     return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
 
 
@@ -25,7 +25,7 @@ def test_clean_pictures_lack_nothing(gauge, road):
 
 
 def test_contrast_and_psnr_follow_the_levels(gauge, road):
-    """Half the levels give half the contrast, and the PSNR of that error."""
+    """At half the grey levels, the contrast is halved and the PSNR is that of the error."""
     psnr, contrast, _ = gauge.measure(road, road // 2)
     error = (road.astype(float) - road // 2) ** 2
     assert contrast == pytest.approx(60.0, abs=1.0)
@@ -42,9 +42,7 @@ def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
 
 
 def test_weak_edges_count_where_marks_are_weak(gauge, road):
-    """Between lines with a third of the contrast, edges of a third count; next to strong lines they
-    do not.
-    """
+    """Weak edges count between lines with a third of the contrast, but not next to strong lines."""
     weak = (road // 3).copy()
     strong = road.copy()
     weak[:, 310:330:8] = 60
@@ -54,7 +52,7 @@ def test_weak_edges_count_where_marks_are_weak(gauge, road):
 
 
 def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
-    """A pixel is covered if an even grey changes by 8 levels or more; uniform haze covers nothing."""
+    """A pixel is covered if an even grey changes by at least 8 levels. Uniform haze covers no pixel."""
     grey = np.full_like(road, 100)
     assert gauge.covered(grey // 2) == 0.0
     half = grey.copy()
@@ -78,7 +76,7 @@ def test_page_has_every_effect_and_level():
 def test_page_is_what_the_command_writes(tmp_path):
     """The committed page is current.
 
-    After a change of effects or detectors: `python -m selfdrive.sim.effects.page`.
+    After a change of effects or detectors, run `python -m selfdrive.sim.effects.page`.
     """
     page.write(tmp_path)
     made, kept = (folder / "image-effects.md" for folder in (tmp_path, REFERENCE))

@@ -1,4 +1,4 @@
-"""The physical meaning of the paper's effect levels."""
+"""The paper's effect levels match physical amounts of rain, snow and fog."""
 
 from itertools import pairwise
 
@@ -10,9 +10,9 @@ from selfdrive.sim.effects.visibility import BLOCK, DROP, REACH, fog, rain, snow
 
 
 def test_so_many_drops_are_near_the_camera(camera):
-    """At level 10 there are 10,000 drops of 1 mm and more within range:
+    """At level 10 there are 10,000 drops of 1 mm and more within range.
 
-    Marshall's and Palmer's number in the view.
+    The number in the view is that of Marshall and Palmer.
     """
     weather = rain(10, camera)
     fall = Rain(weather.rate, 0, camera)
@@ -22,7 +22,7 @@ def test_so_many_drops_are_near_the_camera(camera):
 
 
 def test_so_many_flakes_look_as_large_as_a_block(camera):
-    """Flakes appear as large as a block up to one distance, and there are 1,000 of them at level 10."""
+    """Level 10 has 1,000 flakes within the distance at which a flake appears as large as a block."""
     weather = snow(10, camera)
     fall = Snow(weather.rate, 0, camera)
     count, step = 0.0, 0.01
@@ -35,19 +35,22 @@ def test_so_many_flakes_look_as_large_as_a_block(camera):
 
 
 def test_worse_weather_is_seen_less_far(camera):
-    """From level to level it rains and snows more, and the range falls."""
+    """At each higher level, rain and snow are heavier and the range is shorter."""
     for kind in (rain, snow):
         weather = [kind(level, camera) for level in range(1, 11)]
         assert all(a.rate < b.rate and a.range > b.range for a, b in pairwise(weather))
 
 
 def test_fog_of_a_contrast():
-    """At the meteorological range 5 % is left; the middle of the measured road has the given contrast."""
+    """At the meteorological range 5 % of the contrast is left.
+
+    The middle of the measured road has the given contrast.
+    """
     assert fog(0.05).range == pytest.approx(17.5)
     assert fog(0.9).range > fog(0.4).range > 50.0
 
 
 def test_a_rate_out_of_reach_is_the_nearest():
-    """For a camera that sees everything around it, the rate is limited to the least one."""
+    """If a camera sees everything around it, the rate is the lowest possible one."""
     wide = CameraModel(fx=30.0, fy=30.0)
     assert snow(0.0001, wide).rate == pytest.approx(Snow.LEAST)

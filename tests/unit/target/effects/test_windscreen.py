@@ -1,4 +1,4 @@
-"""Drops on the windscreen stay where they land until they are wiped away."""
+"""Drops on the windscreen stay where they land until the wiper removes them."""
 
 import numpy as np
 import pytest
@@ -9,18 +9,18 @@ from selfdrive.sim.picture import whole
 
 @pytest.fixture
 def glass(camera):
-    """A windscreen in rain of 1,000 drops of 2 mm in a cubic metre."""
+    """A windscreen in rain with 1,000 drops of 2 mm in a cubic metre."""
     return Windscreen(np.random.default_rng(5), camera, 1000.0, np.full(50, 0.002), shrunk, Gaussian(BLUR))
 
 
 def wet(glass, picture, moment, share, wipe=3):
-    """The pixels that show drops at this fraction of the time between two wipes."""
+    """Return the pixels that show drops at this fraction of the time between two wipes."""
     start = wipe * WIPE - glass._start
     return glass.seen(picture, whole(picture.shape), moment._replace(t=start + share * WIPE)) != picture
 
 
 def test_drops_gather_until_the_wipe(glass, road, moment):
-    """Drops stay and others join them; the wiper removes all; the next ones land elsewhere."""
+    """Drops stay and more join them. The wiper removes all of them, and new ones land elsewhere."""
     early, late = (wet(glass, road, moment(), share) for share in (0.3, 0.9))
     assert 0 < early.sum() < 0.6 * late.sum()
     assert (late | ~early).mean() > 0.999
@@ -30,14 +30,17 @@ def test_drops_gather_until_the_wipe(glass, road, moment):
 
 
 def test_a_faster_car_meets_more_drops(glass, road, moment):
-    """The number of drops grows with the air's speed at the glass, including the rain's fall."""
+    """The number of drops grows with the speed of the air at the glass, which includes the rain's fall."""
     slow, fast = (wet(glass, road, moment(speed=speed), 0.9).sum() for speed in (0.0, 26.8))
     assert 2.0 < fast / slow < 5.0
     assert wet(glass, road, moment(speed=90.0), 0.99).any()
 
 
 def test_drops_show_the_scene_upside_down(glass, camera, moment):
-    """Drops before the dark road are bright below, and those before the bright sky dark above."""
+    """A drop in front of the dark road is bright at the bottom.
+
+    A drop in front of the bright sky is dark at the top.
+    """
     picture = np.full((camera.rows, camera.width), 60, np.uint8)
     picture[:200] = 200
     start = 3 * WIPE - glass._start

@@ -1,4 +1,4 @@
-"""Films of short runs with ideal vision and with frames, and made-up frames."""
+"""Films of short runs, with ideal vision or with frames, and synthetic frames."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ spacing_m: 1.342
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory):
-    """Run the first half second of S1 into a new folder and return it; the film is in film/."""
+    """Run the first half second of S1 into a new folder and return it. Its film is in film/."""
 
     def go(*arguments, film=True):
         folder = tmp_path_factory.mktemp("run")
@@ -42,7 +42,7 @@ def drive(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def seeing(tmp_path_factory):
-    """Arguments of a run that uses four frames of a road."""
+    """Return the arguments of a run that uses four frames of a road."""
     folder = tmp_path_factory.mktemp("frames")
     (folder / "camera.yaml").write_text(CALIBRATION)
     road = RoadRenderer(CameraModel(), "solid", 0)

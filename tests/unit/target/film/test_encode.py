@@ -1,4 +1,4 @@
-"""Videos, stills, and the command that writes them."""
+"""Videos, stills and the command that writes them."""
 
 import json
 
@@ -22,7 +22,7 @@ EVENTS = {
 
 
 def pictures(count=8):
-    """Grey images of rising brightness, with a bar in a colour of the sheet."""
+    """Grey images that become brighter, with a bar in one of the sheet's colours."""
     for number in range(count):
         picture = np.full((180, 320, 3), 60 + 10 * number, np.uint8)
         picture[:40] = pen.FAULTY
@@ -39,7 +39,7 @@ def frames_of(path):
 
 
 def test_an_mp4_shows_the_pictures(tmp_path):
-    """The video has as many frames as images, of their size and brightness."""
+    """The video has one frame for each image, with the image's size and brightness."""
     write_video(pictures(), tmp_path / "a.mp4")
     found = frames_of(tmp_path / "a.mp4")
     assert [picture.shape for picture in found] == [(180, 320, 3)] * 8
@@ -50,7 +50,7 @@ def test_an_mp4_shows_the_pictures(tmp_path):
 
 
 def test_a_gif_moves_at_the_same_speed(tmp_path):
-    """A GIF has a quarter of the frames, each shown four times as long, in the sheet's own colours."""
+    """A GIF has every fourth frame, shown four times as long, in the sheet's colours."""
     write_video(pictures(), tmp_path / "a.gif")
     with Image.open(tmp_path / "a.gif") as gif:
         assert (gif.n_frames, gif.info["duration"], gif.size) == (2, 200, (800, 450))
@@ -58,7 +58,7 @@ def test_a_gif_moves_at_the_same_speed(tmp_path):
 
 
 def test_other_formats_are_refused(tmp_path):
-    """The error lists the supported names, and nothing is written."""
+    """For an unknown format, the error lists the supported names and no file is written."""
     with pytest.raises(ConfigError, match=r"\.mp4 or \.gif"):
         write_video(pictures(), tmp_path / "a.avi")
     with pytest.raises(ConfigError, match=r"\.png"):
@@ -75,7 +75,7 @@ def test_a_place_that_cannot_be_written_is_told(tmp_path):
 
 @pytest.mark.parametrize(("name", "words"), [("a.gif", ()), ("a.png", ("--at", "0.3"))])
 def test_the_command_shows_two_films(drive, tmp_path, name, words):
-    """From two runs' films to a file with the same bytes each time."""
+    """From two runs' films, the command writes a file with the same bytes each time."""
     (tmp_path / "events.json").write_text(json.dumps(EVENTS))
     film = str(drive() / "film")
     for folder in ("x", "y"):
@@ -85,7 +85,7 @@ def test_the_command_shows_two_films(drive, tmp_path, name, words):
 
 
 def test_the_command_tells_what_is_wrong(tmp_path, capsys):
-    """Wrong input gives exit code 2 and one line."""
+    """For invalid input, the command exits with code 2 and prints one line."""
     folder = str(tmp_path)
     words = ["--golden", folder, "--faulty", folder, "--events", folder, "--out", f"{folder}/a.mp4"]
     assert main(words) == 2
@@ -96,9 +96,7 @@ def test_the_command_tells_what_is_wrong(tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.gif", "a.png"])
 def test_a_full_disk_is_told_with_the_file(tmp_path, name):
-    """A file that cannot be written completely is an error that names it, without a traceback or a
-    torn file.
-    """
+    """A file that cannot be written completely raises an error with its name. No partial file remains."""
     path = tmp_path / name
     path.symlink_to("/dev/full")
     with pytest.raises(ConfigError, match=f"{name}: No space left on device"):

@@ -1,4 +1,4 @@
-"""A film's content, and its absence of effect on the run."""
+"""A film shows what the run did and does not affect the run."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def test_a_run_with_pictures_is_the_same_with_a_film(drive, seeing):
 
 
 def test_one_frame_for_each_look_of_the_camera(drive):
-    """The film has twenty frames a second, at the trace's times, with its speeds and distances."""
+    """The film has twenty frames a second, with the times, speeds and distances of the trace."""
     folder = drive()
     reel, trace = read_reel(folder / "film"), np.load(folder / "trace.npz")
     assert [frame.t for frame in reel.frames] == list(trace["t"][::5])
@@ -38,7 +38,7 @@ def test_one_frame_for_each_look_of_the_camera(drive):
 
 
 def test_what_was_seen_is_kept(drive):
-    """Ideal vision sees both lines and the lead where they are."""
+    """With ideal vision, the film shows both lines and the lead where they are."""
     frame = read_reel(drive() / "film").frames[-1]
     assert (frame.lines["left"].y[0], frame.lines["right"].y[0]) == (1.85, -1.85)
     assert frame.lines["left"].prob == 1.0
@@ -46,19 +46,19 @@ def test_what_was_seen_is_kept(drive):
 
 
 def test_pictures_are_kept_as_the_detector_had_them(drive, seeing):
-    """The stored frame is the camera's own, apart from JPEG losses."""
+    """The stored frame is the detector's frame, apart from JPEG losses."""
     frame = read_reel(drive(*seeing) / "film").frames[0]
     own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
     assert np.abs(frame.image().astype(int) - own).mean() < 1.0
 
 
 def test_a_free_road_has_no_lead(drive):
-    """Without a lead a frame has no distance."""
+    """If there is no lead, a frame has no distance."""
     assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
 
 
 def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
-    """If visiond publishes nothing, the film has no lines, instead of the previous message's."""
+    """If visiond publishes nothing, the film shows no lines, not those of the previous message."""
     publish = Visiond.publish
     monkeypatch.setattr(Visiond, "publish", lambda own, model: model.t < 0.2 and publish(own, model))
     frames = read_reel(drive() / "film").frames
@@ -82,7 +82,7 @@ def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
 
 
 def test_a_film_that_cannot_be_written(tmp_path, capsys):
-    """A folder that cannot be created is reported by name, and nothing runs."""
+    """If the folder cannot be created, the error names it and nothing runs."""
     (tmp_path / "file").touch()
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out")]
     assert main([*words, "--film", str(tmp_path / "file" / "film")]) == 2
@@ -91,7 +91,7 @@ def test_a_film_that_cannot_be_written(tmp_path, capsys):
 
 
 def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
-    """If the disk is full at the second frame, the run ends with the folder's name."""
+    """If the disk is full at the second frame, the run ends with an error that names the folder."""
     (tmp_path / "film").mkdir()
     (tmp_path / "film" / "00001.jpg").symlink_to("/dev/full")
     words = ["--scenario", str(SCENARIOS / "S1.yaml"), "--out", str(tmp_path / "out"), *seeing]
@@ -101,7 +101,7 @@ def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
 
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
 def test_what_is_no_film_is_told(tmp_path, text):
-    """An index with missing parts is refused by its name."""
+    """An index with missing parts is refused, and the error names it."""
     (tmp_path / "film.jsonl").write_text(text)
     with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
         read_reel(tmp_path)

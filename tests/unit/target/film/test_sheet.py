@@ -1,4 +1,4 @@
-"""The sheet: two runs side by side, whatever a fault did to their perception."""
+"""The sheet shows two runs side by side, whatever a fault did to perception."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ EVENTS = Events(title="a fault", outcome="hazard", active=None, marks=(), names=
 
 
 def is_drawn(picture, colour):
-    """Whether a pixel of the image has nearly this colour."""
+    """Whether a pixel of the image has almost this colour."""
     return bool((np.abs(picture.astype(int) - colour).max(axis=-1) <= 40).any())
 
 
@@ -28,7 +28,7 @@ def pane_of(sheet, side):
 
 
 def test_lines_lie_on_the_paint(frame):
-    """Lines seen at their true place cover the painted ones, so no yellow is left."""
+    """A line that is seen at its true place covers the painted one, so no yellow is left."""
     pane = CameraPane(CameraModel(), *PANE)
     without, with_lines = pane.draw(frame(lines=None, d_rel=None)), pane.draw(frame(d_rel=None))
     yellow = (without[..., 2].astype(int) - without[..., 0] > 90).sum()
@@ -38,7 +38,7 @@ def test_lines_lie_on_the_paint(frame):
 
 
 def test_a_bend_moves_road_and_lines_alike(frame):
-    """In a left-hand bend the seen line still covers the painted one."""
+    """In a left-hand bend, the seen line covers the painted one."""
     bend = tuple(0.001 * x * x for x in range(0, 50, 7))
     lines = {"left": SeenLine(y=tuple(1.85 + y for y in bend), prob=1.0)}
     pane = CameraPane(CameraModel(), *PANE)
@@ -71,7 +71,10 @@ def test_whatever_a_fault_does_can_be_drawn(reel):
 
 
 def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
-    """A red frame starts at the hazard, an amber bar shows while the driver is warned; golden has neither."""
+    """A red frame starts at the hazard.
+
+    An amber bar shows while the driver is warned. The golden run has neither.
+    """
     faulty = reel({}, {"hazards": ("H3",)}, {"alerts": ("steer_saturated",), "text": "Take control"})
     sheet = Sheet(reel({}, {}, {}), faulty, EVENTS)
     for index, colour in ((1, pen.HAZARD), (2, pen.ALERT)):
@@ -81,14 +84,14 @@ def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
 
 
 def test_alerts_that_do_not_count_are_not_shown(reel):
-    """The reminder at the start is no warning."""
+    """The reminder at the start does not count as a warning."""
     plain, reminded = reel({}), reel({"alerts": ("startup",), "text": "Hands on the wheel"})
     sheet = Sheet(plain, reminded, EVENTS).draw(0)
     assert (pane_of(sheet, "faulty")[-60:] == pane_of(sheet, "golden")[-60:]).all()
 
 
 def test_the_fault_is_said_to_be_active_while_it_is(reel):
-    """The faulty side shows the text between its first and its last activation."""
+    """The faulty side shows the fault as active between its first and its last activation."""
     events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
     corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]
@@ -96,7 +99,7 @@ def test_the_fault_is_said_to_be_active_while_it_is(reel):
 
 
 def test_a_run_that_broke_off_stands_still(reel):
-    """The shorter film keeps its last frame, darker, while the other continues."""
+    """When the shorter film ends, its last frame stays, darkened, while the other film continues."""
     sheet = Sheet(reel({}, {}, {}), reel({}), EVENTS)
     assert sheet.count == 3
     assert pane_of(sheet.draw(2), "faulty").mean() < 0.7 * pane_of(sheet.draw(0), "faulty").mean()
@@ -104,13 +107,13 @@ def test_a_run_that_broke_off_stands_still(reel):
 
 
 def test_a_moment_is_found(reel):
-    """The frame nearest to a time is found, even beyond the end."""
+    """The frame nearest to a time is found, even after the end of the film."""
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), EVENTS)
     assert [sheet.nearest(t) for t in (-1.0, 0.06, 99.0)] == [0, 1, 2]
 
 
 def test_marks_stand_at_their_times(reel):
-    """The timeline has a line in the mark's colour at its time, and none without the mark."""
+    """The timeline has a line in the mark's colour at the mark's time, and nowhere else."""
     frames = [{}] * 41
     marked = Events(
         title="", outcome="hazard", active=None, marks=(Mark(kind="hazard", t=1.0, label="H1"),), names={}
@@ -125,7 +128,7 @@ def test_marks_stand_at_their_times(reel):
 
 
 def test_what_comes_after_the_end_of_the_drive_is_grey(reel):
-    """Both sides and the timeline lose their colours after the end, and plots ignore later values."""
+    """After the end of the drive, both sides and the timeline are grey. Plots leave later values out."""
     frames = [{"d_rel": 20.0}] * 21 + [{"d_rel": 500.0}] * 20
     ended, whole = (Sheet(reel(*frames), reel(*frames), replace(EVENTS, end=end)) for end in (1.0, None))
     assert (ended.draw(20)[:580] == whole.draw(20)[:580]).all()
@@ -139,7 +142,7 @@ def test_what_comes_after_the_end_of_the_drive_is_grey(reel):
 
 
 def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
-    """A wide camera's frame fills the pane's width and leaves room above."""
+    """A wide camera's frame fills the width of its pane and leaves space above."""
     cv2.imwrite(str(tmp_path / "a.jpg"), np.full((720, 1280), 128, np.uint8))
     model = CameraModel.from_view(width=1280, rows=720, horizon=300.0, focal=1000.0, height=1.4)
     wide = replace(reel({"picture": tmp_path / "a.jpg", "d_rel": None}), camera=model)
@@ -149,7 +152,7 @@ def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
 
 
 def test_events_are_read(tmp_path):
-    """Events written by the harness are read back; anything else is an error with the file's name."""
+    """Events that the harness wrote are read back. For any other content, the error names the file."""
     path = tmp_path / "events.json"
     mark = {"kind": "alert", "t": 3.0, "label": "fcw"}
     path.write_text(

@@ -48,7 +48,7 @@ def lead():
 
 @pytest.fixture
 def lanes():
-    """Build straight lanes of 3.7 m, their middle `offset` m to the left, turned by `slope`."""
+    """Build straight lanes of 3.7 m with the middle `offset` m to the left, rotated by `slope`."""
 
     def make(offset=0.0, slope=0.0, left_prob=1.0, right_prob=1.0):
         lines = [(0.0, 0.0, slope, offset + y) for y in (1.85, -1.85, 0.0)]

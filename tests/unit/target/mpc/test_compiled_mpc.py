@@ -1,4 +1,4 @@
-"""The compiled solvers have the bits of CasADi's, which replace them wherever they might not."""
+"""The compiled solvers return CasADi's bits, or CasADi's solvers are used instead."""
 
 import ctypes
 import math
@@ -53,7 +53,7 @@ def number(draw: random.Random, scale: float) -> float:
 
 
 def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], list[float]]:
-    """A first state and parameters; sizes are `wild` times those of a drive."""
+    """Return a first state and parameters. Their sizes are `wild` times those of a normal drive."""
     if name == "longitudinal":
         speeds = [abs(number(draw, 30 * wild)) for _ in range(2)]
         gap = draw.choice((50.0, abs(number(draw, 100 * wild))))
@@ -67,7 +67,7 @@ def problem(name: str, draw: random.Random, wild: float) -> tuple[list[float], l
 
 
 def spoil(values: list[float], draw: random.Random) -> None:
-    """Sometimes replace one of them by an implausible number."""
+    """Sometimes replace a value by an implausible one."""
     if draw.random() < 0.03:
         values[draw.randrange(len(values))] = draw.choice(NO_NUMBERS)
 
@@ -78,8 +78,10 @@ def spoil(values: list[float], draw: random.Random) -> None:
 def test_iterations_have_the_bits_of_the_reference(
     name: str, seed: int, references: dict[str, Solver]
 ) -> None:
-    """Trajectory, next guess and flags of 15 iterations have the same bytes, also for impossible problems and
-    for NaN; of non-finite results, only that they are not finite.
+    """After 15 iterations, trajectory, next guess and flags have the same bytes.
+
+    This also holds for impossible problems and NaN. If results are not finite, the test only checks that
+    neither solver's are.
     """
     draw = random.Random(seed)
     wild = draw.choice((1.0, 3.0, 10.0, 1e3, 1e10, 1e100, 1e308)) if seed % 4 == 0 else 1.0
@@ -113,7 +115,7 @@ def test_iterations_have_the_bits_of_the_reference(
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("name", COMPILED)
 def test_a_solver_has_no_memory(name: str) -> None:
-    """After impossible problems, or in another solver, the same problem gives the same bytes."""
+    """The same problem gives the same bytes after impossible problems and in another solver."""
     draw = random.Random(1)
     start, parameters = problem(name, draw, 1.0)
     solver = COMPILED[name]()
@@ -133,7 +135,7 @@ def test_a_solver_has_no_memory(name: str) -> None:
 
 
 def test_the_c_file_has_what_casadi_derives() -> None:
-    """The C file's generated part is that of this CasADi, and its weights are those of the problems."""
+    """The generated part of the C file matches this CasADi, and its weights match those of the problems."""
     assert casadi.__version__ == compiled_mpc.CASADI
     text = C_SOURCE.read_text()
     assert mpc_parts.with_parts(text) == text
@@ -144,9 +146,7 @@ def test_the_c_file_has_what_casadi_derives() -> None:
 @pytest.mark.usefixtures("use")
 @pytest.mark.parametrize("other", ["version", "function", "conduct"])
 def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With another CasADi, without the called function, or with another answer to a known problem, it is not
-    used.
-    """
+    """The library is used only if CasADi's version, the function and a known solution match."""
     compiled_mpc._daqp.cache_clear()
     if other == "version":
         monkeypatch.setattr(compiled_mpc, "CASADI", "3.7.0")
@@ -165,7 +165,7 @@ def test_another_daqp_is_not_used(other: str, monkeypatch: pytest.MonkeyPatch) -
 def test_an_edited_problem_is_solved_as_it_is_written(
     all_compiled: Path, tmp_path: Path, edited: str
 ) -> None:
-    """If a file that the C code stands for differs, CasADi's solver is built."""
+    """If a file that the C code replaces has changed, CasADi's solver is built."""
     target = tmp_path / "target"
     shutil.copytree(
         mpc_parts.C_FILE.parents[3] / "selfdrive",
@@ -190,7 +190,7 @@ def test_an_edited_problem_is_solved_as_it_is_written(
 
 
 def test_a_run_without_pictures_needs_no_casadi(all_compiled: Path) -> None:
-    """With compiled code, a run does not import CasADi, which is slow to import."""
+    """With compiled code, a run does not import CasADi, because the import is slow."""
     code = (
         "import sys; from selfdrive.sim.run import open_run; "
         "open_run(['--scenario', %r, '--out', 'none', '--compiled', %r]).step(); "

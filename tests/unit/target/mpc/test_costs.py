@@ -1,4 +1,4 @@
-"""Both MPCs minimise their intended costs, written again in plain formulas."""
+"""Both MPCs minimise the intended costs, which the tests state as plain formulas."""
 
 import math
 from itertools import pairwise
@@ -12,7 +12,10 @@ FACTORS = np.array([1.0] * 5 + [3.0] * 15 + [1.0])  # long intervals weigh three
 
 
 def flattest(cost, controls, scale):
-    """The cost's slope by each control (central differences), relative to that of a plan slightly off."""
+    """The slope of the cost along each control, relative to the slope at a plan slightly off.
+
+    The slopes are central differences.
+    """
     bases = np.eye(len(controls)) * scale
 
     def slope(u):
@@ -22,7 +25,7 @@ def flattest(cost, controls, scale):
 
 
 def long_cost(jerks, v, a, x_lead, v_lead):
-    """The longitudinal cost of a plan behind a lead of constant speed."""
+    """The longitudinal cost of a plan behind a lead at constant speed."""
     steps = [0.2] * 5 + [0.6] * 15
     x, xs = 0.0, []
     for k in range(21):
@@ -41,7 +44,7 @@ def long_cost(jerks, v, a, x_lead, v_lead):
 
 @pytest.mark.parametrize(("v", "a", "gap", "v_lead"), [(20.0, -0.3, 45.0, 18.0), (25.0, 0.0, 60.0, 26.0)])
 def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead):
-    """Weights 5, 0.1, 10, 20 and the residuals of gap, danger, acceleration and jerk."""
+    """The plan minimises gap, danger, acceleration and jerk residuals with weights 5, 0.1, 10 and 20."""
     for _ in range(50):
         long_mpc.set_cur_state(v, a)
         long_mpc.update(v, a, lead(gap, v_lead))
@@ -50,7 +53,7 @@ def test_longitudinal_plan_minimises_its_cost(long_mpc, lead, v, a, gap, v_lead)
 
 
 def test_first_guess_brakes_evenly_to_the_lead(long_mpc):
-    """For a new lead the first plan slows from 20 to 10 m/s over the 80 m between, by 0.625 m/s^2."""
+    """For a new lead, the first plan brakes by 0.625 m/s^2 from 20 to 10 m/s over the 80 m between."""
     long_mpc.v_mpc = 20.0
     long_mpc._simulate(80.0, 10.0, 0.0, LEAD_DECAY)
     speeds = long_mpc._iteration.guess[1:126:6]
@@ -90,7 +93,7 @@ def lateral_cost(rates, delta):
 
 
 def rk4(z, rate):
-    """One step of 0.05 s."""
+    """One Runge-Kutta step of 0.05 s."""
 
     def f(z):
         return np.array(
@@ -105,7 +108,10 @@ def rk4(z, rate):
 
 
 def test_lateral_plan_minimises_its_cost(lateral_mpc):
-    """Weights 1, 1, 1, 1 and 0.5 and the residuals of path, both lanes, heading and steering rate."""
+    """The plan minimises its residuals.
+
+    These are path, both lanes, heading and steering rate with weights 1, 1, 1, 1 and 0.5.
+    """
     for _ in range(60):  # from its own solution each time, not from a shifted one
         lateral_mpc._delta = 0.002
         lateral_mpc._iteration.guess[:] = lateral_mpc._iteration.solution

@@ -1,4 +1,4 @@
-"""Lateral MPC: its plan, its limits, and the case without a solution."""
+"""The lateral MPC: its plan, its limits and unsolvable problems."""
 
 import math
 import random
@@ -26,7 +26,7 @@ def settle(mpc, lanes, times=60):
 
 
 def results(mpc):
-    """All public results, to the last bit."""
+    """Return all public results, to the last bit."""
     scalars = (mpc.angle_desired, mpc.delta_desired, mpc.nans)
     return [repr(value) for value in scalars] + [mpc.delta_plan.tobytes()]
 
@@ -49,7 +49,7 @@ def test_steers_towards_the_path(lateral_mpc, lanes, side):
 
 
 def test_curve_ends_in_the_curves_wheel_angle(lateral_mpc):
-    """Along a curve of 500 m radius the plan holds the wheel angle of that curvature."""
+    """Along a curve of 500 m radius, the plan holds the wheel angle for that curvature."""
     curve = (0.0, 1 / 1000, 0.0)
     road = Lanes((*curve, 1.85), (*curve, -1.85), (*curve, 0.0), 1.0, 1.0, 3.7)
     for _ in range(100):
@@ -70,7 +70,7 @@ def test_without_lanes_the_models_path_counts(lateral_mpc, lanes):
 
 
 def test_one_line_gives_the_lane_by_its_width(lateral_mpc, lanes):
-    """With the left line alone the middle is half a lane's width to its right."""
+    """With the left line only, the middle is half a lane's width to its right."""
     one = lanes(0.4, right_prob=0.0)
     one.path_poly = (0.0, 0.0, 0.0, -5.0)
     settle(lateral_mpc, one)
@@ -78,7 +78,7 @@ def test_one_line_gives_the_lane_by_its_width(lateral_mpc, lanes):
 
 
 def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
-    """A car that hardly turns is steered to 25 degrees at 0.1 rad/s at the road wheels, and never beyond."""
+    """A car that hardly turns is steered at 0.1 rad/s at the road wheels up to 25 degrees, and no further."""
     for _ in range(120):
         lateral_mpc.update(lanes(8.0), V, 0.0, 0.0, 0.02)
         plan = lateral_mpc.delta_plan
@@ -91,7 +91,7 @@ def test_plan_keeps_rate_and_angle_limits(lateral_mpc, lanes):
 
 
 def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
-    """The plan starts at the car's position and heading when a command acts."""
+    """The plan starts at the position and heading that the car has when a command acts."""
     drive(lateral_mpc, lanes(), angle=0.26)
     delay = get_params().steer_actuator_delay
     x, y, heading, delta = lateral_mpc._iteration.solution[:4]
@@ -100,7 +100,7 @@ def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
 
 
 def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
-    """The measured wheel angle does not enter the plan's own; the offset is added to the result."""
+    """The plan continues from its own angle, not the measured one. The offset is added to the result."""
     drive(lateral_mpc, lanes(1.0), offset=0.01)
     wanted = lateral_mpc.delta_desired
     assert lateral_mpc.angle_desired == pytest.approx(wanted * RATIO + 0.01)
@@ -109,14 +109,14 @@ def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
 
 
 def test_low_speed_is_planned_as_5_mps(lateral_mpc, lanes):
-    """Below 5 m/s the plan is that for 5 m/s, except the distance until a command acts."""
+    """Below 5 m/s the plan is that for 5 m/s, except for the distance until a command acts."""
     drive(lateral_mpc, lanes(0.3), v=0.0)
     assert lateral_mpc._iteration.solution[4] == pytest.approx(5.0 * 0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("where", ["lane", "speed", "angle", "lanes too far"])
 def test_no_number_resets(lateral_mpc, lanes, where):
-    """Without a finite solution the angle is NaN once, and the next plan starts at the measured angle."""
+    """Without a finite solution the angle is NaN once. The next plan starts at the measured angle."""
     drive(lateral_mpc, lanes(0.5), times=3)
     broken = lanes(400.0) if where == "lanes too far" else lanes()
     if where == "lane":
@@ -133,7 +133,7 @@ def test_no_number_resets(lateral_mpc, lanes, where):
 
 
 def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
-    """A discarded plan has no effect later: two pasts give the same bytes afterwards."""
+    """A discarded plan has no later effect. After two different pasts, the results have the same bytes."""
     outcomes = []
     for past in (lanes(1.0), lanes(-3.0)):
         lateral_mpc.reset()
@@ -145,8 +145,9 @@ def test_reset_after_no_number_is_complete(lateral_mpc, lanes):
 
 
 def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
-    """A heading beyond 90 degrees has no solution: the plan continues unchanged, and the failure is
-    counted.
+    """A heading of more than 90 degrees has no solution.
+
+    The plan continues unchanged, and the failure is counted.
     """
     drive(lateral_mpc, lanes(2.0), times=3)
     planned = list(lateral_mpc._iteration.guess[84:])
@@ -158,7 +159,7 @@ def test_unsolvable_problem_keeps_the_planned_rates(lateral_mpc, lanes):
 
 
 def test_reset_forgets_everything(lateral_mpc, lanes):
-    """After a reset, even from an unsolvable problem, an instance computes the bytes of a new one."""
+    """After a reset, even from an unsolvable problem, an instance computes the same bytes as a new one."""
     fresh = LateralMpc(get_params())
     drive(lateral_mpc, lanes(-3.0), times=5, angle=60.0)
     drive(lateral_mpc, lanes(math.nan))

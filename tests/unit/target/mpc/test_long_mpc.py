@@ -25,7 +25,7 @@ def drive(mpc, v, a, lead, times):
 
 
 def results(mpc):
-    """All public results, to the last bit."""
+    """Return all public results, to the last bit."""
     scalars = (mpc.v_mpc, mpc.a_mpc, mpc.v_mpc_future, mpc.prev_lead_status, mpc.new_lead)
     plans = (mpc.x_plan, mpc.v_plan, mpc.a_plan, mpc.x_lead_plan)
     return [repr(value) for value in scalars] + [plan.tobytes() for plan in plans]
@@ -33,10 +33,10 @@ def results(mpc):
 
 @pytest.fixture
 def stop():
-    """From 7.5 s to 22 s of the original's run in S5, 20 Hz: its leads and its plans.
+    """Leads and plans of the original's run in S5, from 7.5 s to 22 s at 20 Hz.
 
     A lead is (distance, speed, acceleration), a plan (speed, acceleration). The lead's speed is the relative
-    one plus the car's speed 0.1 s before, two rows up, because of the radar's delay.
+    speed plus the car's speed 0.1 s before, two rows up, because of the radar's delay.
     """
     path = TRACES / "S5.csv"
     if not path.exists():
@@ -53,7 +53,7 @@ def stop():
 
 
 def test_plan_follows_the_recorded_original(long_mpc, lead, stop):
-    """With the same leads, our plan equals the original's through a whole stop (openpilot v0.4.2)."""
+    """With the same leads, the plan equals the original's through a whole stop (openpilot v0.4.2)."""
     leads, plans = stop
     (v, a), (_, a_next) = plans[:2]
     a -= 0.2 * (a_next - a)
@@ -76,7 +76,7 @@ def test_plan_follows_the_recorded_original(long_mpc, lead, stop):
 
 @pytest.mark.parametrize("v", [0.0, 5.0, 15.0, 30.0])
 def test_steady_gap(long_mpc, lead, v):
-    """Behind a lead of its own speed, at 4 m + 1.8 s, the plan changes nothing."""
+    """Behind a lead at the car's speed, with a gap of 4 m + 1.8 s, the plan keeps the speed."""
     drive(long_mpc, v, 0.0, lead(4.0 + 1.8 * v, v), 20)
     assert long_mpc.a_mpc == pytest.approx(0.0, abs=1e-6)
     assert list(long_mpc.v_plan) == pytest.approx([v] * 21, abs=1e-4)
@@ -84,7 +84,7 @@ def test_steady_gap(long_mpc, lead, v):
 
 @pytest.mark.parametrize(("gap", "sign"), [(30.0, -1), (60.0, 1)])
 def test_plan_closes_the_error_of_the_gap(long_mpc, lead, gap, sign):
-    """Too close means braking, too far means accelerating."""
+    """The plan brakes if the gap is too small and accelerates if it is too large."""
     drive(long_mpc, 20.0, 0.0, lead(gap, 20.0), 20)
     assert long_mpc.a_mpc * sign > 0.01
     assert (long_mpc.v_mpc_future - 20.0) * sign > 0.1
@@ -100,7 +100,7 @@ def test_no_lead_never_limits(long_mpc):
 
 
 def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
-    """A lead is new after none, or after a move of more than 2.5 m in one update."""
+    """A lead is new if there was none before or if it moved by more than 2.5 m in one update."""
     seen = []
     for d_rel in (50.0, 49.0, 51.5, 54.1, 54.1):
         drive(long_mpc, 20.0, 0.0, lead(d_rel, 18.0), 1)
@@ -113,13 +113,13 @@ def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
 
 @pytest.mark.parametrize(("v", "a"), [(0.09, 0.0), (2.0, -4.1), (-3.0, 0.0)])
 def test_slow_or_hard_braking_lead_counts_as_stopped(long_mpc, lead, v, a):
-    """A lead below 0.1 m/s, or one that stops within two seconds, is planned as standing still."""
+    """A lead below 0.1 m/s, or one that stops within two seconds, counts as standing still."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, v, a), 1)
     assert list(long_mpc.x_lead_plan) == [30.0] * 21
 
 
 def test_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
-    """The lead's deceleration fades, so that its planned speed ends at zero."""
+    """The lead's deceleration fades, so its planned speed ends at zero."""
     drive(long_mpc, 5.0, 0.0, lead(30.0, 2.0, -3.9), 1)
     steps = [b - a for a, b in zip(long_mpc.x_lead_plan, long_mpc.x_lead_plan[1:], strict=False)]
     assert min(steps) > -0.01
@@ -127,7 +127,7 @@ def test_braking_lead_stops_but_does_not_reverse(long_mpc, lead):
 
 
 def test_decay_of_the_leads_acceleration(long_mpc, lead):
-    """The decay is 1.5/s while the lead is steady and otherwise falls by a tenth with each update."""
+    """The decay is 1.5/s while the lead is steady. Otherwise it falls by a tenth with each update."""
 
     def travelled(decay):
         """RK4 of a decaying acceleration of 1 m/s^2, as the plan integrates it."""
@@ -149,7 +149,7 @@ def test_decay_of_the_leads_acceleration(long_mpc, lead):
 
 
 def test_first_guess_for_a_new_lead_brakes_to_its_speed(make_long, lead):
-    """Two instances with different pasts but equal planned speed plan the same for a new lead."""
+    """For a new lead, two instances with different pasts but equal planned speed plan the same."""
     one, other = make_long(), make_long()
     drive(one, 20.0, 0.0, lead(20.0, 5.0), 5)
     drive(other, 25.0, 0.0, None, 3)
@@ -160,7 +160,10 @@ def test_first_guess_for_a_new_lead_brakes_to_its_speed(make_long, lead):
 
 
 def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
-    """50 m beyond the lead the plan is discarded: the car's own motion counts, the next lead is new."""
+    """A plan that passes 50 m through the lead is discarded.
+
+    The car's own motion counts, and the next lead is new.
+    """
     drive(long_mpc, 20.0, 0.0, lead(30.0, 20.0), 3)
     long_mpc.set_cur_state(20.0, 0.0)
     long_mpc.update(19.5, -0.3, lead(-51.0, 20.0))
@@ -173,7 +176,7 @@ def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
 
 
 def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
-    """A speed below -0.01 m/s in the plan discards it, with a lead only."""
+    """A planned speed below -0.01 m/s discards the plan, but only if there is a lead."""
     drive(long_mpc, -0.02, 0.0, None, 1)
     assert long_mpc.resets == 0
     drive(long_mpc, -0.009, 0.0, lead(10.0, 0.0), 1)
@@ -186,7 +189,7 @@ def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
 @pytest.mark.parametrize("a", [-3.0, -0.5, 0.0])
 @pytest.mark.parametrize("d_rel", [0.0, 3.0, 6.0])
 def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
-    """Braking at standstill has a plan that does not go backwards after its first node."""
+    """Braking at standstill has a solution that does not go backwards after its first node."""
     drive(long_mpc, v, a, lead(d_rel, 0.0), 10)
     assert long_mpc.unsolved == long_mpc.resets == 0
     assert min(long_mpc.v_plan[1:]) > -1e-5
@@ -195,7 +198,7 @@ def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
 @pytest.mark.parametrize("field", ["d_rel", "v_lead", "a_lead_k"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_lead_that_is_no_number_never_raises(long_mpc, lead, field, value):
-    """A NaN lead never raises: the solution is used or discarded, and valid leads work again at once."""
+    """A NaN lead never raises. The solution is used or discarded, and valid leads work again at once."""
     broken = lead(30.0, 20.0)
     setattr(broken, field, value)
     drive(long_mpc, 20.0, 0.0, broken, 3)
@@ -206,7 +209,7 @@ def test_lead_that_is_no_number_never_raises(long_mpc, lead, field, value):
 
 
 def test_solution_that_is_no_number_is_thrown_away(long_mpc, lead):
-    """NaN in the distance causes one reset per update; speed and acceleration are then the car's own."""
+    """A NaN distance causes one reset per update. Speed and acceleration are then the car's own."""
     drive(long_mpc, 20.0, 0.0, lead(40.0, 20.0), 2)
     before = long_mpc.a_plan.tobytes()
     long_mpc.update(19.0, 0.1, lead(math.nan, 20.0))
@@ -228,7 +231,7 @@ def test_any_input_is_answered(make_long, lead):
 
 
 def test_reset_forgets_everything(make_long, lead):
-    """After a reset, whatever came before, an instance computes the bytes of a new one."""
+    """After a reset, an instance computes the same bytes as a new one, whatever came before."""
     used, fresh = make_long(), make_long()
     drive(used, 20.0, -1.0, lead(15.0, 5.0, -4.0), 5)
     drive(used, math.nan, 0.0, lead(15.0, 5.0), 1)
@@ -242,7 +245,7 @@ def test_reset_forgets_everything(make_long, lead):
 
 
 def test_thrown_away_is_forgotten(make_long, lead):
-    """A discarded plan has no effect later: two causes give the same bytes afterwards."""
+    """A discarded plan has no later effect. After two different causes, the results have the same bytes."""
     one, other = make_long(), make_long()
     one.update(20.0, 0.0, lead(math.nan, 20.0))
     drive(other, 20.0, 0.0, lead(40.0, 20.0), 5)
@@ -255,7 +258,7 @@ def test_thrown_away_is_forgotten(make_long, lead):
 
 
 def test_shared_solver_carries_no_state(long_solver, lead):
-    """Two instances on one solver, called alternately, compute what each computes alone."""
+    """Two instances that share a solver and are called alternately compute the same as each alone."""
     together = [LongitudinalMpc(i, long_solver) for i in (1, 2)]
     alone = [LongitudinalMpc(i) for i in (1, 2)]
     leads = (lead(30.0, 15.0), lead(60.0, 25.0, -1.0))
@@ -267,5 +270,5 @@ def test_shared_solver_carries_no_state(long_solver, lead):
 
 
 def test_nodes():
-    """Five intervals of 0.2 s and fifteen of 0.6 s make 10 s."""
+    """Five intervals of 0.2 s and fifteen of 0.6 s add up to 10 s."""
     assert pytest.approx((0.2,) * 5 + (0.6,) * 15) == NODE_STEPS

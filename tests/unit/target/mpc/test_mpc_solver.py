@@ -1,4 +1,4 @@
-"""The solvers agree with the same problems written in full and given to other solvers."""
+"""The solvers agree with other solvers on the same problems written out in full."""
 
 import math
 from array import array
@@ -23,7 +23,7 @@ CASES = {
 
 
 def full_problem(ocp, start, param):
-    """Trajectory, residuals with their weights, defects of the dynamics and bounds, without elimination."""
+    """Return trajectory, weighted residuals, dynamics defects and bounds, with no variable eliminated."""
     n, nx = ocp.n_control, ocp.n_state
     w, p = ca.SX.sym("w", ocp.n_trajectory), ca.DM(param)
     z, u, q = ca.SX.sym("z", nx), ca.SX.sym("u"), ca.SX.sym("q", ocp.n_param)
@@ -50,14 +50,14 @@ def full_problem(ocp, start, param):
 
 
 def first_guess(ocp, start, control):
-    """All nodes at the start, shifted slightly to violate the dynamics."""
+    """All nodes are at the start state, shifted slightly so that they violate the dynamics."""
     nodes = [x + 0.01 * k for k in range(ocp.n_control + 1) for x in start]
     return array("d", nodes + [control] * ocp.n_control)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_one_iteration_is_the_full_gauss_newton_step(case):
-    """Condensing is exact: the step is that of the whole quadratic program in another solver."""
+    """Condensing is exact: a step equals that of the full quadratic program in another solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     guess = first_guess(ocp, start, control)
@@ -82,7 +82,7 @@ def test_one_iteration_is_the_full_gauss_newton_step(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_iterations_converge_to_the_optimum(case):
-    """Repeated at the same state, the iterations converge to a nonlinear solver's optimum."""
+    """Repeated at the same state, the iterations converge to the optimum of a nonlinear solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     nlp = {"x": w, "f": ca.sumsqr(residuals) / 2, "g": defects}
@@ -101,9 +101,7 @@ def test_iterations_converge_to_the_optimum(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_equal_input_gives_equal_bytes(case):
-    """A solver has no memory: the bytes are the same after other problems, even impossible ones, and in a
-    second build.
-    """
+    """A problem gives the same bytes after other problems, even impossible ones, and in a second build."""
     ocp, start, param, control = CASES[case]
     guess = first_guess(ocp, start, control)
     solver = build_solver(ocp)
@@ -125,7 +123,7 @@ def test_equal_input_gives_equal_bytes(case):
 
 
 def test_infeasible_program_keeps_the_controls():
-    """Infeasible bounds keep the previous controls, and are counted."""
+    """Infeasible bounds leave the controls unchanged, and the failure is counted."""
     ocp, _, param, _ = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     beyond = (0.0, 0.0, 0.0, math.radians(60.0))
@@ -137,7 +135,7 @@ def test_infeasible_program_keeps_the_controls():
 
 
 def test_shift_moves_the_guess_by_one_interval():
-    """The next guess is the shifted solution; its last interval repeats the last control."""
+    """The next guess is the shifted solution, with the last control repeated in its last interval."""
     ocp, start, param, control = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     iteration.restart(control=control)
