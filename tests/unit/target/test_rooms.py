@@ -1,4 +1,4 @@
-"""What the target must not know."""
+"""The target does not know about the harness or the environment."""
 
 import re
 from pathlib import Path
@@ -22,7 +22,7 @@ def test_the_target_knows_nothing_of_the_harness(word: str) -> None:
 
 
 def test_the_target_reads_no_environment() -> None:
-    """A run depends only on its arguments; only the command that compiles helpers reads CC."""
+    """A run depends only on its arguments. Only the command that compiles helpers reads CC."""
     reads = re.compile(r"\benviron\b|\bgetenv\b|\bexpanduser\b|\bPath\.home\b")
     readers = {name(file) for file in FILES if reads.search(file.read_text(encoding="utf-8"))}
     assert readers == {"sim/compile_helpers.py"}

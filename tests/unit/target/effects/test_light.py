@@ -33,9 +33,9 @@ def test_glare_falls_off_with_the_square_of_the_angle(camera):
 
 
 def test_noise_is_that_of_electrons(camera, moment):
-    """The noise's mean and spread follow from electrons and read noise.
+    """The mean stays, and the spread is that of electrons and read noise.
 
-    Both effects shrink in bright light.
+    The spread shrinks in bright light.
     """
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     for lux in (100000.0, 100.0, 20.0):

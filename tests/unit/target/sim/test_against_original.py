@@ -16,7 +16,7 @@ MEASURED = {
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_longitudinal_control_is_the_original(fault_free, name):
-    """Headway, distance, pedals and speeds agree with the original's."""
+    """Headway, distance, pedals and speeds agree with the original."""
     close_at, headway, distance, brake, gas, speeds = MEASURED[name]
     trace = fault_free(name).trace
     assert trace["t"][np.argmax(trace["hwt"] <= 2.0)] == pytest.approx(close_at, abs=0.011)
@@ -32,7 +32,7 @@ def test_longitudinal_control_is_the_original(fault_free, name):
 @pytest.mark.parametrize("plant", PLANTS)
 @pytest.mark.parametrize("name", ["O17", "O18", "O19", "O20"])
 def test_warning_two_seconds_before_contact(scenarios, name, plant):
-    """A driver about to hit the lead is warned about two seconds before, as by the original."""
+    """A driver about to hit the lead is warned about two seconds before contact, as in the original."""
     result = simulate(on_plant(load_scenario(scenarios / f"{name}.yaml"), plant), 0)
     contact = result.record["hazards"]["H1"]
     warned = [alert["t"] for alert in result.record["alerts"] if alert["name"] == "fcw"]

@@ -1,4 +1,4 @@
-"""The whole loop: fault-free scenarios, loss of inputs, lane behaviour, repeatability."""
+"""The closed loop: fault-free scenarios, lost inputs, lane behaviour, repeatability."""
 
 from dataclasses import replace
 
@@ -18,7 +18,7 @@ def drive(scenario, change=lambda simulator: None, simulator=None):
 
 
 def contexts(trace):
-    """Rows of the context table (HWT above 2 s or not, approaching or not) reached from 1.5 s on."""
+    """Return the context table's rows (HWT above 2 s or not, approaching or not) reached from 1.5 s on."""
     armed = trace["t"] >= 1.5
     far, closing = trace["hwt"][armed] > 2.0, trace["v_rel"][armed] < 0.0
     return len(set(zip(far.tolist(), closing.tolist(), strict=True)))
@@ -31,8 +31,9 @@ def s1(scenarios):
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_fault_free(fault_free, name, rows):
-    """The car stays engaged, without hazard or alert, straight, and reaches as many contexts as the campaigns
-    need.
+    """The car stays engaged and straight, without hazard or alert.
+
+    It reaches as many contexts as the campaigns need.
     """
     record, trace = fault_free(name).record, fault_free(name).trace
     assert record["engaged_from"] == pytest.approx(1.31, abs=0.02)
@@ -45,7 +46,7 @@ def test_fault_free(fault_free, name, rows):
 
 
 def no_frames_from(t, bus):
-    """Drop all frames of a bus (None: of both)."""
+    """Drop all frames of a bus, or of both buses for None."""
 
     def change(simulator):
         inner = simulator.manager.step
@@ -75,7 +76,10 @@ def no_model_from(t):
     ids=["all CAN", "radar", "camera"],
 )
 def test_loss_of_an_input(s1, change, alert, within):
-    """The controller notices, alerts in time, releases the pedals for good, and the car hits the lead."""
+    """After losing an input, the controller alerts in time and releases the pedals for good.
+
+    The car hits the lead.
+    """
     result = drive(replace(s1, steps=2500), change)
     first = result.record["alerts"][0]
     assert first["name"] == alert
@@ -104,7 +108,7 @@ def lanes_from(t, shift):
 
 @pytest.mark.parametrize("offset", [0.5, -0.5])
 def test_start_beside_the_middle(s1, offset):
-    """Engaged half a metre off, the car returns to the middle within 4 s, without overshoot, and stays."""
+    """If engaged half a metre off, the car is in the middle within 4 s, without overshoot, and stays there."""
     trace = drive(replace(s1, lateral_offset=offset, steps=1200)).trace
     distance = trace["lateral_offset"] * np.sign(offset)
     assert distance[:130] == pytest.approx(0.5)
@@ -114,8 +118,9 @@ def test_start_beside_the_middle(s1, offset):
 
 @pytest.mark.parametrize("shift", [1.0, -1.0])
 def test_lanes_a_metre_off(s1, shift):
-    """Lanes seen a metre aside cause full torque briefly, a smooth move over some seconds, and lane
-    departure.
+    """If lanes are seen a metre to the side, the car leaves its lane.
+
+    It steers briefly at full torque and moves over smoothly.
     """
     result = drive(s1, lanes_from(5.0, lambda t: shift))
     trace = result.trace
@@ -128,8 +133,9 @@ def test_lanes_a_metre_off(s1, shift):
 
 
 def test_lanes_that_run_away(s1):
-    """Lanes that drift by half a metre a step saturate the steering, which alerts and turns no faster than it
-    can.
+    """Lanes that drift by half a metre a step saturate the steering.
+
+    It alerts and turns no faster than it can.
     """
     result = drive(replace(s1, steps=1000), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)))
     assert [alert["name"] for alert in result.record["alerts"]] == ["steer_saturated"]
@@ -141,9 +147,7 @@ def test_lanes_that_run_away(s1):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_lanes_beyond_any_solution(s1, side):
-    """If the lanes are so far off that no angle is found, there is full torque to the left, on whichever side
-    they are.
-    """
+    """If the lanes on either side are too far off for a solution, the car steers left at full torque."""
     trace = drive(replace(s1, steps=1300), lanes_from(5.0, lambda t: 50.0 * side * (t - 5.0))).trace
     unsolved = np.flatnonzero(np.isnan(trace["angle_desired"]))
     assert len(unsolved) > 50
@@ -152,7 +156,7 @@ def test_lanes_beyond_any_solution(s1, side):
 
 
 def test_a_bend_of_500_m(s1):
-    """A curve of 500 m at 60 mph is held within half a metre, steadily, with half the torque."""
+    """At 60 mph, the car holds a curve of 500 m steadily within half a metre, with half the torque."""
     bend = replace(s1, lead=None, curvature=((0.0, 150.0, 250.0), (0.0, 0.0, 0.002)))
     trace = drive(bend).trace
     offset = trace["lateral_offset"]
@@ -162,7 +166,7 @@ def test_a_bend_of_500_m(s1):
 
 
 def test_a_grade_is_climbed(s1):
-    """On a slope that takes 1 m/s^2 the car gives more gas and keeps its speed."""
+    """On a slope that takes 1 m/s^2, the car gives more gas and keeps its speed."""
     slope = replace(s1, lead=None, grade=((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)))
     trace = drive(slope).trace
     assert trace["gas"][2500:].mean() > trace["gas"][700:900].mean() + 0.1
@@ -170,7 +174,7 @@ def test_a_grade_is_climbed(s1):
 
 
 def test_runs_leave_nothing_behind(scenarios, fault_free):
-    """After a run with a failed lateral solver and one of another scenario, S1 is the same to the bit."""
+    """After a run with a failed lateral solver and a run of another scenario, S1 has the same bits."""
     simulator = Simulator()
     s1 = load_scenario(scenarios / "S1.yaml")
     broken = drive(replace(s1, steps=1500), lanes_from(5.0, lambda t: 50.0 * (t - 5.0)), simulator)

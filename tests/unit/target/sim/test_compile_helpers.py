@@ -1,4 +1,4 @@
-"""Compiled helpers: found by the code they replace, with the same bytes, and never an obstacle."""
+"""Compiled helpers are found by the code they replace, and compute the same bytes."""
 
 import shutil
 import sys
@@ -25,19 +25,19 @@ needs_compiler = pytest.mark.skipif(not COMPILER, reason="there is no C compiler
 
 @pytest.fixture(autouse=True)
 def _none_afterwards():
-    """Hide the helpers of this file from all other tests."""
+    """Hide the helpers compiled here from all other tests."""
     yield
     compiled.use(None)
 
 
 @pytest.fixture
 def helpers(all_compiled, tmp_path):
-    """A folder with all helpers, a copy for one test."""
+    """A copy of the folder with all helpers, for one test."""
     return shutil.copytree(all_compiled, tmp_path / "own")
 
 
 def test_every_c_file_says_what_it_stands_for():
-    """Each C file names the Python files that it replaces, so that an edit of them is noticed."""
+    """Each C file names the Python files that it replaces, so an edit of them is noticed."""
     sources = list(compile_helpers.PACKAGE.rglob("*.c"))
     assert C_SOURCE in sources
     for source in sources:
@@ -48,7 +48,7 @@ def test_every_c_file_says_what_it_stands_for():
 @needs_compiler
 @pytest.mark.parametrize("edited", ["mark_windows.c", "hog.py", "lane_net.py"])
 def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tmp_path, edited):
-    """No library is found for other C code, for other Python code, or while compiled code is disabled."""
+    """No library is found for other C or Python code, or while compiled code is disabled."""
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is not None
     for name in (C_SOURCE.name, *compiled.stands_for(C_SOURCE.read_bytes())):
@@ -64,7 +64,7 @@ def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tm
 @needs_compiler
 @pytest.mark.parametrize("keep", [0, 10, 5000, -1])
 def test_a_library_that_is_damaged_is_none(helpers, keep):
-    """A damaged library is ignored, and the Python code computes."""
+    """If a library is damaged, the Python code computes instead."""
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is None
@@ -73,7 +73,7 @@ def test_a_library_that_is_damaged_is_none(helpers, keep):
 
 @needs_compiler
 def test_a_changed_constant_of_a_library_is_noticed(helpers):
-    """A library with a changed constant would compute other numbers without any other sign."""
+    """A library with a changed constant is rejected, because nothing else would show the error."""
     data = bytearray((helpers / NAME).read_bytes())
     data[len(data) // 2] ^= 1
     (helpers / NAME).write_bytes(data)
@@ -83,7 +83,7 @@ def test_a_changed_constant_of_a_library_is_noticed(helpers):
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])
 def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
-    """A missing, unreadable or half-filled folder is no error."""
+    """A missing, unreadable or incomplete folder is not an error."""
     (tmp_path / "empty").mkdir()
     compiled.use(tmp_path / folder)
     assert compiled.library(C_SOURCE) is None
@@ -91,7 +91,7 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 
 @needs_compiler
 def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compiled, tmp_path):
-    """A library is named by the code it replaces; libraries of other code are deleted."""
+    """A library's name contains the digest of the code it replaces. Libraries of other code are deleted."""
     old = tmp_path / f"warp-0{compiled.SUFFIX}"
     old.touch()
     list(compile_helpers.compile_helpers(tmp_path))
@@ -102,7 +102,10 @@ def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compile
 
 @pytest.mark.parametrize("given", ["no-such-compiler", "/", "cc '"])
 def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch, capsys, given):
-    """The message has the value of CC, the expectation and the remedy; exit code 2."""
+    """Without a compiler the command exits with code 2.
+
+    Its message gives CC, what was expected and what to do.
+    """
     monkeypatch.setenv("CC", given)
     monkeypatch.setattr("sys.argv", ["compile_helpers", "--out", str(tmp_path)])
     assert compile_helpers.main() == 2
@@ -113,7 +116,10 @@ def test_without_a_compiler_it_says_so_and_leaves_nothing(tmp_path, monkeypatch,
 
 @pytest.mark.parametrize("there", [True, False], ids=["ziglang", "nothing"])
 def test_a_machine_without_a_compiler_takes_that_of_a_package(monkeypatch, there):
-    """CC comes first, then cc, then the package ziglang; without it, installation requires it."""
+    """The compiler is CC, else cc, else that of the package ziglang.
+
+    Without cc, installation requires ziglang.
+    """
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(shutil, "which", lambda name: None)
     monkeypatch.setattr(compile_helpers, "find_spec", lambda name: there or None)
@@ -123,7 +129,10 @@ def test_a_machine_without_a_compiler_takes_that_of_a_package(monkeypatch, there
 @needs_compiler
 @pytest.mark.slow
 def test_runs_have_the_same_bytes_and_the_proof_takes_no_helper(all_compiled, tmp_path, monkeypatch):
-    """Record and trace of a run with frames are the same with and without helpers; `--forget` finds none."""
+    """Record and trace of a run with frames are the same with and without helpers.
+
+    With `--forget`, no helper is used.
+    """
     found = []
     look = compiled.library
 

@@ -1,4 +1,4 @@
-"""The table of detections shared by runs."""
+"""The table of detections that runs share."""
 
 import errno
 import os
@@ -15,13 +15,14 @@ NUMBERS = (1.5, -0.0, float("inf"), 5e-324)
 
 
 def key(number: int, bucket: int = 7) -> bytes:
-    """One of many keys of a bucket."""
+    """Return one of many keys of the same bucket."""
     return bucket.to_bytes(8, "little") + number.to_bytes(8, "big")
 
 
 def test_what_is_kept_is_recalled(tmp_path):
-    """Any process with the same cache recalls the entry to the bit, with none up to MOST numbers; other keys
-    have none.
+    """Any process with the same cache recalls the entry to the bit.
+
+    An entry has from none to MOST numbers. Other keys have no entry.
     """
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
@@ -34,7 +35,7 @@ def test_what_is_kept_is_recalled(tmp_path):
 
 
 def test_the_table_never_grows(tmp_path):
-    """Its size is fixed, its empty part takes no disk space, and a full bucket drops an old entry."""
+    """The table's size is fixed, and its empty part takes no disk space. A full bucket drops an old entry."""
     memory = DetectionMemory(tmp_path)
     for number in range(1, 4 * WAYS):
         memory.keep(key(number), (float(number),))
@@ -47,7 +48,7 @@ def test_the_table_never_grows(tmp_path):
 
 @pytest.mark.parametrize("at", [0, 16, 24, 32, ENTRY - 1])
 def test_a_damaged_entry_is_not_recalled(tmp_path, at):
-    """An entry with one wrong byte counts as missing and can be stored again."""
+    """An entry with one wrong byte counts as missing. It can be stored again."""
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
     with (tmp_path / FILE).open("r+b") as file:
@@ -61,7 +62,7 @@ def test_a_damaged_entry_is_not_recalled(tmp_path, at):
 
 
 def test_a_short_or_strange_file_is_taken_over(tmp_path):
-    """Any other content in place of the table is no entry, and does not prevent storing."""
+    """A file with other content in place of the table holds no entries and does not prevent storing."""
     (tmp_path / FILE).write_bytes(b"no table" * 5000)
     memory = DetectionMemory(tmp_path)
     assert memory.recall(key(1, 2)) is None
@@ -70,7 +71,7 @@ def test_a_short_or_strange_file_is_taken_over(tmp_path):
 
 
 def test_without_a_file_nothing_is_remembered(tmp_path):
-    """If the table cannot be created, it acts as if empty."""
+    """If the table cannot be created, lookups find nothing."""
     (tmp_path / FILE).mkdir()
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
@@ -78,7 +79,7 @@ def test_without_a_file_nothing_is_remembered(tmp_path):
 
 
 def test_a_full_disk_ends_remembering_and_no_more(tmp_path, monkeypatch):
-    """A value that cannot be written is not remembered, and no error reaches the run."""
+    """If the disk is full, a value is not remembered and the run sees no error."""
     memory = DetectionMemory(tmp_path)
 
     def full(*_):
@@ -103,7 +104,7 @@ for turn in range(30):
 
 
 def test_processes_share_it_at_once(tmp_path):
-    """Two processes that write many entries into few places recall only values of the right key."""
+    """If two processes write many entries to few places, each recalls only values of the right key."""
     root = str(Path(selfdrive.__path__[0]).parent)
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     both = [subprocess.Popen(command, env={"PYTHONPATH": root}) for _ in range(2)]
@@ -111,7 +112,7 @@ def test_processes_share_it_at_once(tmp_path):
 
 
 def test_a_forked_child_shares_it(tmp_path):
-    """The parent recalls what a child stores in the table that the parent opened."""
+    """The parent recalls what a child stores in a table that the parent opened."""
     code = (
         "import os, sys; from pathlib import Path\n"
         "from selfdrive.sim.detection_memory import DetectionMemory\n"

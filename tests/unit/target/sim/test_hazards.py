@@ -1,4 +1,4 @@
-"""The hazard definitions at their limits."""
+"""The hazard definitions, tested at their limits."""
 
 import pytest
 from selfdrive.sim.hazards import HazardMonitor
@@ -12,7 +12,7 @@ def first(truth, *rows):
 
 
 def test_none_in_ordinary_driving(truth):
-    """Following in the lane is no hazard."""
+    """Following a lead in the middle of the lane is no hazard."""
     assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None}
 
 
@@ -21,7 +21,7 @@ def test_none_in_ordinary_driving(truth):
     [(0.0, 0.0, True), (0.01, 0.0, False), (-3.0, 2.75, True), (-3.0, -2.76, False)],
 )
 def test_h1(truth, d_rel, offset, hit):
-    """A collision needs zero distance and an overlap of the two cars, 2.75 m to either side."""
+    """H1, a collision, needs zero distance and overlapping cars, up to 2.75 m to either side."""
     assert (first(truth, {"d_rel": d_rel, "lateral_offset": offset})["H1"] == 0.0) is hit
 
 
@@ -35,13 +35,13 @@ def test_h1(truth, d_rel, offset, hit):
     ],
 )
 def test_h2(truth, v_ego, d_rel, free_road, hit):
-    """Standing below 0.3 m/s counts with 100 m or more of free road ahead."""
+    """H2 is a speed below 0.3 m/s with at least 100 m of free road ahead."""
     stopped = {"v_ego": v_ego, "d_rel": d_rel, "free_road": free_road}
     assert (first(truth, {}, stopped)["H2"] == 1.0) is hit
 
 
 def test_h2_needs_a_car_that_has_moved(truth):
-    """A car that has not started does not block the road; once it has moved, its next stop counts."""
+    """H2 does not count before the car has moved for the first time."""
     rest = {"v_ego": 0.0, "d_rel": 150.0}
     assert first(truth, rest, rest)["H2"] is None
     assert first(truth, rest, {"v_ego": 0.3}, rest)["H2"] == 2.0
@@ -49,11 +49,11 @@ def test_h2_needs_a_car_that_has_moved(truth):
 
 @pytest.mark.parametrize(("offset", "hit"), [(0.94, False), (0.96, True), (-0.96, True)])
 def test_h3(truth, offset, hit):
-    """A side of the car leaves the lane beyond 0.95 m of offset."""
+    """H3: at more than 0.95 m of offset, a side of the car is outside the lane."""
     assert (first(truth, {"lateral_offset": offset})["H3"] == 0.0) is hit
 
 
 def test_only_the_first_time_counts(truth):
-    """A hazard that ends and comes back keeps its first time."""
+    """If a hazard ends and comes back, its first time remains."""
     out = {"lateral_offset": 2.0}
     assert first(truth, {}, out, {}, out)["H3"] == 1.0

@@ -1,4 +1,4 @@
-"""Detection of bright bands as wide as marks."""
+"""The band filter detects bright bands as wide as lane marks."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ ROWS, COLUMNS = 60, 260
 
 
 def road(*bands: tuple[int, int, float], ground: float = 90.0, noise: float = 1.5) -> np.ndarray:
-    """A map with upright bands, each (first column, columns, brightness above the ground)."""
+    """Return a map with upright bands, each (first column, columns, brightness above the ground)."""
     picture = np.full((ROWS, COLUMNS), ground)
     for first, width, brighter in bands:
         picture[:, first : first + width] += brighter
@@ -17,7 +17,7 @@ def road(*bands: tuple[int, int, float], ground: float = 90.0, noise: float = 1.
 
 
 def support(picture: np.ndarray, first: int, last: int) -> float:
-    """Weight of the points in these columns, as a share of the rows."""
+    """Return the weight of the points in these columns, as a share of the rows."""
     points = mark_points(picture)
     return float(points.weight[(points.column >= first) & (points.column < last)].sum()) / ROWS
 
@@ -25,7 +25,7 @@ def support(picture: np.ndarray, first: int, last: int) -> float:
 @pytest.mark.parametrize("width", [2, 3, 4, 5])
 @pytest.mark.parametrize("brighter", [15.0, 60.0, 140.0])
 def test_a_mark_s_middle_is_found_in_every_row(width, brighter):
-    """A band as wide as paint is found in nearly every row, at its middle, faint or bright."""
+    """The filter finds a band as wide as paint at its middle in almost every row, faint or bright."""
     picture = road((100, width, brighter))
     points = mark_points(picture)
     near = np.abs(points.column - (100 + 0.5 * (width - 1))) <= 1.0
@@ -34,7 +34,7 @@ def test_a_mark_s_middle_is_found_in_every_row(width, brighter):
 
 
 def test_a_double_line_is_found_as_one():
-    """Two lines with a gap of their own width are found as one, between their outer edges."""
+    """Two lines with a gap of their own width are found as one line, between their outer edges."""
     picture = road((100, 3, 80.0), (106, 3, 80.0))
     assert support(picture, 100, 109) > 0.5
 
@@ -51,7 +51,7 @@ def test_what_is_not_a_bright_narrow_band_is_not_found(bands):
 
 @pytest.mark.parametrize("light", [0.3, 0.6, 1.5])
 def test_light_does_not_matter(light):
-    """Half the light, or half as much again, leaves the detections in place."""
+    """At half or one and a half times the brightness, the detections stay in place."""
     bright = road((60, 3, 50.0), (180, 4, 70.0))
     picture = (bright * light).clip(0, 255).astype(np.uint8)
     assert support(picture, 58, 65) > 0.9 * support(bright, 58, 65)
@@ -59,7 +59,7 @@ def test_light_does_not_matter(light):
 
 
 def test_points_on_rough_ground_weigh_little():
-    """On ground as rough as a mark is bright, chance points weigh much less than a mark's."""
+    """If the ground is as rough as a mark is bright, chance points weigh much less than a mark's points."""
     rough = road(noise=25.0)
     points = mark_points(rough)
     assert points.weight.sum() / ROWS * 7 / COLUMNS < 0.1

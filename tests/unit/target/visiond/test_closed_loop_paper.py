@@ -1,4 +1,4 @@
-"""Lane keeping with the paper's detector: the five scenarios on rendered roads."""
+"""The paper's detector keeps the lane in the five scenarios on rendered roads."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ def cache(tmp_path_factory) -> Path:
 
 
 def drive(name: str, marks: str, cache: Path):
-    """Result of a run of the scenario on a road with these marks."""
+    """Run the scenario on a road with these marks and return the result."""
     simulator = Simulator()
     pictures = Pictures(detector="paper", marks=marks, cache=cache)
     simulator.reset(load_scenario(SCENARIOS / f"{name}.yaml"), 0, pictures)
@@ -30,7 +30,7 @@ def drive(name: str, marks: str, cache: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_lane_is_kept_between_solid_lines(name, cache):
-    """There is no hazard, no steering limit alert, and at most 0.3 m from the middle."""
+    """The car raises no hazard and no steering limit alert and stays within 0.3 m of the middle."""
     result = drive(name, "solid", cache)
     assert set(result.record["hazards"].values()) == {None}
     assert "steer_saturated" not in [alert["name"] for alert in result.record["alerts"]]
@@ -39,7 +39,7 @@ def test_the_lane_is_kept_between_solid_lines(name, cache):
 
 @pytest.mark.slow
 def test_gaps_between_dashes_make_it_wander_but_not_leave(cache):
-    """Where a gap fills its view it follows the other line, and stays in its lane."""
+    """Where a gap between dashes fills the view, the car follows the other line and stays in its lane."""
     result = drive("S3", "dashed", cache)
     assert result.record["hazards"]["H3"] is None
     assert np.abs(result.trace["lateral_offset"]).max() <= 0.5

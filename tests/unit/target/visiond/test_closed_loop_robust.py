@@ -1,4 +1,4 @@
-"""Lane keeping with the geometric detector: the five scenarios on rendered roads."""
+"""The geometric detector keeps the lane in the five scenarios on rendered roads."""
 
 from pathlib import Path
 
@@ -15,7 +15,7 @@ SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize("seed", [0, 2**40])
 def test_the_lane_is_kept(marks, seed, tmp_path):
-    """S1 to S5 have no hazard, no steering limit alert, and at most 0.3 m from the middle."""
+    """In S1 to S5 there is no hazard or steering limit alert, and the car stays within 0.3 m of the middle."""
     for name in ("S1", "S2", "S3", "S4", "S5"):
         pictures = Pictures(detector=ROBUST, marks=marks, cache=tmp_path)
         result = simulate(load_scenario(SCENARIOS / f"{name}.yaml"), seed, pictures)

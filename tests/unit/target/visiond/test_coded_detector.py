@@ -1,4 +1,4 @@
-"""The lane detector as its authors coded it, including its credulity."""
+"""The lane detector as the paper's authors coded it, including the false lines that it accepts."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ CALTECH = CameraModel()
 
 
 def seen(detector: CodedDetector, picture: np.ndarray) -> LaneLines:
-    """The detections in a single image."""
+    """The lines detected in `picture`. The view's other fields are dummies."""
     return detector.detect(
         CameraView(left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture)
     )
@@ -27,8 +27,9 @@ def road() -> RoadRenderer:
 
 @pytest.mark.parametrize("offset", [0.0, 0.4, -0.4])
 def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
-    """Lines are read where they cross row 278, three pixels nearer to the middle, on the detector's own
-    scale.
+    """Each line is read at row 278, shifted 3 px towards the middle, and converted to metres.
+
+    The scale is the detector's own.
     """
     found = seen(CodedDetector(CALTECH), road.grey(4.0, offset))
     for line, true, inward in zip(found[:2], road.truth(offset), (3, -3), strict=True):
@@ -39,7 +40,7 @@ def test_lines_are_read_in_one_row(road: RoadRenderer, offset: float) -> None:
 
 
 def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> None:
-    """Such a line, left or right, is far to the left of the car, with full certainty."""
+    """A line without a cluster is placed in column 0, far left of the car, with probability 1."""
     for half, expected in ((slice(320, None), (None, 8.03)), (slice(None, 320), (7.88, None))):
         picture = road.grey(4.0).copy()
         picture[:, half] = 97
@@ -51,7 +52,7 @@ def test_a_line_without_a_cluster_is_in_the_first_column(road: RoadRenderer) -> 
 
 
 def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If there are edges but no cluster is large enough, both lines are in the first column."""
+    """If there are edges but no cluster is large enough, both lines are placed in column 0."""
     monkeypatch.setattr(coded, "LEAST_POINTS", 10**6)
     found = seen(CodedDetector(CALTECH), road.grey(4.0))
     assert [line.y for line in found[:2]] == pytest.approx([7.88, 8.03], abs=0.005)
@@ -60,7 +61,7 @@ def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(("edges", "looked_at"), [(24, False), (25, True)])
 def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With one edge fewer the net is not called."""
+    """A window with fewer than 25 edges is not passed to the net."""
     crests = np.zeros((np.prod(coded.WINDOWS), 32, 32), bool)
     crests[40].reshape(-1)[:edges] = True
     monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)
@@ -73,14 +74,14 @@ def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytes
 
 @pytest.mark.parametrize(("points", "column"), [(29, 0), (30, 200)])
 def test_a_cluster_needs_30_points(points: int, column: int) -> None:
-    """A point that several windows found counts several times; without a cluster the line is in column 0."""
+    """A point counts once for each window that found it. Without a cluster, the line is in column 0."""
     left = np.column_stack((np.repeat(np.arange(270, 285), 2)[:points], np.full(points, 200)))
     right = np.column_stack((np.arange(265, 305), np.full(40, 440)))
     assert coded._columns_of_lines(np.concatenate((left, right))) == pytest.approx((column, 440))
 
 
 def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
-    """An image without content changes nothing."""
+    """A frame without edges leaves the lines where they were."""
     detector = CodedDetector(CALTECH)
     before = seen(detector, road.grey(4.0, 0.3))
     assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
@@ -89,7 +90,7 @@ def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
 
 
 def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
-    """A detector with another's state continues like that one."""
+    """A detector that takes over another detector's state returns the same lines."""
     one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
     seen(one, road.grey(4.0, 0.3))
     other.state = one.state
@@ -98,7 +99,7 @@ def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
 
 
 def test_steepness_is_relative_to_the_window() -> None:
-    """A tenth of the contrast gives the same edges."""
+    """A tenth of the contrast gives the same edges, because steepness is relative to the window."""
     random = np.random.default_rng(1)
     faint = random.integers(0, 10, coded.SIZE).astype(np.uint8)
     assert edges_in_windows(faint).any()
@@ -106,7 +107,7 @@ def test_steepness_is_relative_to_the_window() -> None:
 
 
 def test_edges_are_crests_down_the_picture() -> None:
-    """A step from row to row is an edge of one row; a step from column to column is none."""
+    """A brightness step between rows is an edge one row high. A step between columns is not an edge."""
     level, upright = np.zeros((2, *coded.SIZE), np.uint8)
     level[40:], upright[:, 40:] = 100, 100
     assert edges_in_windows(level).any()
@@ -114,7 +115,7 @@ def test_edges_are_crests_down_the_picture() -> None:
 
 
 def test_clusters_are_what_pixels_lead_to() -> None:
-    """A bridge of single pixels joins two groups that are otherwise separate."""
+    """A chain of single pixels joins two clusters that are separate without it."""
     crowd = np.argwhere(np.ones((8, 8), bool))
     beyond = crowd + np.array([0, 38])
     chain = np.column_stack((np.full(30, 4), np.arange(8, 38)))
@@ -124,6 +125,6 @@ def test_clusters_are_what_pixels_lead_to() -> None:
 
 
 def test_another_size_of_picture_is_refused() -> None:
-    """Another image size is refused, because all its positions are pixels of one camera."""
+    """The detector rejects frames of any other size, because its pixel positions are fixed."""
     with pytest.raises(ConfigError, match=r"pictures of 1280 x 720.*expected 640 x 480"):
         CodedDetector(CameraModel.from_view(width=1280, rows=720, horizon=238.0, focal=1000.0, height=1.5))

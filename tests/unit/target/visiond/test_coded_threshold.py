@@ -1,4 +1,4 @@
-"""The threshold of the detector as coded, found on few images."""
+"""The search for the threshold of the detector as coded, run on a few images."""
 
 import pytest
 from selfdrive.visiond import coded_detector, coded_threshold
@@ -11,7 +11,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_least_marks_all_and_the_largest_none() -> None:
-    """The share of marked windows falls from one to zero."""
+    """The lowest threshold marks all windows and the highest marks none."""
     found = coded_threshold.thresholds()
     assert [row[0] for row in found] == coded_threshold.TRIED
     marked = [row[1] for row in found]
@@ -23,8 +23,10 @@ def test_the_least_marks_all_and_the_largest_none() -> None:
 def test_the_middle_of_those_that_will_do_is_printed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The search prints the middle of the acceptable thresholds; one that marks too much is rejected, however
-    well it reads, and so is one that misreads more.
+    """The search prints the middle of the acceptable thresholds.
+
+    It rejects a threshold that marks too much, however well it reads the lines, and one that misreads more
+    lines.
     """
     rows = [(1.0, 0.004, 0.0), (2.0, 0.003, 0.1), (3.0, 0.002, 0.02), (4.0, 0.001, 0.02), (5.0, 0.0, 0.02)]
     monkeypatch.setattr(coded_threshold, "thresholds", lambda: rows)
@@ -38,8 +40,9 @@ def test_the_middle_of_those_that_will_do_is_printed(
 def test_the_threshold_is_the_one_that_is_found(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The stored threshold is the one that the search finds; a change of net, road or rule needs a new
-    search.
+    """The stored threshold is the one that the search finds.
+
+    After a change of the net, the road or the rule, search again.
     """
     monkeypatch.undo()
     coded_threshold.main()

@@ -1,4 +1,4 @@
-"""Detectors with their arithmetic in C return the Python code's results, to the last bit."""
+"""Detectors with arithmetic in C return the results of the Python code, to the last bit."""
 
 from dataclasses import replace
 from math import sin
@@ -41,7 +41,7 @@ DETECTORS = {
 
 @pytest.fixture(scope="module", params=["", " -DPLAIN"], ids=["vectors", "plain"])
 def helpers(request, tmp_path_factory, all_compiled):
-    """A folder with all libraries: for any processor, and with the widest vectors of this one."""
+    """A folder with all libraries, compiled for any processor or with this processor's widest vectors."""
     if not request.param:
         return all_compiled
     folder = tmp_path_factory.mktemp("compiled")
@@ -61,8 +61,9 @@ def _found(helpers):
 
 @pytest.fixture(scope="module")
 def pictures():
-    """A road with either kind of marks from many poses, clean and under every effect; noise; an
-    empty image.
+    """Images of a road with either kind of marks, from many poses, clean and with every effect.
+
+    An image of noise and an empty image are added.
     """
     chance, found = np.random.default_rng(3), []
     roads = [RoadRenderer(MODEL, marks, 1, periods=3) for marks in ("solid", "dashed")]
@@ -92,7 +93,7 @@ def view(picture) -> CameraView:
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_lines_are_the_same_to_the_bit(name, pictures):
-    """The bits agree for clean images, all effects, noise and empty images, in sequence."""
+    """The bits agree for a sequence of clean images, images with all effects, noise and empty images."""
     plain, build, kind = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     assert type(fast) is kind and fast.calculated_by != slow.calculated_by
@@ -111,7 +112,7 @@ def test_lines_are_the_same_to_the_bit(name, pictures):
     ids=["wide", "small", "narrow"],
 )
 def test_lines_of_another_camera_are_the_same_to_the_bit(model):
-    """The bits agree for any size of its part of the road."""
+    """The bits agree for cameras whose part of the road has another size."""
     slow, fast = PaperDetector(model), build_paper_detector(model)
     road = RoadRenderer(model, "dashed", 2, periods=2)
     for k in range(8):
@@ -121,7 +122,7 @@ def test_lines_of_another_camera_are_the_same_to_the_bit(model):
 
 @pytest.mark.parametrize("name", DETECTORS)
 def test_what_a_fault_makes_of_a_picture_is_seen_or_refused_alike(name, pictures):
-    """Another type, order or size gives the same lines or the same error."""
+    """An image of another type, memory order or size gives the same lines or the same error."""
     plain, build, _ = DETECTORS[name]
     slow, fast = plain(MODEL), build(MODEL)
     odd = [
@@ -151,7 +152,7 @@ def _outcome(detector, picture) -> str:
     "width, rows, focal", [(640, 480, 400), (512, 400, 600), (256, 200, 200), (637, 403, 500)]
 )
 def test_maps_of_any_camera_are_the_same(width, rows, focal):
-    """Maps agree for any camera, even with image sizes that cannot be halved evenly."""
+    """The maps agree for any camera, even if the image size cannot be halved evenly."""
     model = CameraModel.from_view(width=width, rows=rows, horizon=0.3 * rows, focal=focal, height=1.3)
     slow, fast = RoadView(model), CompiledRoadView(model, compiled.library(compiled_view.C_SOURCE))
     for seed in range(5):
@@ -161,8 +162,9 @@ def test_maps_of_any_camera_are_the_same(width, rows, focal):
 
 @pytest.mark.parametrize("seed", range(40))
 def test_the_same_lines_are_voted_for(seed):
-    """The votes agree for any number of points, in maps with and without content, with and without history,
-    also if no lane of that width fits, or C has too many candidates.
+    """The votes agree for any number of points, in full and empty maps, with and without history.
+
+    They also agree if no lane of that width fits or if C has too many candidates.
     """
     chance = np.random.default_rng(seed)
     view = RoadView(MODEL)
@@ -189,7 +191,7 @@ def _voted(choose, *given) -> str:
 
 @pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
 def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
-    """Another version of OpenCV may filter differently: then Python does everything."""
+    """If OpenCV filters with other bits, Python computes everything."""
     here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
 
     def otherwise(*given):
@@ -208,7 +210,7 @@ def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
 
 
 def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
-    """Features of each window, in steps, equal Hog's; windows above any threshold equal the net's."""
+    """The features of each window, in steps, equal Hog's. The windows above any threshold equal the net's."""
     size = 112, 480
     hog, net = Hog(*size), LaneNet.load()
     for threshold in (0.0, 4.0, -2.5):
@@ -227,7 +229,7 @@ def test_features_are_the_same_and_signs_of_scores_right(helpers, pictures):
 
 
 def test_a_score_too_close_to_the_threshold_is_left_to_python(pictures):
-    """C reports an undecided score, and the detector asks the net."""
+    """C reports a score that is too close to the threshold, and the detector asks the net."""
     part = np.ascontiguousarray(pictures[0][200:232, 280:312])
     score = float(LaneNet.load().score(windows(Hog(32, 32).blocks(part)).reshape(1, FEATURES))[0])
     library = compiled.library(compiled_windows.C_SOURCE)

@@ -1,4 +1,4 @@
-"""The exact DBSCAN on masks agrees with scikit-learn's."""
+"""The exact DBSCAN on masks agrees with scikit-learn's DBSCAN."""
 
 import cv2
 import numpy as np
@@ -10,12 +10,12 @@ from sklearn.cluster import DBSCAN
 
 
 def labels(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """Our labels of the mask's pixels."""
+    """Return our labels of the mask's pixels."""
     return dbscan(np.flatnonzero(mask), mask.shape, eps, min_samples).tolist()
 
 
 def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """scikit-learn's labels of the mask's pixels."""
+    """Return scikit-learn's labels of the mask's pixels."""
     points = np.argwhere(mask)
     if not len(points):
         return []
@@ -40,7 +40,7 @@ def test_random_masks_get_the_labels_of_scikit_learn(seed, rows, width, share, e
 
 @pytest.mark.parametrize(("eps", "min_samples"), [(1, 2), (3, 6), (4, 10), (6, 30)])
 def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
-    """Labels agree on masks like edges: many thin crossing and broken lines."""
+    """Labels agree on masks that look like edges, with many thin crossing and broken lines."""
     rng = np.random.default_rng(eps)
     mask = np.zeros((128, 320), np.uint8)
     for _ in range(25):
@@ -51,16 +51,14 @@ def test_thin_lines_get_the_labels_of_scikit_learn(eps, min_samples):
 
 
 def test_a_pixel_between_two_clusters_belongs_to_the_first():
-    """A border pixel within reach of two clusters belongs to the lower-numbered one and does not
-    join them.
-    """
+    """A border pixel near two clusters belongs to the lower-numbered one and does not join them."""
     mask = np.array([[1, 1, 1, 0, 0, 0, 1, 1, 1]] * 3, np.uint8)
     mask[1, 4] = 1
     assert labels(mask, 2, 8) == [0, 0, 0, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 0, 0, 0, 1, 1, 1]
 
 
 def test_nothing_makes_no_cluster_and_a_lone_pixel_is_noise():
-    """An empty mask gives no labels, a lone pixel the label of noise."""
+    """An empty mask gives no labels. A lone pixel gets the label of noise."""
     mask = np.zeros((5, 5), np.uint8)
     assert labels(mask, 2, 3) == []
     mask[2, 2] = 1

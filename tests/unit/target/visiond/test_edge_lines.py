@@ -1,4 +1,4 @@
-"""From edges to lines: what counts as a lane mark, and its position on the road."""
+"""Edges become lines: which edges count as a lane mark, and where the line is on the road."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,10 @@ TONE = 90
 
 
 def seen(*strips: tuple[float, float, int], slope: float = 0.0):
-    """The lines found in an image with strips along the road: from y to y (m, left first), grey level."""
+    """Return the lines found in an image with strips along the road.
+
+    A strip goes from y to y (m, left first) and has a grey level.
+    """
     row = np.arange(MODEL.rows)[:, np.newaxis]
     column = np.arange(MODEL.width)[np.newaxis]
     picture = np.full((MODEL.rows, MODEL.width), TONE, np.uint8)
@@ -30,14 +33,14 @@ def seen(*strips: tuple[float, float, int], slope: float = 0.0):
 
 @pytest.mark.parametrize("slope", [-0.05, 0.0, 0.05])
 def test_bright_strips_are_lines(slope):
-    """Two strips of paint are found at their middles."""
+    """Each of two painted strips is found at its middle."""
     left, right = seen((1.9, 1.78, 200), (-1.6, -1.72, 200), slope=slope)
     assert (left.y, left.slope) == pytest.approx((1.84, slope), abs=0.02)
     assert (right.y, right.slope) == pytest.approx((-1.66, slope), abs=0.02)
 
 
 def test_the_nearest_strip_counts():
-    """Of three strips to the left, the one next to the middle is the lane's."""
+    """Of three strips on the left, the one closest to the middle is the line."""
     left, right = seen((5.6, 5.5, 210), (3.3, 3.2, 210), (1.4, 1.3, 140))
     assert left.y == pytest.approx(1.35, abs=0.03)
     assert right is None
@@ -45,12 +48,12 @@ def test_the_nearest_strip_counts():
 
 @pytest.mark.parametrize("strip", [(1.0, -9.0, 30), (1.1, 0.98, 30), (9.0, 0.7, 160)])
 def test_a_step_and_a_dark_strip_are_none(strip):
-    """A change to darker only, to brighter only, or to darker and then brighter is no paint."""
+    """A change only to darker or only to brighter, or a dark strip, is not paint."""
     assert seen(strip) == (None, None)
 
 
 def test_paint_behind_such_a_step_is_found():
-    """A shadow's edge next to the middle does not hide the line beyond it."""
+    """The line beyond a shadow's edge is found."""
     left, _ = seen((9.0, 0.9, 60), (1.9, 1.78, 160))
     assert left.y == pytest.approx(1.84, abs=0.03)
 
@@ -58,7 +61,7 @@ def test_paint_behind_such_a_step_is_found():
 @pytest.mark.parametrize("width", [0.02, 0.04, 0.08])
 @pytest.mark.parametrize("gap", [0.0, 0.03, 0.06])
 def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
-    """A joint on either side does not hide the paint, and a joint alone is no line."""
+    """A dark joint on either side does not hide the paint, and a joint alone is not a line."""
     paint, half = 1.84, 0.06
     beyond = (paint + half + gap + width, paint + half + gap, 25)
     before = (paint - half - gap, paint - half - gap - width, 25)
@@ -69,7 +72,7 @@ def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
 
 
 def test_less_contrast_and_other_light_change_no_edge():
-    """Haze that halves the contrast and adds light leaves the same edges."""
+    """Haze that halves the contrast and adds light does not change the edges."""
     part = np.full((64, 96), 80, np.uint8)
     part[:, 40:46] = 180
     at, _ = edges(part)
@@ -78,6 +81,6 @@ def test_less_contrast_and_other_light_change_no_edge():
 
 
 def test_a_camera_that_sees_no_road_is_refused():
-    """A camera that looks up has too few rows of road; the error gives their number."""
+    """A camera that looks up has too few rows of road. The error gives their number."""
     with pytest.raises(ConfigError, match="0 rows of road"):
         RoadRegion(CameraModel.from_view(width=640, rows=480, horizon=470.0, focal=600.0, height=1.2))

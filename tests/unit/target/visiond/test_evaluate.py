@@ -1,4 +1,4 @@
-"""The command that compares detected lanes with the truth."""
+"""The command that compares detected lanes with true lanes."""
 
 import json
 from functools import cache
@@ -18,7 +18,7 @@ def _road(model):
 
 @pytest.fixture
 def frames(tmp_path):
-    """A folder with a frame of each camera shape, and both truths in truth.json."""
+    """A folder with a frame of each camera shape. The truth in both forms is in truth.json."""
     folder = tmp_path / "frames"
     (folder / "deep").mkdir(parents=True)
     lines = {}
@@ -50,7 +50,7 @@ def _lines(folder):
 
 
 def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
-    """Frames are found by key, with or without its prefix, in any folder; all lines count."""
+    """Frames are found by key in any folder, with or without the key's prefix. All lines count."""
     assert _run(frames, "--overlays", str(frames / "drawn")) == 0
     out = capsys.readouterr().out
     assert "both lines found in 2 of 2 = 100.0%" in out and "p1_one" in out and "tus_two" in out
@@ -61,7 +61,7 @@ def test_the_share_of_frames_with_both_lines_is_printed(frames, capsys):
 
 
 def test_a_line_elsewhere_is_a_miss(frames, capsys):
-    """A line further off than the limit makes the frame a miss; the command itself succeeds."""
+    """A frame is a miss if a line is off by more than the limit. The command still succeeds."""
     lines = _lines(frames)
     lines["p1_one"]["L"][1] -= 30.0
     _write(frames, lines)
@@ -71,7 +71,7 @@ def test_a_line_elsewhere_is_a_miss(frames, capsys):
 
 
 def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
-    """If a detector saw nothing, its expectation earns no credit."""
+    """If a detector saw nothing, its assumed lane does not count as a hit."""
     cv2.imwrite(str(frames / "frames" / "one.png"), np.full((540, 960, 3), 90, np.uint8))
     _write(frames, {"p1_one": _lines(frames)["p1_one"]})
     assert _run(frames) == 0
@@ -80,7 +80,7 @@ def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
 
 
 def test_lines_win_over_centres(frames, capsys):
-    """An entry with lines and centres is judged by its lines."""
+    """If an entry has lines and centres, the lines count."""
     lines = _lines(frames)
     lines["p1_one"]["gt"] = {"L": 1.0, "R": 2.0}
     _write(frames, lines)
@@ -89,7 +89,7 @@ def test_lines_win_over_centres(frames, capsys):
 
 
 def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
-    """An entry with null lines is judged by its centres."""
+    """If an entry's lines are null, its centres count."""
     lines = _lines(frames)
     left, right = (lines["p1_one"][side] for side in "LR")
     lines["p1_one"] = {
@@ -103,7 +103,7 @@ def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
 
 
 def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, capsys):
-    """The key's first word selects the folder; if it does not, the frame is refused, not guessed."""
+    """The first word of the key selects the folder. If it does not match, the frame is refused."""
     folder = frames / "frames"
     for camera in ("p1", "tus"):
         (folder / camera).mkdir()
@@ -118,14 +118,14 @@ def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, c
 
 
 def test_overlays_that_cannot_be_written_are_named(frames, capsys):
-    """If a file is in the way of the folder, the error names it."""
+    """If a file is in the way of the overlay folder, the error names it."""
     (frames / "drawn").write_text("in the way")
     assert _run(frames, "--overlays", str(frames / "drawn")) == 2
     assert "drawn/robust_p1_one.png" in capsys.readouterr().err
 
 
 def test_a_folder_s_own_camera_is_used(frames, capsys):
-    """With a camera.yaml next to the frames, keys may have any form."""
+    """If there is a camera.yaml next to the frames, keys can have any form."""
     (frames / "frames" / "camera.yaml").write_text(
         "schema: camera/1\nname: mine\nfiles: '*.png'\nwidth: 960\nrows: 540\n"
         "horizon_row: 318\nfocal_px: 868.5\nheight_m: 1.21\nfps: 20\n"
@@ -150,7 +150,7 @@ def test_a_folder_s_own_camera_is_used(frames, capsys):
     ],
 )
 def test_a_wrong_truth_is_named(frames, capsys, lines, words):
-    """A missing frame or camera, or an invalid line, is a user's error with names."""
+    """A missing frame or camera, or an invalid line, is a user error that names the entry."""
     _write(frames, lines)
     assert _run(frames) == 2
     error = capsys.readouterr().err
@@ -173,7 +173,7 @@ def test_a_missing_truth_file_is_named(frames, capsys):
 
 @pytest.mark.parametrize("width", [640, 960, 1280])
 def test_the_canonical_frame_has_its_vanishing_row_at_200(width):
-    """Any frame ends up 640 wide with the camera's vanishing row in row 200."""
+    """Any frame is converted to a width of 640 px with the camera's vanishing row at row 200."""
     rows = width * 9 // 16
     frame = np.zeros((rows, width, 3), np.uint8)
     row = round(425 / 720 * rows)

@@ -1,4 +1,4 @@
-"""The table-driven histograms of oriented gradients agree with scikit-image's."""
+"""The table-driven histograms of oriented gradients (HOG) agree with scikit-image."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ TOLERANCE = 1e-6  # features are at most 1
 
 
 def pictures() -> dict[str, np.ndarray]:
-    """Noise, an even grey, a black and white pixel checkerboard, a slope that wraps, all 64 x 96."""
+    """Images of 64 x 96 pixels: noise, even grey, a pixel checkerboard, and a slope that wraps round."""
     rng = np.random.default_rng(7)
     row, column = np.mgrid[:64, :96]
     return {
@@ -22,7 +22,7 @@ def pictures() -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("name", pictures())
 def test_blocks_equal_those_of_scikit_image(name):
-    """Every block has scikit-image's features, to a millionth."""
+    """Every block has the features that scikit-image computes, to a millionth."""
     picture = pictures()[name].astype(np.uint8)
     expected = hog(picture, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
     blocks = Hog(*picture.shape).blocks(picture)
@@ -30,7 +30,10 @@ def test_blocks_equal_those_of_scikit_image(name):
 
 
 def test_a_window_has_the_features_of_its_own_part_of_the_picture():
-    """Away from a window's border, where a separate image has no gradient, the features agree."""
+    """A window has the features of a separate image, except at the border.
+
+    There a separate image has no gradient.
+    """
     picture = pictures()["noise"].astype(np.uint8)
     shared = windows(Hog(*picture.shape).blocks(picture))
     assert shared.shape == (3, 5, 7, FEATURES // 7)
@@ -42,7 +45,7 @@ def test_a_window_has_the_features_of_its_own_part_of_the_picture():
 
 
 def test_turning_the_light_up_changes_no_feature():
-    """Twice the contrast and another brightness leave every block unchanged."""
+    """Doubled contrast and another brightness leave every block unchanged."""
     picture = np.random.default_rng(3).integers(0, 100, (64, 96)).astype(np.uint8)
     brighter = 2 * picture + 37
     tables = Hog(64, 96)
@@ -51,7 +54,7 @@ def test_turning_the_light_up_changes_no_feature():
 
 
 def test_the_tables_have_the_angle_and_length_of_every_gradient():
-    """Angles and lengths agree to the last bit, even for mirror images of the computed ones."""
+    """Angles and lengths agree to the last bit, even for mirrored gradients."""
     dx, dy = np.arange(-255, 256)[np.newaxis, :], np.arange(-255, 256)[:, np.newaxis]
     turned = np.degrees(np.arctan2(dy, dx)) % 180.0
     tables = _tables()

@@ -37,7 +37,7 @@ def road(request) -> RoadRenderer:
 
 @pytest.fixture(scope="module")
 def faded() -> RoadRenderer:
-    """A road with an invisible right line and no adjacent lanes."""
+    """A road with an invisible right line and no adjacent lane."""
     look = standard_look()
     look = replace(look, right=replace(look.right, fade=1.0), far_left=None, far_right=None)
     return RoadRenderer(CALTECH, look, 5, periods=3)
@@ -45,7 +45,7 @@ def faded() -> RoadRenderer:
 
 @pytest.mark.parametrize(("offset", "heading"), POSES)
 def test_both_lines_are_found_where_they_are(road, offset, heading):
-    """Both are found within 6 cm and 0.6 degrees, wherever the car is in its lane, through any camera."""
+    """Both lines are found within 6 cm and 0.6 degrees, from any position in the lane and with any camera."""
     found = PaperDetector(road.model).detect(view(road.grey(4.0, offset, heading)))
     for line, (y, slope) in zip(found[:2], road.truth(offset, heading), strict=True):
         assert line.prob > 0.5
@@ -55,7 +55,7 @@ def test_both_lines_are_found_where_they_are(road, offset, heading):
 
 
 def test_no_picture_is_remembered():
-    """A detector that has seen other images finds the same as a new one, to the last bit."""
+    """A detector that has seen other images finds the same lines as a new one, to the last bit."""
     road = RoadRenderer(CALTECH, "dashed", 3, periods=3)
     detector, picture = PaperDetector(CALTECH), road.grey(7.0, 0.3)
     expected = PaperDetector(CALTECH).detect(view(picture))
@@ -65,7 +65,7 @@ def test_no_picture_is_remembered():
 
 
 def test_a_picture_may_be_read_only_and_stays_as_it_is():
-    """Images are mapped from a file that many processes share, so they stay unchanged."""
+    """Read-only images work and stay unchanged, because processes share them."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=2).grey(0.0)
     before = picture.copy()
     picture.flags.writeable = False
@@ -75,7 +75,7 @@ def test_a_picture_may_be_read_only_and_stays_as_it_is():
 
 @pytest.mark.parametrize("level", [0, 97, 255])
 def test_where_nothing_is_seen_nothing_is_claimed(level):
-    """An even image has no lines: probability 0, at the positions of an assumed lane."""
+    """An even image has no lines. Both have probability 0 and the positions of an assumed lane."""
     found = PaperDetector(CALTECH).detect(view(np.full((480, 640), level, np.uint8)))
     assert [(line.y, line.prob) for line in found] == [(1.85, 0.0), (-1.85, 0.0), (0.0, 0.0)]
 
@@ -89,13 +89,13 @@ def test_with_one_line_the_path_is_half_a_lane_beside_it(faded):
 
 
 def test_the_middle_of_the_car_divides_left_from_right(faded):
-    """A car that has crossed its left line has that line on its right."""
+    """For a car that has crossed its left line, that line is the right line."""
     found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 2.6)))
     assert found.right.y == pytest.approx(1.85 - 2.6, abs=0.08)
 
 
 def test_shadows_and_seams_beside_the_middle_are_not_lines():
-    """Hard shadows and tar seams all over the lane move neither line by a tenth of the lane."""
+    """Hard shadows and tar seams across the lane move neither line by a tenth of the lane's width."""
     look = Look(shadows=0.35, shadow_depth=0.6, seams=8.0, cracks=12.0, patches=6.0, joint_tone=-50.0)
     road = RoadRenderer(CALTECH, look, 11, periods=8)
     detector = PaperDetector(CALTECH)
@@ -106,7 +106,7 @@ def test_shadows_and_seams_beside_the_middle_are_not_lines():
 
 
 def test_real_edges_get_the_clusters_of_scikit_learn():
-    """Labels agree on the edges of rendered roads, as a detector gets them."""
+    """On the edges of rendered roads, the labels agree with scikit-learn's."""
     region = RoadRegion(CALTECH)
     for look in (Look(), Look(shadows=0.5, shadow_depth=0.6, cracks=20.0, grain=9.0)):
         part = RoadRenderer(CALTECH, look, 2, periods=3).grey(3.0)[region.part]
@@ -118,7 +118,7 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
 
 
 def test_what_is_seen_does_not_depend_on_the_number_of_threads():
-    """The net's sums have the same bits with one thread and with two."""
+    """The net's sums have the same bits with one thread and with two threads."""
     features = np.random.default_rng(0).random((192, 1764), dtype=np.float32)
     net = LaneNet.load()
     with threadpool_limits(1):
@@ -128,7 +128,7 @@ def test_what_is_seen_does_not_depend_on_the_number_of_threads():
 
 
 def test_a_tile_needs_its_share_of_marked_windows():
-    """A single marked window marks its four tiles only if one is enough."""
+    """One marked window marks its four tiles only if the required number is one."""
     marked = np.zeros((3, 4), bool)
     marked[1, 2] = True
     assert tiles_with_mark(marked, 1).sum() == 4
@@ -136,7 +136,7 @@ def test_a_tile_needs_its_share_of_marked_windows():
 
 
 def test_the_windows_on_a_tile_are_those_that_can_light_it():
-    """The windows on a tile are the four that share it, and a pixel has its tile's number."""
+    """The windows on a tile are the four that contain it. A pixel has the number of its tile."""
     tiles = np.zeros((4, 5), bool)
     tiles.ravel()[tile_numbers(64, 80)[40 * 80 + 50]] = True  # the pixel in row 40, column 50
     assert np.argwhere(tiles).tolist() == [[2, 3]]
@@ -145,7 +145,7 @@ def test_the_windows_on_a_tile_are_those_that_can_light_it():
 
 
 def test_a_window_is_judged_alike_whatever_others_are_looked_at():
-    """The net's score of a window has the same bits at any place of a stack, next to any others."""
+    """The net's score of a window has the same bits at any place in a stack, next to any other windows."""
     features = np.random.default_rng(1).random((64, 1764), dtype=np.float32)
     net = LaneNet.load()
     scores = net.score(features)

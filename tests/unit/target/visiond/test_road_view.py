@@ -1,4 +1,4 @@
-"""The image as a map of the road."""
+"""The road view maps the image onto the road."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ CAMERAS = {
 @pytest.mark.parametrize("name", CAMERAS)
 @pytest.mark.parametrize("y", [-1.85, 0.0, 1.3])
 def test_a_line_along_the_road_stands_upright_in_its_column(name, y):
-    """A line at y m is in the map's column of y, in every row where the image shows it."""
+    """A road line at y m is in the map's column of y, in every row where the image shows it."""
     model = CAMERAS[name]
     a, b = model.line_in_picture(y, 0.0)
     v, u = np.mgrid[: model.rows, : model.width]
@@ -34,7 +34,10 @@ def test_a_line_along_the_road_stands_upright_in_its_column(name, y):
 
 @pytest.mark.parametrize("name", CAMERAS)
 def test_the_map_s_rows_stand_for_the_picture_s(name):
-    """The map goes from far to near without a gap, and its rows' shares add up to the rows it covers."""
+    """The map's rows go from far to near without a gap.
+
+    Their shares add up to the image rows that they cover.
+    """
     view = RoadView(CAMERAS[name])
     step = np.diff(view.drop)
     assert (step > 0).all() and step.max() <= view.share.max() + 1
@@ -44,7 +47,7 @@ def test_the_map_s_rows_stand_for_the_picture_s(name):
 
 
 def test_near_rows_are_means_of_many_pixels():
-    """Noise of single pixels is much weaker in the map's nearest rows than in the image."""
+    """In the map's nearest rows, pixel noise is much weaker than in the image."""
     model = CameraModel()
     picture = (
         np.random.default_rng(1).normal(128, 30, (model.rows, model.width)).clip(0, 255).astype(np.uint8)
@@ -56,7 +59,7 @@ def test_near_rows_are_means_of_many_pixels():
 
 
 def test_a_camera_that_sees_no_road_near_enough_is_refused():
-    """If marks are too narrow to distinguish from texture, the message names the calibration."""
+    """If marks are too narrow to distinguish from texture, the error names the calibration."""
     far = CameraModel.from_view(width=640, rows=480, horizon=463, focal=600, height=1.35)
     with pytest.raises(ConfigError, match=r"calibration: 0 rows .* expected at least 8"):
         RoadView(far)

@@ -28,7 +28,7 @@ def renderer(camera: str = "steep", marks: str = "solid") -> RoadRenderer:
 
 
 def see(detector: RobustDetector, picture: np.ndarray) -> LaneLines:
-    """The detector's result for an image; the view's geometry is invalid."""
+    """Return the detector's result for an image. The view's geometry is invalid."""
     nan = float("nan")
     return detector.detect(
         CameraView(left_lane_y=nan, right_lane_y=nan, path_y=nan, bend=(), lead_d_rel=nan, picture=picture)
@@ -36,7 +36,7 @@ def see(detector: RobustDetector, picture: np.ndarray) -> LaneLines:
 
 
 def errors(lines: LaneLines, truth: tuple) -> list[float]:
-    """Of both lines' y at the car (m)."""
+    """Return the error of each line's y at the car (m)."""
     return [abs(line.y - y) for line, (y, _) in zip((lines.left, lines.right), truth, strict=True)]
 
 
@@ -44,7 +44,7 @@ def errors(lines: LaneLines, truth: tuple) -> list[float]:
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.6, -0.03), (-0.7, 0.04)])
 def test_a_first_picture_is_enough(camera, marks, offset, heading):
-    """Without history both lines are found, to some cm and a few mrad, with the path between them."""
+    """Without history, both lines are found within some cm and a few mrad, with the path between them."""
     road = renderer(camera, marks)
     truth = road.truth(offset, heading)
     lines = see(RobustDetector(road.model), road.grey(3.0, offset, heading))
@@ -56,7 +56,10 @@ def test_a_first_picture_is_enough(camera, marks, offset, heading):
 
 
 def test_another_road_with_distractors():
-    """Concrete with seams, joints, shadows, faint paint, a double line, a kerb and cars is no harder."""
+    """The errors are no larger on concrete with distractors.
+
+    These are seams, joints, shadows, faint paint, a double line, a kerb and cars.
+    """
     look = replace(
         standard_look("dashed"),
         asphalt=150.0,
@@ -76,7 +79,7 @@ def test_another_road_with_distractors():
 
 @pytest.mark.parametrize("tone", [0, 128, 255])
 def test_an_empty_picture_shows_no_lines(tone):
-    """In an image of one tone no line is seen; both are expected at an assumed lane's positions."""
+    """In an image of one tone, no line is seen. Both lines get the positions of an assumed lane."""
     model = CAMERAS["steep"]
     lines = see(RobustDetector(model), np.full((model.rows, model.width), tone, np.uint8))
     assert (lines.left.prob, lines.right.prob, lines.path.prob) == (0.0, 0.0, 0.0)
@@ -84,7 +87,10 @@ def test_an_empty_picture_shows_no_lines(tone):
 
 
 def test_lines_are_held_for_a_while_ever_less_probable():
-    """When nothing is seen any more, the lines stay and fade; after a second there are none."""
+    """When no line is seen any more, the lines stay and their probability falls.
+
+    After a second there are none.
+    """
     road = renderer()
     detector = RobustDetector(road.model)
     before = see(detector, road.grey(0.0, 0.4, 0.02))
@@ -101,7 +107,7 @@ def test_lines_are_held_for_a_while_ever_less_probable():
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_line_is_enough_to_know_the_other(side):
-    """With half of the view covered, the covered line follows from the other one, and fades."""
+    """If half of the view is covered, the other line gives the covered one, whose probability falls."""
     road = renderer()
     detector = RobustDetector(road.model)
     see(detector, road.grey(0.0))
@@ -120,7 +126,7 @@ def test_one_line_is_enough_to_know_the_other(side):
 
 
 def test_lines_are_followed_through_rain():
-    """Behind ten thousand streaks over a dashed road, which briefly hide paint, the lane is not lost."""
+    """Rain of ten thousand streaks over a dashed road hides paint briefly. The lane is not lost."""
     from types import SimpleNamespace
 
     from selfdrive.sim.effects import PaperRain
@@ -136,7 +142,7 @@ def test_lines_are_followed_through_rain():
 
 
 def test_beyond_a_line_the_next_lane_is_the_car_s():
-    """A car that drifts over a line first gets its old lane, then the one it is in."""
+    """A car that drifts over a line keeps its old lane at first and then gets the new one."""
     road = renderer()
     detector = RobustDetector(road.model)
     for i in range(75):
@@ -148,8 +154,9 @@ def test_beyond_a_line_the_next_lane_is_the_car_s():
 
 
 def test_the_same_pictures_give_the_same_lines():
-    """Two detectors agree to the last bit, whatever another one sees in between, and do not modify
-    the image.
+    """Two detectors agree to the last bit, whatever a third one sees in between.
+
+    They do not modify the image.
     """
     road = renderer()
     first, second, other = (RobustDetector(road.model) for _ in range(3))

@@ -1,4 +1,4 @@
-"""Training: a seed always gives the same windows and the same net, and the net recognizes marks."""
+"""Training with the same seed gives the same windows and the same net."""
 
 import numpy as np
 import pytest
@@ -9,13 +9,14 @@ from selfdrive.visiond.training_windows import EACH, labelled_windows
 
 @pytest.fixture(scope="module")
 def sample() -> tuple[np.ndarray, np.ndarray]:
-    """Windows of two roads that the shipped net has not seen."""
+    """Windows of two roads that the shipped net was not trained on."""
     return labelled_windows(2, np.random.default_rng(99))
 
 
 def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
-    """Windows with and without a mark come in equal numbers, limited for each image; a second draw gives the
-    same bytes.
+    """Windows with and without a mark are equal in number, with a limit for each image.
+
+    A second draw gives the same bytes.
     """
     features, labels = sample
     assert 0.4 < labels.mean() < 0.6
@@ -27,13 +28,13 @@ def test_windows_come_in_equal_parts_and_again_from_the_same_seed(sample):
 
 
 def test_the_shipped_net_knows_marks_on_roads_it_has_not_seen(sample):
-    """It classifies at least three in four windows correctly, on deliberately hard roads."""
+    """The shipped net classifies at least three in four windows correctly, on deliberately hard roads."""
     features, labels = sample
     assert np.mean((LaneNet.load().score(features) > 0.0) == labels) >= 0.75
 
 
 def test_weights_can_be_stored_and_loaded(tmp_path):
-    """A net written and read again is the same, and has the same bytes when written."""
+    """A net that is written and read is the same, and has the same bytes when it is written again."""
     net = LaneNet.load()
     net.save(tmp_path / "a.npz")
     LaneNet.load(tmp_path / "a.npz").save(tmp_path / "b.npz")

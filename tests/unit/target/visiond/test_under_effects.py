@@ -1,4 +1,4 @@
-"""The command that counts lines missed behind image effects, on frames of a rendered road."""
+"""The command that counts missed lines under image effects, on frames of a rendered road."""
 
 import csv
 import json
@@ -28,7 +28,7 @@ def frames(tmp_path_factory):
 
 
 def test_misses_are_counted_by_level(frames, tmp_path, capsys):
-    """A random effect has as many images as seeds, a deterministic one has one."""
+    """A random effect has one image for each seed, and a deterministic effect has one image."""
     chosen = ["--effect", "PaperOcclusion", "--effect", "MedianBlur", "--seeds", "3"]
     assert main([*frames, *chosen, "--csv", str(tmp_path / "found.csv")]) == 0
     printed = capsys.readouterr().out.splitlines()
@@ -42,7 +42,7 @@ def test_misses_are_counted_by_level(frames, tmp_path, capsys):
 
 
 def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
-    """Worse weather has more misses."""
+    """Heavier weather has more misses."""
     assert main([*frames, "--effect", "PaperRain", "--seeds", "2", "--csv", str(tmp_path / "found.csv")]) == 0
     with (tmp_path / "found.csv").open() as file:
         missed = [int(row["missed_paper"]) for row in csv.DictReader(file)]
@@ -50,7 +50,7 @@ def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
 
 
 def test_strips_show_all_levels(frames, tmp_path):
-    """Strips have two rows of five, with room for effects of fewer levels."""
+    """Strips have two rows of five images. Effects with fewer levels leave places empty."""
     kinds = {kind.__name__: kind for kind in LEVELS}
     for name in ("PaperRain", "GaussianBlur"):
         assert main([*frames, "--effect", name, "--strips", str(tmp_path)]) == 0
@@ -60,6 +60,6 @@ def test_strips_show_all_levels(frames, tmp_path):
 
 
 def test_missing_frames_are_told(frames, tmp_path, capsys):
-    """Missing frames are reported in one line, with a remedy."""
+    """Missing frames are reported in one line that says what to do."""
     assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
     assert "p1_one" in capsys.readouterr().err

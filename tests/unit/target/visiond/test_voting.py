@@ -1,4 +1,4 @@
-"""Fitting two parallel lines to points."""
+"""The fit of two parallel lines to points."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ VIEW = RoadView(CameraModel())
 
 
 def points_on(pose: Pose, lines: str = "LR", chance: int = 0, seed: int = 0) -> Points:
-    """Points on both lines (or one) in every row, and as many random ones."""
+    """Return points on both lines (or on one) in every row, and `chance` random points."""
     rng = np.random.default_rng(seed)
     rows, columns = [], []
     for side, y in (("L", pose.y_left), ("R", pose.y_right)):
@@ -27,7 +27,7 @@ def points_on(pose: Pose, lines: str = "LR", chance: int = 0, seed: int = 0) -> 
 
 
 def solve(points: Points, belief: Belief) -> Pose:
-    """The result of both steps for the points."""
+    """Return the result of both steps for the points."""
     voters = Voters(VIEW, points, float(VIEW.share.sum()))
     return fit(elect(voters, belief), voters, belief)
 
@@ -37,7 +37,7 @@ def solve(points: Points, belief: Belief) -> Pose:
 @pytest.mark.parametrize("dip", [-7.0, 0.0, 9.0])
 @pytest.mark.parametrize("width", [3.2, 3.7, 4.2])
 def test_lines_are_found_wherever_they_are(middle, left, dip, width):
-    """Offset, heading, pitch error and lane width are recovered from points, a third of them random."""
+    """Offset, heading, pitch error and lane width are found from points of which a third are random."""
     true = Pose(left, dip, middle + 0.5 * width, middle - 0.5 * width)
     found = solve(points_on(true, chance=120), Belief())
     assert found.y_left == pytest.approx(true.y_left, abs=0.04)
@@ -48,7 +48,7 @@ def test_lines_are_found_wherever_they_are(middle, left, dip, width):
 
 @pytest.mark.parametrize(("lines", "missing"), [("L", "y_right"), ("R", "y_left")])
 def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
-    """With points of one line only, the other is at the expected width, and counts as not seen."""
+    """If only one line has points, the other is a lane width away and counts as not seen."""
     true = Pose(5.0, 0.0, 1.6, -1.8)
     found = solve(points_on(true, lines), Belief(width=(3.4, 0.1)))
     assert getattr(found, missing) == pytest.approx(getattr(true, missing), abs=0.1)
@@ -56,7 +56,7 @@ def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
 
 
 def test_without_points_the_belief_stands():
-    """Without points, the result is the expected lane, with nothing seen."""
+    """Without points, the result is the expected lane and nothing is seen."""
     found = solve(
         points_on(Pose(0.0, 0.0, 1.85, -1.85), lines=""), Belief(middle=(0.3, 0.1), width=(3.6, 0.1))
     )
@@ -66,7 +66,7 @@ def test_without_points_the_belief_stands():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_belief_keeps_the_lines_among_many_chance_points(seed):
-    """Ten times as many random points as points of the lines do not move a lane with a known position."""
+    """With a known lane position, ten times as many random points as line points do not move the lane."""
     true = Pose(4.0, 0.0, 1.95, -1.75)
     points = points_on(true, chance=1500, seed=seed)
     belief = Belief(middle=(0.15, 0.1), width=(3.7, 0.1), left=(0.0, 4.0), dip=(0.0, 1.5))
@@ -76,6 +76,6 @@ def test_belief_keeps_the_lines_among_many_chance_points(seed):
 
 
 def test_chance_alone_counts_as_nothing_seen():
-    """Evenly spread points give lines that are hardly seen, though the best pair was selected."""
+    """With evenly spread points, the best pair of lines counts as hardly seen."""
     found = solve(points_on(Pose(0.0, 0.0, 1.85, -1.85), lines="", chance=1500), Belief())
     assert max(found.prob_left, found.prob_right) < 0.6
