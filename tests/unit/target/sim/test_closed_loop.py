@@ -108,7 +108,7 @@ def lanes_from(t, shift):
 
 @pytest.mark.parametrize("offset", [0.5, -0.5])
 def test_start_beside_the_middle(s1, offset):
-    """If engaged half a metre off, the car is in the middle within 4 s, without overshoot, and stays there."""
+    """If engaged half a metre off, the car returns to the middle within 4 s, without overshoot."""
     trace = drive(replace(s1, lateral_offset=offset, steps=1200)).trace
     distance = trace["lateral_offset"] * np.sign(offset)
     assert distance[:130] == pytest.approx(0.5)
