@@ -7,7 +7,7 @@ from mutator.errors import MutatorError
 
 def inside(path: str) -> str:
     """Return `path` as a clean relative path in a target's root; MutatorError, without a file position, if it
-    leads out of it.
+    is outside the root.
 
     Links may lead out of the root, because a target's files are read once and never written.
     """
