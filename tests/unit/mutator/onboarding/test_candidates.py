@@ -1,4 +1,4 @@
-"""Guesses of which functions of a tree are the step of a loop, and which values are worth a fault."""
+"""Guesses of a controller's step function and of the values worth a fault."""
 
 import ast
 
@@ -55,29 +55,30 @@ def run(controller, world):
 
 
 def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
-    """The guesses for these modules, by name."""
+    """The candidates in these modules, by name."""
     modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
     return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
 
 
 def test_the_controllers_step_comes_first() -> None:
-    """A step-like method of a class with state, called in a loop, ranks before the world or a helper."""
+    """A method with a step's name, in a class with state and called in a loop, ranks before the world or a
+    helper."""
     first, *others = candidates(car=CAR)
     assert (first.name, first.path, first.line) == ("SpeedController.update", "car.py", 14)
     assert {one.name for one in others} == {"World.advance", "clip", "run"}
 
 
 def test_what_it_needs() -> None:
-    """Arguments without a default are needed, including keyword ones, of the step and of the constructor."""
+    """The candidate lists the arguments without a default, keyword ones included, of the step and of the
+    constructor."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")
 
 
 def test_values_are_numbers_that_have_a_name() -> None:
-    """Texts, items and unpacked tuples are no values; arithmetic on a name assigned once comes first, and one
-    assigned several times is distinguished.
-    """
+    """Texts, items and unpacked tuples are not listed. Arithmetic on a name that is assigned once comes
+    first. A name that is assigned several times is distinguished."""
     first, *_ = candidates(car=CAR)
     assert [(value.name, value.line, value.nth) for value in first.values] == [
         ("error", 16, None),
@@ -89,7 +90,7 @@ def test_values_are_numbers_that_have_a_name() -> None:
 
 
 def test_values_of_inner_functions_are_not_the_steps() -> None:
-    """Variables of inner functions are not the step's; those in loops and branches are."""
+    """Variables of loops and branches belong to the step; variables of inner functions do not."""
     (step,) = candidates(
         a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
         "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"
@@ -98,7 +99,7 @@ def test_values_of_inner_functions_are_not_the_steps() -> None:
 
 
 def test_a_file_named_for_a_controller_counts() -> None:
-    """Of two equal functions, the one in a file named after a controller comes first."""
+    """If two functions are equal, the one in a file named after a controller comes first."""
     source = "def step(x):\n    y = x + 1\n    return y\n"
     assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
 
@@ -114,7 +115,6 @@ def test_a_file_named_for_a_controller_counts() -> None:
     ],
 )
 def test_nothing_to_step(source: str) -> None:
-    """Modules without active functions have no candidate; a coroutine is none, since calling it
-    runs nothing.
-    """
+    """Modules without functions that do something have no candidate. A coroutine is no candidate, because
+    calling it runs nothing."""
     assert candidates(a=source) == ()

@@ -1,4 +1,4 @@
-"""What a survey of a source tree finds; it reads the tree and never imports it."""
+"""The survey of a source tree, which reads the tree and never imports it."""
 
 import os
 import sys
@@ -15,7 +15,7 @@ Tree = Callable[..., Path]
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Tree:
-    """Write files, path to text, below a folder."""
+    """Write files below a folder, given as path and text."""
 
     def write(**files: str) -> Path:
         for name, text in files.items():
@@ -29,9 +29,8 @@ def tree(tmp_path: Path) -> Tree:
 
 
 def test_packages_and_flat_modules(tree: Tree) -> None:
-    """Packages and flat modules are distinguished; tests, setup scripts and folders without Python are
-    neither.
-    """
+    """Packages and flat modules are distinguished. Tests, setup scripts and folders without Python are
+    ignored."""
     folder = tree(
         pkg__a_py="",
         loose_py="",
@@ -48,7 +47,7 @@ def test_packages_and_flat_modules(tree: Tree) -> None:
 
 
 def test_a_package_itself(tree: Tree) -> None:
-    """The folder of a package means the package, with the folder above it as root."""
+    """If the folder of a package is given, the root is the folder above it."""
     folder = tree(pkg__a_py="x = 1\n")
     (folder / "pkg" / "__init__.py").touch()
     found = look_at(str(folder / "pkg"))
@@ -57,7 +56,7 @@ def test_a_package_itself(tree: Tree) -> None:
 
 
 def test_a_src_layout(tree: Tree) -> None:
-    """A project with its package in src/ has its root there."""
+    """The root of a project with its package in src/ is that folder."""
     folder = tree(src__pkg__a_py="", setup_py="")
     found = look_at(str(folder))
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
@@ -69,7 +68,8 @@ def test_an_empty_folder(tree: Tree) -> None:
 
 
 def test_what_cannot_be_read_is_told(tree: Tree) -> None:
-    """A file with a syntax error, or without text, is left out, with place and reason."""
+    """A file with a syntax error, or one that is not text, is left out and listed with position and
+    reason."""
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = look_at(str(folder))
@@ -79,14 +79,14 @@ def test_what_cannot_be_read_is_told(tree: Tree) -> None:
 
 
 def test_nothing_is_imported(tree: Tree) -> None:
-    """A tree with harmful imports does no harm."""
+    """The survey does not run a tree's harmful imports."""
     tree(harm_py="raise SystemExit('imported')\n")
     assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules
 
 
 def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
-    """Files with names that are no module names, pipes and dangling links are left out."""
+    """Pipes, dangling links and files whose names are not module names are left out."""
     folder = tree(pkg__a_py="")
     for name in ("b-c.py", "class.py"):
         (folder / "pkg" / name).touch()
@@ -98,13 +98,13 @@ def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
 
 
 def test_its_warnings_are_its_own(tree: Tree, recwarn: pytest.WarningsRecorder) -> None:
-    """Python's warnings about the controller's style are not shown."""
+    """Python's warnings about the controller's code are not shown."""
     look_at(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
     assert not recwarn.list
 
 
 def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
-    """Virtual environments of any name below a package, and hidden folders, are left out."""
+    """Hidden folders, and virtual environments of any name below a package, are left out."""
     folder = tree(pkg__a_py="", pkg__own__lib_py="")
     (folder / "pkg" / "own" / "pyvenv.cfg").touch()
     (folder / "pkg" / ".hidden").mkdir()
@@ -113,7 +113,7 @@ def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
 
 
 def test_an_installed_package() -> None:
-    """`installed:NAME` is found without an import, with its requirement."""
+    """`installed:NAME` finds a package without importing it, and adds its requirement."""
     found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
@@ -130,7 +130,8 @@ def test_an_installed_package() -> None:
     ],
 )
 def test_what_is_not_there_is_told(target: str, words: str) -> None:
-    """A missing folder or package, or one without Python source, is a user's error with a remedy."""
+    """A missing folder or package, or one without Python source, is reported as a user's error with a
+    remedy."""
     with pytest.raises(MutatorError, match=words) as told:
         look_at(target)
     assert told.value.remedy

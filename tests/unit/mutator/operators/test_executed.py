@@ -1,4 +1,4 @@
-"""Executed lines: what a golden run reports, while it stays golden."""
+"""The lines that a golden run executes. Recording them does not change the run."""
 
 from pathlib import Path
 
@@ -21,9 +21,8 @@ def _number(path: Path, text: str) -> int:
 
 
 def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
-    """Lines of each step are recorded, but not those of constructors or unexecuted ones; the run equals the
-    golden run byte for byte.
-    """
+    """The lines of each step are recorded, without those of constructors and lines that do not run. The
+    run equals the golden run byte for byte."""
     manifest = toycar.manifest("toycar")
     base = prepare_base(manifest, tmp_path / "base")
     engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)
@@ -44,9 +43,8 @@ def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_pa
 
 
 def test_lines_are_measured_once(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second time, the lines come from the cache; a damaged entry is measured again, and a failed run is
-    an error.
-    """
+    """The second time, the lines come from the cache. A damaged entry is measured again, and a failed run
+    is an error."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
     drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)

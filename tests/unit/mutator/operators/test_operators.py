@@ -1,4 +1,4 @@
-"""Mutation operators: their mutations of small sources, the exclusions, and the sample."""
+"""Mutation operators: the mutations of small sources, the exclusions, and samples."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -58,7 +58,7 @@ CHANGES = {
         "if a: return b": ["a -> not a", "a -> True", "a -> False"],
         "return b if a else c": ["a -> not a", "a -> True", "a -> False"],
         "return [b for b in c if a]": ["a -> not a", "a -> True", "a -> False"],
-        "if (c := a) > b: return c": ["(c := a) > b -> not ((c := a) > b)"],  # a constant sets no c
+        "if (c := a) > b: return c": ["(c := a) > b -> not ((c := a) > b)"],  # a constant would not set `c`
         "return a": [],
     },
     "omission": {
@@ -66,9 +66,9 @@ CHANGES = {
         "self.a = b": ["self.a = b -> left out"],
         "a += b": ["a += b -> left out"],
         "a(b)": ["a(b) -> left out"],
-        "c = b": [],  # its first value: without it the name would not exist
+        "c = b": [],  # the first value of `c`, without which the name would not exist
         "if a: b = c": [],
-        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # its own name
+        "a([c for c in b])\n    c = b": ["a([c for c in b]) -> left out"],  # the `c` inside is another name
     },
     "return": {
         "return a": ["a -> None", "a -> 0", "a -> -a"],
@@ -92,9 +92,8 @@ CHANGES = {
 
 @pytest.fixture
 def make(tmp_path: Path, clone: Workspace) -> Make:
-    """The mutations by all operators, or by these, of a function `f` with this source as its body, without
-    duplicates of equal code.
-    """
+    """The mutations of a function `f` with this source as its body, by all operators or by the given ones,
+    without duplicates of equal code."""
     models = clone.fault_models()
 
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
@@ -108,18 +107,18 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
 
 @pytest.mark.parametrize("operator", CHANGES)
 def test_changes_of_operator(operator: str, make: Make) -> None:
-    """Each operator makes exactly its documented set of changes."""
+    """Each operator makes exactly the changes that its documentation lists."""
     for body, expected in CHANGES[operator].items():
         assert [one.text for one in make(body, operator)] == expected, body
 
 
 def test_yield_is_not_calculated_again(make: Make) -> None:
-    """An expression with a `yield` keeps its value, since a second one would suspend the function twice."""
+    """An expression with `yield` is not mutated in a way that would suspend the function twice."""
     assert not make("return (yield a) + b", "arithmetic", "return")
 
 
 def test_equal_code_is_dropped(make: Make) -> None:
-    """A mutant that compiles to the code of the original, or of an earlier mutant, is dropped."""
+    """A mutant is dropped if it compiles to the same code as the original or an earlier mutant."""
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
     assert [(one.operator.value, one.now) for one in denied] == [
@@ -129,7 +128,7 @@ def test_equal_code_is_dropped(make: Make) -> None:
 
 
 def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
-    """A property and its setter share a name: the first value of a local name is kept in both."""
+    """A property and its setter share a name. Each keeps the first value of its local names."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
         f"@property\n    def f(self):\n        c = 1\n        return c\n    {setter}",
@@ -149,13 +148,14 @@ def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
 
 
 def test_long_change_shows_what_differs(make: Make) -> None:
-    """The text of a change in a long expression is short and shows the difference."""
+    """A change in a long expression has a short text that shows the difference."""
     [long] = make(f"{'a' * 80}(b, limit=a)", "argument")
     assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 
 
 def test_places_and_executed_lines(toycar: Workspace) -> None:
-    """Places name files and functions, optionally with globs; unexecuted lines are left out and counted."""
+    """Places are files and functions, optionally with globs. Lines that are not executed are left out and
+    counted."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
@@ -179,9 +179,8 @@ def test_places_and_executed_lines(toycar: Workspace) -> None:
 
 
 def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
-    """A sample has each operator's share in each function, give or take one, and a seed always gives the same
-    faults.
-    """
+    """A sample has each operator's share in each function, to within one mutant. The same seed gives the
+    same faults."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
@@ -193,7 +192,8 @@ def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
 
 
 def test_mutants_of_operators_build(toycar: Workspace) -> None:
-    """Every mutant of the toy builds, with the same bytes as a direct build; ids are different."""
+    """Every mutant of the toy can be built, with the same bytes as in a direct build. The ids are all
+    different."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]

@@ -1,4 +1,4 @@
-"""Blame: who caused a bad ending, by the content of the stack and the time."""
+"""Who is blamed for a run that ends badly. The lines on the stack and the time decide."""
 
 from pathlib import Path
 
@@ -62,8 +62,8 @@ def execution(
 def test_what_was_on_the_stack(stack: Stack, status: Status) -> None:
     """An exception in the target's own code is a crash.
 
-    One in an injected line, in a probe helper that it calls, or in target code that it calls makes the mutant
-    invalid. Observing and asking the probe are not the target's code.
+    If the exception is in an injected line, in a probe helper that it calls, or in target code that it
+    calls, the mutant is invalid. Observing and asking the probe are not the target's code.
     """
     assert assign_blame(execution(stack), FILES, ())[0] is status
 
@@ -90,9 +90,9 @@ CHANGED = {
     ],
 )
 def test_a_changed_line_still_does_what_it_did(stack: Stack, status: Status) -> None:
-    """Only the injected part of a line is the injection's.
+    """In a changed line, only the injected part belongs to the injection.
 
-    An exception in the rest is the target's, one in asking the probe is the harness's.
+    An exception in the rest of the line belongs to the target, and one in asking the probe to the harness.
     """
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
@@ -115,9 +115,8 @@ TWO = b"""def say(x):
     [(IN_A_STRING, "None.x"), (LATIN, "1 / 0"), (TWO, "no()"), (TWO, "1 / 0")],
 )
 def test_what_raised_is_found_wherever_it_stands(data: bytes, of_fault: str) -> None:
-    """In a line that begins in a string or has letters of another encoding, columns are the traceback's:
-    bytes of UTF-8. Code before or after the injection's part is the target's.
-    """
+    """In a line that begins inside a string, or has letters of another encoding, columns are those of the
+    traceback: bytes of UTF-8. Code before or after the injected part belongs to the target."""
     encoding = "latin-1" if b"latin" in data else "utf-8"
     number = 1 + next(n for n, line in enumerate(data.splitlines()) if b"# fi:" in line)
     line = data.splitlines()[number - 1].decode(encoding)
@@ -133,7 +132,7 @@ def test_what_raised_is_found_wherever_it_stands(data: bytes, of_fault: str) -> 
 
 
 def test_each_of_two_in_a_line_answers_for_itself() -> None:
-    """If one injection raises on purpose, that does not excuse another one in its line."""
+    """An injection that raises on purpose does not excuse another injection in the same line."""
     line = TWO.splitlines()[1]
     columns = [line.index(b"no()"), line.index(b"1 / 0")]
     told = [
@@ -144,7 +143,7 @@ def test_each_of_two_in_a_line_answers_for_itself() -> None:
 
 
 def test_words() -> None:
-    """The blame is stated with the line or the reason."""
+    """The message names the line or the reason."""
     told = [
         assign_blame(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
     ]
@@ -157,7 +156,8 @@ def test_words() -> None:
 
 
 def test_a_model_may_raise() -> None:
-    """An exception of an injection that raises on purpose is a crash; it does not excuse another one."""
+    """An exception from an injection that raises on purpose is a crash. It does not excuse another
+    injection."""
     assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
     assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
@@ -166,16 +166,15 @@ def test_a_model_may_raise() -> None:
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 @pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
 def test_before_the_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
-    """A fault that was never active is not blamed for an ending."""
+    """A fault that was never active is not blamed for how the run ends."""
     told = assign_blame(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
     assert told[0] is Status.HARNESS_ERROR
     assert told[1].endswith(", before the fault was active")
 
 
 def test_what_has_no_exception() -> None:
-    """A timeout or a silent end after the activation keeps its status, as does a harness error at
-    any time.
-    """
+    """A timeout or a silent end after the activation keeps its status. A harness error keeps its status at
+    any time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
         assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
     told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
@@ -183,16 +182,15 @@ def test_what_has_no_exception() -> None:
 
 
 def test_what_an_exception_came_of_counts() -> None:
-    """If the target catches an exception of an injected line or of the probe and raises another, the first
-    counts. The probe takes precedence.
-    """
+    """If the target catches an exception of an injected line or of the probe and raises another one, the
+    first one is blamed. The probe takes precedence."""
     assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
     assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_which_call_was_one_too_many_is_chance() -> None:
-    """A target that recurses for ever is to blame, even if an injected line made the last call."""
+    """A target that recurses for ever is blamed, even if an injected line made the last call."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
         assert assign_blame(deep, FILES, ())[0] is Status.CRASHED
@@ -201,12 +199,12 @@ def test_which_call_was_one_too_many_is_chance() -> None:
 
 
 def test_a_probe_that_cannot_report_failed() -> None:
-    """An exception without a probe report is the one that the probe had to report."""
+    """If there is no probe report, the exception is the one that the probe had to report."""
     assert assign_blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
 
 
 def test_records_keep_type_text_and_place() -> None:
-    """The place is the innermost line of the target, never of the probe."""
+    """The reported position is the innermost line of the target, never of the probe."""
     error = error_of(execution((PROBE, INJECTED, ELSEWHERE)).raised)
     assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
     assert error_of(None) is None

@@ -1,4 +1,4 @@
-"""The manifest alone determines the columns of the results."""
+"""The columns of the results follow from the manifest alone."""
 
 from pathlib import Path
 
@@ -21,14 +21,14 @@ def names(hazards: list[str], compared: list[str]) -> list[str]:
 
 
 def test_the_shipped_target_has_these_columns_in_this_order(clone: Workspace) -> None:
-    """The columns of the shipped target's results.csv keep their positions."""
+    """The columns of the shipped target's results.csv stay where they are."""
     manifest = clone.manifest("openpilot")
     made = names(list(manifest.hazards), [channel.name for channel in manifest.compared])
     assert ", ".join(made) == OF_OPENPILOT
 
 
 def test_another_target_has_its_own_columns_in_the_same_places() -> None:
-    """Hazards come before the alerts, channels after the reaction time; there are no columns of a car."""
+    """Hazards come before alerts, and channels after the reaction time. No column is specific to a car."""
     made = names(["CRUSHED"], ["gripper_force"])
     at = made.index("t_manifest")
     assert made[at + 1 : at + 4] == ["crushed", "t_crushed", "alerts"]
@@ -37,14 +37,14 @@ def test_another_target_has_its_own_columns_in_the_same_places() -> None:
 
 
 def test_a_target_may_have_no_hazards() -> None:
-    """Without hazards and channels the fixed columns remain, and none of them is read as a hazard."""
+    """A target without hazards and channels has only the fixed columns, none of which is read as a hazard."""
     made = names([], [])
     assert hazards_in(made) == ()
     assert not [name for name in made if name.startswith("max_dev_")]
 
 
 def test_hazards_are_known_by_their_columns() -> None:
-    """The columns of a table name its hazards, in the manifest's order."""
+    """A table's columns name its hazards in the order of the manifest."""
     assert hazards_in(names(["H3", "TOO_FAST", "H1"], ["gas"])) == ("H3", "TOO_FAST", "H1")
 
 
@@ -56,7 +56,7 @@ def test_hazards_are_known_by_their_columns() -> None:
     ],
 )
 def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
-    """A channel's column is named by its first word if that is unique."""
+    """The column of a channel is named by the first word of its name, if that is unique."""
     assert list(deviation_columns(channels).values()) == columns
 
 
@@ -72,23 +72,23 @@ def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
     ],
 )
 def test_text_is_told_from_numbers(column: str, text: bool) -> None:
-    """Names are text whatever they look like; a target's own columns are numbers."""
+    """Names are read as text even if they look like numbers. The columns that a target adds are numbers."""
     assert is_text(column) is text
 
 
 @pytest.mark.parametrize(
     ("hazards", "at"),
     [
-        ("[alert]", "alert"),  # t_alert is the time of the first alert
+        ("[alert]", "alert"),  # t_alert is the column for the first alert's time
         ("[H1, Status]", "Status"),
         ("[max_dev_speed]", "max_dev_speed"),
-        ("[hazard]", "hazard"),  # derived: any hazard
+        ("[hazard]", "hazard"),  # the column that says whether any hazard occurred
         ("[kind]", "kind"),
         ("[H1, t_h1]", "t_h1"),
     ],
 )
 def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: str) -> None:
-    """A hazard with an existing column is refused at its line of the manifest."""
+    """A hazard that would have an existing column is refused at its line of the manifest."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: {hazards}"))
     with pytest.raises(MutatorError, match=rf"{Path(path).name}:26: '{at}'; expected a name whose columns"):
@@ -99,13 +99,14 @@ def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: 
     ("metrics", "at"),
     [
         (["t_h1"], "t_h1"),
-        (["peak", "t_peak"], "t_peak"),  # together they would look like a hazard
+        (["peak", "t_peak"], "t_peak"),  # the two columns together would look like a hazard
         (["t_peak", "peak"], "peak"),
-        (["end"], "end"),  # next to t_end
+        (["end"], "end"),  # the column t_end exists
     ],
 )
 def test_a_metric_may_not_take_another_column(toy: Workspace, metrics: list[str], at: str) -> None:
-    """A metric is refused if its column exists already, or would make another column a hazard."""
+    """A metric is refused if its column exists already, or if it would make another column look like a
+    hazard."""
     path = toy.library / "targets" / "toy.yaml"
     lines = [f"  {name}: {{max: speed, unit: m/s, worse: higher, about: x}}" for name in metrics]
     path.write_text("\n".join([path.read_text().rstrip(), "metrics:", *lines, ""]))
@@ -115,7 +116,7 @@ def test_a_metric_may_not_take_another_column(toy: Workspace, metrics: list[str]
 
 @pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
 def test_no_name_is_special(toy: Workspace, name: str) -> None:
-    """Any other name is valid."""
+    """All other names are valid."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
     assert toy.manifest("toy").hazards == (name,)

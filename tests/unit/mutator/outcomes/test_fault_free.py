@@ -1,4 +1,4 @@
-"""What the fault-free runs of a run folder do on their own."""
+"""What the fault-free runs of a run folder do without any fault."""
 
 import json
 from pathlib import Path
@@ -30,7 +30,7 @@ MANIFEST: Any = SimpleNamespace(
 
 
 def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
-    """A run folder whose golden runs, by scenario and change, have these records."""
+    """A run folder with these records of golden runs, by scenario and change."""
     goldens = [[scenario, [change] if change else []] for scenario, change in runs]
     (path / "run.json").write_text(json.dumps({"schema": "run/1", "goldens": goldens}))
     made = RunFolder.unverified(path)
@@ -43,7 +43,8 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
 
 
 def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
-    """First times of counted events, and the range of a channel; unrecorded values are left out."""
+    """The data have the first times of counted events and the range of a channel. Values that are not
+    recorded are left out."""
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
     runs = fault_free_runs(
         folder(
@@ -61,7 +62,7 @@ def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
 
 
 def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
-    """The sentence names each alert and scenario once, whatever the changes; without alerts it is empty."""
+    """The sentence names each alert and scenario once, regardless of changes. Without alerts, it is empty."""
     fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
     late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
     runs = fault_free_runs(
@@ -72,7 +73,7 @@ def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
 
 
 def test_a_golden_run_that_is_gone_is_an_error(tmp_path: Path) -> None:
-    """A missing golden run is an error with its path."""
+    """A missing golden run is an error that gives its path."""
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
     (made.golden("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):

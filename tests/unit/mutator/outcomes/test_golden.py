@@ -1,4 +1,4 @@
-"""Comparison with golden, and reading a target's output."""
+"""Comparing a run with golden, and reading the output of a target."""
 
 import errno
 import json
@@ -43,7 +43,7 @@ def trace(**channels: list[float]) -> dict[str, np.ndarray]:
 
 
 def test_equal_traces_do_not_differ() -> None:
-    """Equal numbers, infinities and NaNs are no difference."""
+    """Equal numbers, equal infinities and two NaNs do not differ."""
     same = trace(gas=[0.0, -0.0, np.nan, np.inf, -np.inf])
     difference = compare(same, trace(gas=[-0.0, 0.0, np.nan, np.inf, -np.inf]), [GAS], "t")
     assert difference.t_first is None
@@ -51,7 +51,8 @@ def test_equal_traces_do_not_differ() -> None:
 
 
 def test_differences_up_to_the_end_of_the_drive() -> None:
-    """Steps after the end count in the run's largest difference, and not in the drive's."""
+    """Steps after the drive's end count in the largest difference of the run, but not in that of the
+    drive."""
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
     found = compare(golden, faulty, [GAS], "t", t_end=0.2)
     assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
@@ -59,7 +60,7 @@ def test_differences_up_to_the_end_of_the_drive() -> None:
 
 
 def test_steps_at_other_times_alone_are_no_difference() -> None:
-    """A channel with its own times is compared on these; a run that ends earlier still differs."""
+    """A channel with its own times is compared at these times. A run that ends earlier still differs."""
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
@@ -71,7 +72,7 @@ def test_steps_at_other_times_alone_are_no_difference() -> None:
 
 @pytest.mark.parametrize("times", [T, T + 0.01, T[:3]], ids=["equal", "others", "shorter"])
 def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
-    """A comparison is the same whether or not equal times are the same array."""
+    """The result of a comparison does not depend on whether both runs share one array of times."""
     golden = trace(gas=[1, 2, 3, 4, 5])
     faulty = {"t": times.copy(), "gas": np.array([1, 2, 3.5, 4, np.nan])[: len(times)]}
     shared = sharing_times(golden, faulty, "t")
@@ -80,9 +81,8 @@ def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
 
 
 def test_first_and_largest_difference() -> None:
-    """The comparison has the time of the first difference in any channel, and the largest
-    difference of each.
-    """
+    """The result has the time of the first difference in any channel, and the largest difference of each
+    channel."""
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
     difference = compare(golden, faulty, [GAS, BRAKE], "t")
@@ -92,13 +92,13 @@ def test_first_and_largest_difference() -> None:
 
 @pytest.mark.parametrize(("step", "first"), [(1e-12, T[3]), (0.5, T[3])])
 def test_exact_by_default(step: float, first: float) -> None:
-    """Without a tolerance the smallest difference counts."""
+    """Without a tolerance, any difference counts."""
     difference = compare(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
     assert difference.t_first == first
 
 
 def test_tolerance() -> None:
-    """A difference within the channel's tolerance does not count, but its size is kept."""
+    """A difference within the channel's tolerance does not count, but its size is stored."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -107,7 +107,8 @@ def test_tolerance() -> None:
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_no_number_against_a_number_is_infinitely_different(value: float) -> None:
-    """NaN or infinity against golden's number is an infinite difference, whatever the tolerance."""
+    """NaN or infinity, compared with a number in golden, is an infinite difference regardless of the
+    tolerance."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
@@ -116,7 +117,7 @@ def test_no_number_against_a_number_is_infinitely_different(value: float) -> Non
 
 @pytest.mark.parametrize(("golden", "faulty"), [(3, 5), (5, 3)])
 def test_other_length_differs_where_one_ends(golden: int, faulty: int) -> None:
-    """A run with another length differs from the first step that only one of them has."""
+    """If two runs have different lengths, they differ from the first step that only one of them has."""
     difference = compare(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
     assert difference.t_first == T[3]
 
@@ -129,13 +130,13 @@ def test_flags_and_integers_compare_too() -> None:
 
 
 def test_key_of_a_golden_run() -> None:
-    """Scenario and changes name a golden run."""
+    """The key of a golden run consists of its scenario and changes."""
     assert GoldenRun("S1").key == "S1"
     assert GoldenRun("S1", ("no_lead",)).key == "S1+no_lead"
 
 
 def test_trace_is_read(tmp_path: Path) -> None:
-    """The requested channels and time are read back as written."""
+    """The requested channels and the time are read as they were written."""
     np.savez(tmp_path / "trace.npz", t=T, gas=T * 2, other=T)
     found = load_trace(MANIFEST, tmp_path, [GAS])
     assert set(found) == {"t", "gas"}
@@ -144,7 +145,7 @@ def test_trace_is_read(tmp_path: Path) -> None:
 
 
 def test_bad_traces_are_told(tmp_path: Path) -> None:
-    """A trace that is missing, torn, without a channel, or of unequal lengths is BadOutput."""
+    """A trace that is missing, incomplete, without a channel, or of unequal lengths raises BadOutput."""
     path = tmp_path / "trace.npz"
     with pytest.raises(BadOutput):
         load_trace(MANIFEST, tmp_path)
@@ -165,7 +166,7 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
 
 
 def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
-    """An array alone, a member with an invalid header, and a pipe are BadOutput."""
+    """A file of a single array, a member with an invalid header, and a pipe raise BadOutput."""
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)
@@ -184,7 +185,7 @@ def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
 
 
 def test_record_is_read(tmp_path: Path) -> None:
-    """A target's record is read with every raise of a counted alert."""
+    """A target's record is read, including each time at which a counted alert is raised."""
     said = {
         "hazards": {"H1": None, "H2": 3.5},
         "alerts": [{"name": "fcw", "t": 1.0}],
@@ -208,14 +209,14 @@ def test_record_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
-    """A record without the times of hazards and alerts is BadOutput."""
+    """A record without the times of hazards and alerts raises BadOutput."""
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)
 
 
 def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A trace that cannot be opened for lack of file handles is not blamed on its run."""
+    """If a trace cannot be opened because no file handle is free, its run is not blamed."""
 
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
@@ -226,7 +227,7 @@ def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pyte
 
 
 def test_a_trace_that_is_a_pipe(tmp_path: Path) -> None:
-    """A pipe in place of an output counts as missing, without waiting."""
+    """A pipe in place of an output counts as missing and is not waited for."""
     for name in (MANIFEST.trace_file, MANIFEST.record_file):
         os.mkfifo(tmp_path / name)
     for read in (load_trace, load_record, trace_digest):

@@ -1,4 +1,4 @@
-"""Hazards, ends of drives and metrics, compared with hand-computed runs."""
+"""Hazards, ends of drives and metrics, compared with values computed by hand."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -14,7 +14,7 @@ from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 from mutator.targets.manifest_files import load_manifest
 
-# a cart rolls towards a wall, backs off, hits it, and continues through it
+# a cart rolls towards a wall, backs off, hits it, and goes through it
 T = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
 GAP = np.array([3.0, 1.0, 2.0, 0.0, -1.0, 4.0])
 SPEED = np.array([1.0, 2.0, -1.0, 2.0, 1.0, 0.0])
@@ -44,7 +44,7 @@ Write = Callable[..., TargetManifest]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Write a manifest with these last lines; `old: new` replace earlier text."""
+    """Write a manifest that ends with these lines. `old: new` replaces earlier text."""
 
     def manifest(rest: str, **replaced: str) -> TargetManifest:
         text = HEAD
@@ -68,9 +68,9 @@ def judged(manifest: TargetManifest, **channels: Any) -> Judged:
         ("when: gap < 1", 3.0),
         ("when: gap < -5", None),
         ("{when: gap <= 2, for_s: 2}", 3.0),  # from 1 s to 4 s
-        ("{when: gap <= 1, for_s: 1}", 4.0),  # from 3 s: the stretch before is too short
+        ("{when: gap <= 1, for_s: 1}", 4.0),  # from 3 s on; the earlier stretch is too short
         ("{when: gap <= 1, for_s: 2}", None),
-        ("when: left < 1", 1.0),  # 1 m at 2 m/s: a derived value
+        ("when: left < 1", 1.0),  # `left`, a derived value: 1 m at 2 m/s
         ("when: rate(gap) > 3", 5.0),
         ("when: ever(gap <= 0) and speed <= 0", 5.0),
         ("when: t >= 2 and not gap > 1", 3.0),
@@ -79,7 +79,7 @@ def judged(manifest: TargetManifest, **channels: Any) -> Judged:
     ],
 )
 def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> None:
-    """A hazard occurs in the first step in which its condition has held for its required time."""
+    """A hazard occurs at the first step at which its condition has held for the required time."""
     rule = rule if rule.startswith("{") else f"{{{rule.replace(': ', ': ', 1)}}}"
     key, _, value = rule.strip("{}").partition(": ")
     condition, _, more = value.partition(", for_s")
@@ -92,22 +92,22 @@ def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> No
 @pytest.mark.parametrize(
     ("metric", "value"),
     [
-        ("min: gap", 0.0),  # at contact, not -1 behind it
-        ("max: gap", 3.0),  # not 4, after the end
+        ("min: gap", 0.0),  # the value at contact, not -1 after it
+        ("max: gap", 3.0),  # not 4, which occurs after the end
         ("mean: speed", 1.0),
         ("last: speed", 2.0),
-        ("integral: speed", 2.0),  # 1 + 2 - 1: each value lasts until the next step, except the last
+        ("integral: speed", 2.0),  # 1 + 2 - 1: each value lasts until the next step, and the last is left out
         ('duration: "speed > 0"', 2.0),
         ("at_end: speed", 2.0),
         ("min: left", 0.0),
         ('{min: gap, where: "speed < 0"}', 2.0),
         ('{min: gap, where: "speed > 9"}', None),
         ("max: rate(speed)", 3.0),
-        ("max: gap / (speed - speed)", None),  # NaN and infinities do not count
+        ("max: gap / (speed - speed)", None),  # NaN and infinities are left out
     ],
 )
 def test_metrics_count_up_to_the_end_of_the_drive(write: Write, metric: str, value: float | None) -> None:
-    """An aggregate covers the steps up to and including the first terminal hazard."""
+    """A metric covers the steps up to and including the first terminal hazard."""
     what = metric.strip("{}")
     found = judged(
         write(
@@ -120,7 +120,8 @@ def test_metrics_count_up_to_the_end_of_the_drive(write: Write, metric: str, val
 
 
 def test_a_drive_without_an_end(write: Write) -> None:
-    """Without a terminal hazard the whole run counts, and values at the end are missing."""
+    """Without a terminal hazard, metrics cover the whole run, and values at the end of the drive are
+    missing."""
     found = judged(
         write(
             "hazards: {}\nmetrics:\n"
@@ -132,7 +133,7 @@ def test_a_drive_without_an_end(write: Write) -> None:
 
 
 def test_a_condition_may_end_the_drive(write: Write) -> None:
-    """A hazard may precede the end of the drive: too close at 1 s, contact at 3 s."""
+    """A hazard may occur before the end of the drive: too close at 1 s, contact at 3 s."""
     found = judged(write('hazards: {NEAR: {when: "gap <= 1", terminal: "gap <= 0", unit: m}}\n'))
     assert (found.hazards, found.t_end) == ((("NEAR", 1.0),), 3.0)
     assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
@@ -148,13 +149,14 @@ CONTACT = (
 @pytest.mark.parametrize(
     ("speed", "delta_v"),
     [
-        (2.0, 1.5),  # 1 t into 3 t at 2 m/s: both continue at 0.5 m/s
-        (-4.0, 0.0),  # the wall moves away: they touch and part
+        (2.0, 1.5),  # 1 t hits 3 t at 2 m/s, and both continue at 0.5 m/s
+        (-4.0, 0.0),  # the wall moves away, so they touch and separate
         (np.nan, None),
     ],
 )
 def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None) -> None:
-    """Delta-v is the change of own speed in an inelastic collision, from closing speed and masses."""
+    """Delta-v is the change of the own speed in an inelastic collision, computed from closing speed and
+    masses."""
     manifest = write(CONTACT.replace("OUT_ENDS", "false"))
     found = judged(manifest, speed=np.array([1.0, 2.0, -1.0, speed, 9.0, 9.0]))
     assert found.t_end == 3.0
@@ -162,9 +164,8 @@ def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None)
 
 
 def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> None:
-    """A drive that another hazard ended has no delta-v, even with a later contact; nor has a drive without a
-    contact.
-    """
+    """There is no delta-v without a contact. There is none if another hazard ended the drive, even with a
+    contact later."""
     found = judged(write(CONTACT.replace("OUT_ENDS", "true")))
     assert (found.t_end, found.hazards) == (2.0, (("HIT", 3.0), ("OUT", 2.0)))
     assert dict(found.metrics) == {"margin_hit": 1.0, "margin_out": -1.0, "impact": -1.0}
@@ -179,17 +180,18 @@ def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> No
     [
         ('{when: "gap <= 1"}', -2.0),  # gap - 1
         ('{when: "abs(speed) > 1.5"}', -0.5),  # 1.5 - abs(speed)
-        ('{when: "gap <= 1 and speed > 0"}', None),  # of which of the two?
+        ('{when: "gap <= 1 and speed > 0"}', None),  # a margin of which of the two comparisons?
         ('{when: "gap <= 1 and speed > 0", margin: gap - 1}', -2.0),
     ],
 )
 def test_margins(write: Write, rule: str, margin: float | None) -> None:
-    """The least margin of a run is a metric; for a single comparison it needs no declaration."""
+    """The smallest margin in a run is a metric. For a hazard with a single comparison, it needs no
+    declaration."""
     assert dict(judged(write(f"hazards: {{HIT: {rule}}}\n")).metrics).get("margin_hit") == margin
 
 
 def test_what_the_target_judges_itself(write: Write) -> None:
-    """A hazard without a condition is read from the record; others in the record do not count."""
+    """A hazard without a condition is read from the record. The record's other hazards are ignored."""
     manifest = write('record: record.json\nhazards: {HIT: {terminal: true}, NEAR: {when: "gap < 0.5"}}\n')
     trace = {"time": T, "gap": GAP, "speed": SPEED}
     found = judge_run(manifest, trace, {"hazards": {"HIT": 2.5, "OTHER": 1.0}})
@@ -199,7 +201,7 @@ def test_what_the_target_judges_itself(write: Write) -> None:
 
 
 def test_channels_with_times_of_their_own(write: Write) -> None:
-    """A slow channel keeps its newest value for the steps; before its first it has none."""
+    """A slow channel keeps its newest value in the steps that follow. Before its first value it has none."""
     manifest = write(
         'hazards: {SEEN: {when: "seen < 2"}}\n',
         observation="  seen: {unit: m, role: internal, time: t_seen}\nobservation:",
@@ -209,7 +211,8 @@ def test_channels_with_times_of_their_own(write: Write) -> None:
 
 
 def test_steps_of_any_length(write: Write) -> None:
-    """Time is the trace's own, for the duration of conditions and the weight in integrals."""
+    """The trace's own times decide how long a condition has held and how much a step counts in an
+    integral."""
     manifest = write(
         'hazards: {HIT: {when: "gap < 2", for_s: 0.5}}\n'
         "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
@@ -221,12 +224,13 @@ def test_steps_of_any_length(write: Write) -> None:
 
 
 def test_a_formula_of_temporal_logic(write: Write) -> None:
-    """The hazard occurs after the violating step by the formula's horizon; the robustness is the margin."""
+    """The hazard occurs after the step that violates the formula, later by the formula's horizon. The
+    margin is the robustness."""
     pytest.importorskip("rtamt")
     rule = "(gap < 2) implies eventually[0:2](gap > 3)"
     found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
     assert found.hazards == (("LATE", 3.0),)  # below 2 m at 1 s, and not above 3 m by 3 s
-    assert dict(found.metrics) == {"margin_late": -1.0}  # for 1 s; what 4 s and 5 s need was not recorded
+    assert dict(found.metrics) == {"margin_late": -1.0}  # at 1 s; the record ends too early for 4 s and 5 s
     with pytest.raises(MutatorError, match=r"cart.yaml:20: unknown name 'speeed' in"):
         write('hazards: {LATE: {stl: "historically(speeed < 3)"}}\n')
     with pytest.raises(MutatorError, match=r"cart.yaml:20: a time that is not a multiple of the step, 1 s"):
@@ -234,7 +238,7 @@ def test_a_formula_of_temporal_logic(write: Write) -> None:
 
 
 def test_temporal_logic_needs_even_steps(write: Write) -> None:
-    """A run with uneven steps cannot be judged by such a formula and is a bad output."""
+    """A run with uneven steps is a bad output, because such a formula cannot be evaluated."""
     pytest.importorskip("rtamt")
     manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
     with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
@@ -243,7 +247,7 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
 def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
-    """The same run in any format, with a channel at its own rate, gives the same result."""
+    """The same run gives the same result in any format, including a channel at its own rate."""
     import pandas as pd
 
     places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
@@ -282,7 +286,7 @@ def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
-    """In a table, rows without a step's time belong to channels with their own times."""
+    """In a table, rows at other times than a step belong to channels with their own times."""
     fast = "trace: {file: trace.csv, time: time}"
     text = (tmp_path / "cart.yaml", write("hazards: {}\n"))[0].read_text()
     text = text.replace("trace: {file: trace.npz, time: time}", fast)
@@ -298,7 +302,7 @@ def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) ->
 
 @pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
 def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
-    """Decreasing or missing times make a trace invalid, since hazards depend on the order."""
+    """A trace with missing or decreasing times is invalid, because hazards depend on the order."""
     np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
     manifest = write("hazards: {}\n")
     with pytest.raises(MutatorError, match="times of time that decrease or are missing"):
@@ -314,7 +318,7 @@ def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
     ],
 )
 def test_a_late_command_differs(later: list[float], first: float | None, largest: float) -> None:
-    """Equal values at other times are a difference, from the first differing time on."""
+    """Equal values at other times are a difference from the first time that differs."""
     pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
     values = np.array([2.0, 9.0, 5.0])
     golden = {"t": T, "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}

@@ -1,4 +1,4 @@
-"""Arrays of stored .npz files: as numpy reads them, or none."""
+"""Reading arrays from stored .npz files gives the same arrays as numpy, or none."""
 
 import io
 import zipfile
@@ -24,7 +24,7 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
 
 
 def test_the_arrays_are_those_that_numpy_reads() -> None:
-    """Names, order, types, shapes and values equal numpy's."""
+    """Names, order, types, shapes and values equal those that numpy reads."""
     found = npz.members(written(**ARRAYS))
     assert found is not None
     assert list(found) == list(ARRAYS)
@@ -45,12 +45,13 @@ def test_the_arrays_are_those_that_numpy_reads() -> None:
     ],
 )
 def test_what_is_not_as_usual_is_left_to_numpy(data: bytes) -> None:
-    """For compressed members, other orders and types, and other files, the fast reader returns nothing."""
+    """The fast reader returns nothing for compressed members, other orders and types, and other kinds of
+    files."""
     assert npz.members(data) is None
 
 
 def headed(header: bytes) -> bytes:
-    """A file of one array with this text in its header."""
+    """A file with one array that has this text in its header."""
     data = written(t=np.arange(3.0))
     there = data[data.index(b"{'descr'") : data.index(b"\n", data.index(b"{'descr'"))]
     with zipfile.ZipFile(io.BytesIO(data)) as file:
@@ -65,7 +66,8 @@ def headed(header: bytes) -> bytes:
     "shape", ["(3,)", "(-1,)", "(3, -1)", "(2,)", "(4,)", "(0,)", "(True,)", "(3,", "(%s,)" % ("9" * 30)]
 )
 def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
-    """A mutant may write a file with valid checksums: if there are arrays, numpy reads the same ones."""
+    """A mutant may write a file with valid checksums. If the fast reader returns arrays, numpy reads the
+    same ones."""
     data = headed(b"{'descr': '<f8', 'fortran_order': False, 'shape': " + shape.encode() + b"}")
     found = npz.members(data)
     if shape == "(3,)":
@@ -75,7 +77,7 @@ def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
 
 
 def test_a_damaged_file_has_no_arrays() -> None:
-    """After any bit flip, the arrays are the original ones, or there are none."""
+    """After a flipped bit, the reader returns the original arrays or none."""
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
         found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])

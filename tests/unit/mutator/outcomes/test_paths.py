@@ -1,4 +1,5 @@
-"""Hand-computed paths of faults: a structure of two controllers, and chains without one."""
+"""Paths of faults, computed by hand for a structure with two controllers and for chains without a
+structure."""
 
 from pathlib import Path as Folder
 from typing import Any
@@ -24,7 +25,7 @@ from mutator.outcomes.paths import Passage, Path, State, Ways, ways_of
 from mutator.store.run_head import Head
 from mutator.stpa.analysis import StructureModel
 
-# eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge feeds `speed`, too
+# eyes -> finder -> speed -> pedals -> car, and gauge -> wheel -> rack -> car; the gauge also feeds `speed`
 KINDS = {
     "driver": "human",
     "speed": "controller",
@@ -124,7 +125,8 @@ def passages(found: Path) -> dict[str, Passage]:
 
 
 def test_a_fault_that_an_estimator_held() -> None:
-    """The fault was injected where nothing is recorded; neither the estimator nor its followers changed."""
+    """The fault was injected in a component without recorded channels. The estimator after it did not
+    change, so it stopped the fault."""
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", State.INJECTED),
@@ -143,7 +145,7 @@ def test_a_fault_that_an_estimator_held() -> None:
 
 
 def test_a_fault_that_a_controller_held() -> None:
-    """The fault reached the estimator and no further: the controller after it stopped it."""
+    """The fault reached the estimator, and the controller after the estimator stopped it."""
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
     assert passages(found)["picture"] is Passage.THROUGH
@@ -151,7 +153,8 @@ def test_a_fault_that_a_controller_held() -> None:
 
 
 def test_a_fault_that_reached_the_car() -> None:
-    """Each component has the time of its first channel; the furthest one is the controlled process."""
+    """Each component has the time of its first channel to differ. The furthest component reached is the
+    controlled process."""
     found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
     assert [(s.component, s.t_first) for s in found.stages[1:]] == [
         ("finder", 1.2),
@@ -164,15 +167,14 @@ def test_a_fault_that_reached_the_car() -> None:
 
 
 def test_feedback_is_no_path() -> None:
-    """A component off the path is not on it, whenever it left golden: a car that moves differently is
-    observed differently.
-    """
+    """A component off the path is never part of it, even if it left golden, because a car that moves
+    differently is also observed differently."""
     found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
     assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
 
 
 def test_links_that_are_not_studied_are_no_path() -> None:
-    """A fault of the speed control does not reach the wheel control by a link that the study ignores."""
+    """A fault of the speed control does not reach the wheel control through a link that the study ignores."""
     ends = {"from": "speed", "to": "wheel", "label": ""}
     links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
     for studied, names in ((True, {"wheel", "rack"}), (False, set())):
@@ -182,9 +184,8 @@ def test_links_that_are_not_studied_are_no_path() -> None:
 
 
 def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
-    """The speed control left golden after the car, and something off the path leads to it: so it and what it
-    alone feeds only received feedback, while an earlier branch was reached.
-    """
+    """The speed control left golden after the car, and something off the path leads to it. So it and the
+    components that it alone feeds only received feedback. An earlier branch was reached."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
         "finder": State.INJECTED,
@@ -199,9 +200,8 @@ def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
 
 
 def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
-    """The rack left golden before the car, so the fault came through the wheel control, even if nothing
-    recorded there changed, or only later.
-    """
+    """The rack left golden before the car, so the fault came through the wheel control. This holds even if
+    the recorded channels of the wheel control changed later or not at all."""
     found = path("gauge", torque=1.0, place=1.1)
     assert states(found)["wheel"] is State.PASSED
     assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
@@ -209,9 +209,8 @@ def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
 
 
 def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
-    """The speed control alone feeds the pedals, so it had changed by the time they did, whenever its channel
-    shows it. A component with other inputs proves nothing about its feeders.
-    """
+    """Only the speed control feeds the pedals, so it changed no later than the pedals, whatever time its
+    channel shows. A component with other inputs proves nothing about the components that feed it."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
     assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
     assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
@@ -222,31 +221,30 @@ def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
 @pytest.mark.parametrize(
     ("left", "state"),
     [
-        ({"pace": 1.6}, State.REACHED),  # the gauge had not yet seen the car's different motion
+        ({"pace": 1.6}, State.REACHED),  # the gauge did not observe the car's different motion yet
         ({"pace": 1.5}, State.FEEDBACK),
-        ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault was there before
+        ({"pace": 1.5, "seen": 1.2}, State.REACHED),  # the fault reached it earlier
         ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
     ],
 )
 def test_what_came_first_decides_between_fault_and_feedback(left: dict[str, float], state: State) -> None:
-    """If the car has moved before the speed control leaves golden, the input that left golden first decides:
-    one on the path means the fault, one off it means feedback.
-    """
+    """If the car moved before the speed control left golden, the input that left golden first decides. An
+    input on the path means the fault, and one off the path means feedback."""
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
     found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
 def test_a_late_departure_that_the_path_alone_explains() -> None:
-    """Only the speed control leads to the pedals: they are reached, though the car moved before."""
+    """Only the speed control leads to the pedals, so the fault reached them, although the car moved
+    earlier."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
 
 def test_what_is_not_recorded_is_passed_through() -> None:
-    """A component without channels is unseen; it is unknown whether the fault reached it, and its followers
-    show whether it got further.
-    """
+    """A component without channels is unobserved. It is unknown whether the fault reached it. The
+    components after it show whether the fault got further."""
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
@@ -257,14 +255,14 @@ def test_what_is_not_recorded_is_passed_through() -> None:
 
 
 def test_a_fault_before_a_fork_may_be_held_twice() -> None:
-    """Both controllers that a sensor feeds held it."""
+    """Both controllers that a sensor feeds stopped the fault."""
     assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
     assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
 
 
 @pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
 def test_no_path_without_an_active_fault_and_an_outcome(outcome: Outcome | None) -> None:
-    """A fault that was never active, or a run that broke down, has no path."""
+    """A fault that was never active has no path, nor has a run that broke down."""
     assert WAYS.path(experiment("eyes"), record(outcome)) is None
 
 
@@ -274,9 +272,8 @@ def test_no_path_from_nowhere() -> None:
 
 
 def test_a_chain_without_a_structure() -> None:
-    """The components of a manifest follow each other by role, then by order; the first that stayed equal
-    after the reached ones stopped the fault.
-    """
+    """Without a structure, components follow each other by role, then by order in the manifest. The first
+    one after those reached, which stayed equal, stopped the fault."""
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
@@ -286,7 +283,8 @@ def test_a_chain_without_a_structure() -> None:
 
 
 def test_a_chain_knows_feedback_too() -> None:
-    """The car interface reads values that change after the car: the command was injected behind it."""
+    """The car interface reads values that change after the car, because the command was injected after the
+    interface."""
     ways = Ways(
         [
             ["seen", "", "internal", "interface", ""],
@@ -304,7 +302,7 @@ def test_a_chain_knows_feedback_too() -> None:
 
 
 def test_components_that_lead_in_a_circle() -> None:
-    """A path through a circle has each component once, and ends at the process."""
+    """A path through a loop has each component once and ends at the process."""
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)
@@ -318,7 +316,8 @@ def replace_links(links: dict[str, Any]) -> StructureModel:
 
 
 def test_ways_from_run_json() -> None:
-    """The head's ways are read as written; without components, as in old runs, there are none."""
+    """The structure is read from the head as it was written. Older runs have no components, so they have
+    no paths."""
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
     head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
     found = ways_of(head)

@@ -1,4 +1,4 @@
-"""Which channels left golden, and their table."""
+"""Which channels leave golden, and the table that lists them."""
 
 import numpy as np
 import pytest
@@ -25,21 +25,23 @@ def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = N
 
 
 def test_only_what_exceeds_its_tolerance_has_left() -> None:
-    """A channel leaves where it first exceeds its tolerance; its deviation is its largest difference."""
+    """A channel leaves golden when it first exceeds its tolerance. Its deviation is its largest
+    difference."""
     faulty = {"a": stepped(2, 0.5), "b": stepped(1, 0.3) + stepped(4), "c": ZEROS}
     found = left({"a": ZEROS, "b": ZEROS, "c": ZEROS}, faulty, *(channel(n, 0.5) for n in "abc"))
     assert found == (("b", T[4], 1.3),)
 
 
 def test_what_comes_after_the_end_of_the_drive_is_left_out() -> None:
-    """The end itself counts; a channel that leaves later has not left, and later values are no deviation."""
+    """A difference at the end of the drive counts. A channel that differs only later has not left golden,
+    and later values do not count as deviation."""
     golden, faulty = {"a": ZEROS, "b": ZEROS}, {"a": stepped(2) + stepped(4, 9.0), "b": stepped(4)}
     assert left(golden, faulty, channel("a"), channel("b"), t_end=T[3]) == (("a", T[2], 1.0),)
     assert left(golden, faulty, channel("b"), t_end=T[4]) == (("b", T[4], 1.0),)
 
 
 def test_values_that_are_no_numbers() -> None:
-    """Equal infinities and NaNs are no difference; a number against NaN is an infinite one."""
+    """Equal infinities and two NaNs do not differ. A number compared with NaN is an infinite difference."""
     golden = {"a": np.array([np.nan, np.inf, 0, 0, 0, 0])}
     assert left(golden, {"a": golden["a"].copy()}, channel("a", 1.0)) == ()
     faulty = {"a": np.array([np.nan, np.inf, np.nan, 0, 0, 0])}
@@ -47,7 +49,8 @@ def test_values_that_are_no_numbers() -> None:
 
 
 def test_channels_with_times_of_their_own() -> None:
-    """Values are compared at the channel's own times: a late message leaves when it is first missing."""
+    """Values are compared at the channel's own times. A late message leaves golden at the time when it is
+    first missing."""
     golden = {"a": np.array([1.0, 2.0]), "a@": np.array([0.0, 0.3])}
     assert left(golden, dict(golden), channel("a")) == ()
     assert left(golden, golden | {"a": np.array([1.0, 5.0])}, channel("a")) == (("a", 0.3, 3.0),)
@@ -56,12 +59,12 @@ def test_channels_with_times_of_their_own() -> None:
 
 
 def test_a_channel_that_was_not_recorded_is_left_out() -> None:
-    """A channel that one of the runs lacks is left out."""
+    """A channel that is missing in one run is left out."""
     assert left({"a": ZEROS}, {"b": ZEROS}, channel("a"), channel("b")) == ()
 
 
 def test_a_run_that_ends_earlier_has_left_there() -> None:
-    """All channels leave golden where the shorter run ended, unless that is after the drive."""
+    """All channels leave golden where the shorter run ends, unless that is after the drive."""
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
     assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()
@@ -71,9 +74,8 @@ def test_a_run_that_ends_earlier_has_left_there() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_departures_agree_with_the_comparison(seed: int) -> None:
-    """For any values, the earliest departure is when the fault manifested, and deviations are those of the
-    whole run.
-    """
+    """For any values, the fault manifested when the first channel left golden. The deviations are those of
+    the whole run."""
     random = np.random.default_rng(seed)
     channels = [channel(name, float(random.integers(0, 3))) for name in "abc"]
     golden = {"t": T, **{name: random.integers(-2, 3, 6).astype(float) for name in "abc"}}
@@ -87,7 +89,7 @@ def test_departures_agree_with_the_comparison(seed: int) -> None:
 
 
 def test_the_table_has_a_row_for_each_departure() -> None:
-    """Rows are in the order of records and departures, with role and component from run.json."""
+    """Rows keep the order of the records and of the departures. Role and component are those in run.json."""
     record = Record(
         experiment_id="e1",
         status=Status.OK,

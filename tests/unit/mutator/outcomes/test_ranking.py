@@ -1,4 +1,4 @@
-"""Which of two results is worse."""
+"""The order of results, worst first."""
 
 import csv
 import random
@@ -29,7 +29,7 @@ WORST_FIRST = {
     "s2-a": CONTACT,
     "s2-b": CONTACT,
     "s0": CONTACT | {"severity": "S0", "delta_v": "0"},
-    # H2 and H3 alternate, though H3's numbers are larger; margins of hazards that did not occur do not count
+    # H2 and H3 alternate, although H3's numbers are larger; only margins of hazards that occurred count
     "deep-2": HAZARD | {"margin_h2": "-0.3"},
     "deep-3": LEFT | {"margin_h3": "-500"},
     "both": LEFT | {"t_h2": "3", "margin_h2": "-0.2", "margin_h3": "-2"},  # second of H2, third of H3
@@ -48,9 +48,8 @@ WORST_FIRST = {
 
 
 def test_the_worst_come_first(tmp_path: Path) -> None:
-    """The order is by class, then delta-v; without a class by ending, then by margin of each hazard; finally
-    by id, for any input order.
-    """
+    """The order is by class, then by delta-v. Without a class, it is by ending, then by the margin of each
+    hazard. Ids decide ties, for any input order."""
     path = tmp_path / "results.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
@@ -62,7 +61,7 @@ def test_the_worst_come_first(tmp_path: Path) -> None:
 
 
 def test_places_are_those_of_the_worst(tmp_path: Path) -> None:
-    """Ranking by columns equals ranking row by row, for made-up results with many ties."""
+    """Ranking by columns gives the same order as ranking row by row, for made-up results with many ties."""
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]

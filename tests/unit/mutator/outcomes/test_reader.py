@@ -29,13 +29,13 @@ from mutator.workspace import Workspace
 
 SOURCES = Path(mutator.__file__).parent
 WriteRun = Callable[..., Path]
-# The toy car's terms in a target without gas, brake or H1.
+# The toy car's names, which a target without gas, brake or H1 must not show.
 OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r"\bbrake\b": "clamp"}
 
 
 @pytest.fixture
 def crane(toycar: Workspace) -> Workspace:
-    """The toy with other names of hazards and channels, in its library and its tree."""
+    """The toy with other names for hazards and channels, in its library and its tree."""
     for path in toycar.library.parent.rglob("*"):
         if path.suffix in (".py", ".yaml") and "templates" not in path.parts:
             text = path.read_text()
@@ -46,7 +46,7 @@ def crane(toycar: Workspace) -> Workspace:
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """Lane faults are hazardous, silence crashes the controller, the rest is masked."""
+    """Lane faults are hazardous, silence crashes the controller, and all other faults are masked."""
     if e.fault.fault_type == "silence":
         return {"status": Status.CRASHED, "outcome": None, "max_dev": ()}
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("DROPPED", 4.0), ("CRUSHED", 4.5))}
@@ -71,9 +71,8 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 
 
 def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
-    """A pyarrow thread that returns bytes to Python during its shutdown kills the process: no reader of
-    tables starts one. Threads of its allocator and of BLAS do not use Python.
-    """
+    """No reader of tables starts a thread of pyarrow, because a thread that returns bytes to Python during
+    shutdown kills the process. Threads of the allocator and of BLAS do not use Python."""
     results.build(run)
     words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
     ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
@@ -81,7 +80,7 @@ def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
 
 
 def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> None:
-    """CSV, Parquet and frames have the target's hazards and channels in the positions of the shipped ones."""
+    """CSV, Parquet and frames have the target's hazards and channels where the shipped target has its own."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")
@@ -105,7 +104,8 @@ def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> Non
 def test_numbers_have_the_units_of_their_metric_or_channel(
     crane: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """A metric's unit is the manifest's; a difference, also up to the drive's end, has its channel's unit."""
+    """A metric has the unit from the manifest. A difference has the unit of its channel, also one up to
+    the end of the drive."""
     path = crane.library / "targets" / "toycar.yaml"
     hazards = "hazards: {DROPPED: {when: speed > 90, terminal: true, unit: m/s}, "
     hazards += "CRUSHED: {when: speed > 91}, TOO_FAST: {when: speed > 92}}\n"
@@ -118,7 +118,7 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 
 
 def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
-    """However the results are read, the same experiments have the same hazards at the same times."""
+    """Every way of reading the results gives the same hazards at the same times for each experiment."""
     table = Results.up_to_date(run)
     rows = table.rows()
     frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
@@ -133,14 +133,14 @@ def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
 
 
 def test_of_a_crash_it_is_not_known_whether_a_hazard_would_have_come(run: Path) -> None:
-    """`hazard` is unknown exactly if the run did not end well."""
+    """`hazard` is unknown for exactly those runs that did not end well."""
     frame = Results.up_to_date(run).frame()
     assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
     assert frame["hazard"].isna().any()
 
 
 def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A target without hazard checks has no hazards, and their time is NaN."""
+    """A target that checks no hazards has none, and their time is NaN."""
     head = run / "run.json"
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
@@ -155,7 +155,7 @@ def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None
 
 
 def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> None:
-    """Exports and the report name the target's hazards."""
+    """Exports and the report use the target's names of hazards."""
     table = Results.up_to_date(run)
     assert export(run, Format.CSV).read_bytes() == table.csv()
     assert export(run, Format.PARQUET).read_bytes() == table.parquet()
@@ -185,7 +185,7 @@ def test_a_run_fills_the_columns_that_its_manifest_promises(
 
 
 def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    """A missing table is a user's error that names the folder, through any reader."""
+    """For any reader, a missing table is a user's error that names the folder."""
     table = Results.of_run(tmp_path)
     for read in (table.rows, table.texts, table.csv, table.frame):
         with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
@@ -194,7 +194,7 @@ def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
 def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
-    """A file that is no results table is a user's error, not a KeyError or a decoding error."""
+    """A file that is not a results table is a user's error, not a KeyError or a decoding error."""
     table = Results.of_run(tmp_path)
     table.path.write_bytes(text.encode("latin-1"))
     for read in (table.rows, table.texts):
@@ -203,7 +203,7 @@ def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
 
 
 def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
-    """A table with an unknown status, or a line cut short, is no results table."""
+    """A table with an unknown status or an incomplete line is refused."""
     table = Results.up_to_date(run)
     whole = table.csv()
     for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
@@ -213,7 +213,7 @@ def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
 
 
 def test_nothing_else_opens_the_tables() -> None:
-    """No other module parses or opens the tables, so verification stays in one place."""
+    """No other module parses or opens the tables, so that they are verified in one place."""
     allowed = {"outcomes/reader.py", "outcomes/trace_files.py"}
     opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
     named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")

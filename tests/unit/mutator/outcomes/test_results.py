@@ -1,4 +1,4 @@
-"""The results table: its columns, its cells, its bytes."""
+"""The results table: its columns, cells and bytes."""
 
 import csv
 import io
@@ -33,7 +33,7 @@ MakeRecord = Callable[..., Record]
 
 
 def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """A run with a hazard has flags, simulation times, alerts in order, and reaction time."""
+    """The row of a run with a hazard has flags, simulation times, the alerts in order, and reaction times."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -89,10 +89,10 @@ SCALE = Scale(
     [
         ({}, "S2", 3.5, 3.25),
         ({"metrics": (("delta_v", 0.0),)}, "S0", 3.5, 3.25),
-        ({"metrics": (("delta_v", 11.0),)}, "S3", 3.5, 3.25),  # on the bound: the upper class
+        ({"metrics": (("delta_v", 11.0),)}, "S3", 3.5, 3.25),  # the limit belongs to the higher class
         ({"metrics": ()}, None, 3.5, 3.25),  # no contact
         ({"t_end": 1.5}, None, 3.5, 3.25),  # a contact before the fault was active
-        ({"t_manifest": 6.0}, "S2", 3.5, None),  # the hazard came first
+        ({"t_manifest": 6.0}, "S2", 3.5, None),  # another hazard came first
         ({"t_manifest": None}, "S2", 3.5, None),
         ({"hazards": (), "outcome": Outcome.SDC, "metrics": ()}, None, None, None),
     ],
@@ -105,9 +105,8 @@ def test_severity_and_times_to_the_hazard(
     tolerant: float | None,
     after_manifest: float | None,
 ) -> None:
-    """A contact after the activation has a class; times to the first hazard count from the
-    activation at 2 s.
-    """
+    """A contact after the activation has a class. Times to the first hazard count from the activation at 2
+    s."""
     hit = {"outcome": Outcome.HAZARD, "t_manifest": 2.25, "t_end": 5.5, "metrics": (("delta_v", 5.5),)}
     kept = record(**hit | {"hazards": (("H1", 5.5), ("H2", 7.0))} | given)
     cells = result_rows.row(experiment(), kept, HAZARDS, scale=SCALE)
@@ -117,7 +116,8 @@ def test_severity_and_times_to_the_hazard(
 
 
 def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has the columns that its head requests: all, only the times, or none in an older run."""
+    """A run has the columns that its head requests: all of them, only the times, or, in an older run,
+    none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [
@@ -148,7 +148,7 @@ def test_rows_of_what_did_not_end_well(
     activation: bool,
     activated: int | None,
 ) -> None:
-    """Unknown values of a run that did not end well are empty, never 0."""
+    """In a run that did not end well, unknown values are empty and never 0."""
     given = {} if activation else {"activation": None}
     cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
@@ -159,7 +159,7 @@ def test_rows_of_what_did_not_end_well(
 
 
 def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """A run that ended well without activation has 0, not an empty cell."""
+    """A run that ended well without activation has 0 and no empty cell."""
     cells = result_rows.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
     assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
     assert cells["t_activation"] is None
@@ -167,7 +167,7 @@ def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: 
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
-    """A run with records of all its experiments except two, in two files."""
+    """A run with records of all experiments except two, in two files."""
     plan = make_plan(toycar, "toy")
     folder = freeze(plan, tmp_path / "run", toycar)
     for i in (0, 1):
@@ -186,9 +186,8 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
-    """There is one row for each experiment with a record, sorted by id, in CSV and Parquet; only the target's
-    own hazards and channels appear.
-    """
+    """Each experiment with a record has one row, in CSV and Parquet, sorted by id. Only the hazards and
+    channels of the target appear."""
     rows = list(csv.DictReader(results.build(folder.path).open()))
     assert (len(rows), folder.planned) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
@@ -214,7 +213,7 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
 
 
 def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
-    """Rebuilt, or built from records in other files, the tables have the same bytes."""
+    """Tables that are rebuilt, or built from the same records in other files, have the same bytes."""
     tables = results.build(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())
@@ -227,7 +226,7 @@ def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable
 
 
 def made_at_once(folder: RunFolder) -> dict[str, bytes]:
-    """The tables as version 0.2 and earlier built them, with all rows in memory."""
+    """Build the tables as version 0.2 did, with all rows in memory."""
     records = folder.records()
     planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
@@ -266,9 +265,8 @@ def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]
 def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
-    """For any batch size and one or two processes, the files equal those built with all rows in memory, even
-    for a run without records.
-    """
+    """For any batch size and for one or two processes, the files equal tables that are built with all rows
+    in memory. A run without records has tables, too."""
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
@@ -288,7 +286,8 @@ def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
 
 
 def test_a_long_table_has_several_row_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """All row groups of a Parquet file have one size except the last, for any batches; none is empty."""
+    """For any batches, all row groups of a Parquet file have the same size, except the last. No row group
+    is empty."""
     monkeypatch.setattr(table_files, "_ROWS", 4)
     columns = (Column("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
@@ -312,7 +311,7 @@ def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
 def test_tables_stay_while_they_follow_from_what_is_there(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """File times do not matter: while input and tables have their digests, nothing is built."""
+    """Nothing is built while input and tables have the same digests. File times are ignored."""
     results.build(folder.path)
     os.utime(folder.path / "records" / "0001-gw0.jsonl")
     os.utime(folder.path / "results.csv", (1, 1))
@@ -327,7 +326,8 @@ def test_tables_stay_while_they_follow_from_what_is_there(
 def test_tables_are_built_when_anything_of_them_changed(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    """Other records or timings, and an edited or deleted table or stamp, cause a rebuild."""
+    """The tables are rebuilt after a change of records or timings, and after a table or a stamp is edited
+    or deleted."""
     results.build(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -344,7 +344,7 @@ def test_tables_are_built_when_anything_of_them_changed(
 
 @pytest.mark.parametrize("stamp", [True, False])
 def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -> None:
-    """One line says that an edited table was replaced, even if its stamp is gone."""
+    """One line reports that an edited table was replaced, even if its stamp is missing."""
     table = results.build(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
@@ -358,9 +358,8 @@ def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -
 def test_a_table_that_a_kill_left_is_no_edited_one(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    """If a build was killed before it wrote any table, the next one builds silently, also after more records
-    arrived.
-    """
+    """If a build was killed before it wrote a table, the next build prints nothing, even if records were
+    added."""
     results.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):

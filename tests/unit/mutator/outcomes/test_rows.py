@@ -37,7 +37,7 @@ def write_table(path: Path, *lines: dict[str, str]) -> Path:
 
 
 def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
-    """Each experiment enters exactly the counts that its row supports."""
+    """Each experiment enters exactly the counts that follow from its row."""
     hazard = SEEN | {"outcome": "hazard", "h1": "1", "t_h1": "18.3", "alerts": ""}
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
@@ -55,7 +55,7 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
 def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Path, status: Status) -> None:
-    """A harness error or an invalid mutant is counted as unusable and nowhere else."""
+    """A harness error or an invalid mutant counts as unusable and enters no other count."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -68,7 +68,7 @@ def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Pa
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
-    """A crashed or hanging controller counts as injected and has its own column."""
+    """A controller that crashes or hangs counts as injected and has a separate column."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -80,20 +80,22 @@ def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
 
 
 def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
-    """Without crashes, timeouts or unusable runs, a campaign's table has no columns for them."""
+    """If a campaign has no crashes, timeouts or unusable runs, its table has no columns for them."""
     rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
 def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
-    """A checked hazard is listed even if it never occurred; an unchecked one is not."""
+    """A hazard that the target checks is listed even if it never occurred. A hazard that it does not check
+    is not listed."""
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
     assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 
 
 def test_rows_are_typed(tmp_path: Path) -> None:
-    """Empty cells become None, times become numbers, alerts a tuple, hazards are sorted by time."""
+    """Empty cells become None, times become numbers, alerts become a tuple, and hazards are sorted by
+    time."""
     line = SEEN | {
         "outcome": "hazard",
         "h1": "1",

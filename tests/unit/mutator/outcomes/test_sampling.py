@@ -1,4 +1,4 @@
-"""A run's channels as its series: 20 values a second, and the important steps in between."""
+"""The series of a run: 20 values a second of each channel, and the important steps in between."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -27,7 +27,7 @@ def manifest(toycar: Workspace) -> TargetManifest:
 
 
 def rounded(values: Any) -> list[float]:
-    """Values in single precision, rounded to 20 significant bits."""
+    """The values in single precision, rounded to 20 significant bits."""
     words = np.asarray(values, dtype="<f4").view("<u4")
     return ((words + 8) // 16 * 16).view("<f4").tolist()
 
@@ -38,7 +38,7 @@ def trace(time: np.ndarray = T, **channels: np.ndarray) -> Trace:
 
 
 def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
-    """Golden and faulty, read back from their bytes."""
+    """The series of golden and of the faulty run, read back from their bytes."""
     golden = decode(sampler.encoded)
     return golden, decode(encode(sampler.series(faulty, record), sampler.golden), golden)
 
@@ -46,9 +46,8 @@ def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Ser
 def test_a_channel_has_twenty_values_a_second_and_the_last(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """500 steps in 5 s give every fifth step with its time, and the last, to six digits; the manifest selects
-    the channels.
-    """
+    """Of 500 steps in 5 s, every fifth and the last are stored with their times, to six digits. The
+    manifest selects the channels."""
     one = Sampler(manifest, trace(speed=np.sin(T)))
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
@@ -61,9 +60,8 @@ def test_a_channel_has_twenty_values_a_second_and_the_last(
 def test_what_the_controller_believes_has_ten_values_a_second(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Channels of the controller's beliefs have ten values a second, with the peaks in between, even where
-    other channels have a value.
-    """
+    """Channels with the controller's beliefs have ten values a second, and the peaks in between. This
+    holds even at times when other channels have a value."""
     inside = [replace(c, role=Role.INTERNAL) if c.name == "speed" else c for c in manifest.channels]
     one = Sampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
     speed = np.sin(T)
@@ -75,9 +73,8 @@ def test_what_the_controller_believes_has_ten_values_a_second(
 
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """The first differing step and the largest differences, in the drive and in the whole run, are kept as
-    points, however short; channels without a difference have none.
-    """
+    """The first step that differs, and the steps with the largest differences in the drive and in the
+    whole run, are stored as points, however short they are. Channels that do not differ have no points."""
     gas = np.zeros(500)
     gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
     one = Sampler(manifest, trace())
@@ -91,7 +88,7 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
 def test_what_is_not_a_number_stays_what_it_is(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Infinite, very large and missing values are not rounded to something else."""
+    """Infinite, very large and missing values stay what they are when rounded."""
     speed = np.zeros(500)
     speed[:25:5] = np.inf, -np.inf, np.nan, 3.4e38, 1e300
     faulty = stored(Sampler(manifest, trace()), trace(speed=speed), record())[1]
@@ -103,12 +100,11 @@ def test_what_is_not_a_number_stays_what_it_is(
 def test_the_step_of_a_hazard_is_kept_of_every_channel(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The values at a hazard between two samples are kept for every channel, even those that equal golden
-    there. A hazard after the end of either run has no such step.
-    """
+    """At a hazard between two samples, the values of every channel are stored, even if they equal golden
+    there. A hazard after the end of either run has no such point."""
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
     one = Sampler(manifest, trace(speed=T, gap=gap))
-    hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is a sample at 3.00 s
+    hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
     points = stored(one, trace(speed=speed, gap=gap), record(hazards=hazards))[1].points
     there = points.t == 2.52
     assert points.channel[there].tolist() == [0, 1, 2, 3, SPEED]
@@ -120,7 +116,7 @@ def test_the_step_of_a_hazard_is_kept_of_every_channel(
 def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The last step may be an impact, so its values are kept."""
+    """The values of the last step are stored, because it may be an impact."""
     one = Sampler(manifest, trace(speed=T))
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
@@ -129,7 +125,7 @@ def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
 
 
 def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """A target may end at once."""
+    """A run without any step has no values."""
     faulty = stored(Sampler(manifest, trace()), trace(np.zeros(0)), record())[1]
     assert (len(faulty.t), len(faulty.points.t)) == (0, 0)
 
@@ -137,7 +133,7 @@ def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Ca
 def test_a_run_that_lasts_longer_has_more_times(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Times after the end of golden are the longer run's own."""
+    """After the end of golden, the times are those of the longer run."""
     time = np.arange(700) / 100
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     assert faulty.t[-1] == 6.99
@@ -148,7 +144,7 @@ def test_a_run_that_lasts_longer_has_more_times(
 def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Even if a target's steps depend on events, both runs share one time axis."""
+    """Both runs share one time axis, even if the target's steps depend on events."""
     time = np.arange(0.0, 5.0, 0.03)
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
@@ -158,7 +154,7 @@ def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
 def test_a_channel_with_its_own_times_has_its_newest_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Such a channel has no value before its first."""
+    """A channel with its own times has no value before its first one."""
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
     golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
     gap = dict(zip(golden.times(3).tolist(), golden.rows[3], strict=True))
@@ -169,7 +165,7 @@ def test_a_channel_with_its_own_times_has_its_newest_value(
 def test_a_series_of_its_own_file_is_read_back(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The series has golden and events; the file is the same each time."""
+    """The series has the golden run and the events. Writing it again gives the same file."""
     one = record(alerts=(("brake_hard", 2.5),))
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     path = SeriesFolder(tmp_path).kept(one.experiment_id)

@@ -1,4 +1,4 @@
-"""Margins and metrics of the shipped target, compared with hand-computed drives."""
+"""The margins and metrics of the shipped target, compared with drives computed by hand."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from mutator.outcomes.judging import Judged, judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
-BESIDE = 2.76  # m; the cars overlap sideways up to 2.75 m
+BESIDE = 2.76  # m; at up to 2.75 m to the side, the cars overlap
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def manifest() -> TargetManifest:
 
 
 def driven(manifest: TargetManifest, gaps: list[float], offsets: list[float]) -> Judged:
-    """A drive at 10 m/s behind a vehicle at 8 m/s, with steps of one second."""
+    """A drive at 10 m/s behind a vehicle at 8 m/s, in steps of one second."""
     trace = {channel.name: np.zeros(len(gaps)) for channel in manifest.judged}
     trace |= {"t": np.arange(len(gaps), dtype=float), "d_rel": np.array(gaps), "hwt": np.array(gaps) / 10}
     trace |= {"v_ego": np.full(len(gaps), 10.0), "v_lead": np.full(len(gaps), 8.0)}
@@ -31,25 +31,24 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
 @pytest.mark.parametrize(
     ("gaps", "offsets", "values"),
     [
-        # it leaves its lane behind the other one, passes it, and returns in front of the next one
+        # the car leaves its lane behind the other one, passes it, and returns in front of the next one
         ([10, 6, 2, -3, -40, 30], [0, 2.75, BESIDE, 3, -BESIDE, -2.75], [6, 6, 0.6, 3, 4 / 12, None]),
         ([10, 4, -1, -3], [0, 1, 2, 2], [-1, -1, -0.1, 2, 4 / 8, 2]),  # contact at 2 s, through it at 3 s
-        ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # never behind it
+        ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # the car is never behind the vehicle
     ],
 )
 def test_a_gap_counts_while_the_cars_overlap(
     manifest: TargetManifest, gaps: list[float], offsets: list[float], values: list[float | None]
 ) -> None:
-    """A vehicle that the car passes beside is near but harmless: it enters neither H1's margin nor
-    a metric.
-    """
+    """A vehicle that the car passes at the side is near and harmless, so it does not affect H1's margin or
+    a metric."""
     found = dict(driven(manifest, gaps, offsets).metrics)
     expected = {name: value for name, value in zip(OF_THE_GAP, values, strict=True) if value is not None}
     assert {name: found[name] for name in OF_THE_GAP if name in found} == pytest.approx(expected)
 
 
 def test_the_margin_of_a_contact_is_negative_where_it_came(manifest: TargetManifest) -> None:
-    """The margin of H1 is at most 0 if it occurred, and above 0 if it did not."""
+    """The margin of H1 is 0 or less if the hazard occurred, and above 0 otherwise."""
     for offset in (0.0, 2.75, BESIDE, -9.0):
         judged = driven(manifest, [5, 0, -1], [offset] * 3)
         margin = dict(judged.metrics).get("margin_h1", np.inf)

@@ -1,4 +1,4 @@
-"""The verdict: its whole truth table, and the events that count."""
+"""The verdict: its truth table, and the events that it counts."""
 
 from itertools import product
 
@@ -24,7 +24,7 @@ TRUTH = {
 
 @pytest.mark.parametrize("case", list(product((False, True), repeat=3)), ids=str)
 def test_truth_table(case: tuple[bool, bool, bool]) -> None:
-    """Every combination of activated, manifested and hazard has the outcome of the table."""
+    """Each combination of activated, manifested and hazard has the outcome that the table gives."""
     activated, manifested, hazard = case
     outcome = judge(
         activation=ACTIVE if activated else None,
@@ -38,7 +38,7 @@ def test_truth_table(case: tuple[bool, bool, bool]) -> None:
     ("time", "counts"), [(0.0, False), (1.99, False), (2.0, True), (2.01, True), (9.0, True)]
 )
 def test_events_before_the_activation_do_not_count(time: float, counts: bool) -> None:
-    """An event counts from the moment of the activation, inclusive."""
+    """An event counts from the time of the activation on, including that time."""
     assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
 
 
@@ -48,7 +48,7 @@ def test_no_event_counts_without_activation() -> None:
 
 
 def test_first_of_each_name_sorted_by_time() -> None:
-    """The first event of each name at or after the activation is kept, in order of time, then name."""
+    """The first event of each name at or after the activation is kept, sorted by time, then by name."""
     events = [("fcw", 1.0), ("b", 5.0), ("fcw", 4.0), ("fcw", 3.0), ("a", 5.0)]
     assert first_events(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
 
@@ -69,5 +69,6 @@ HAZARDS = (("H3", 5.0), ("H1", 7.0))
     ids=["neither", "no alert", "no hazard", "alert first", "at once", "hazard first"],
 )
 def test_reaction_time(hazards: tuple, alerts: tuple, expected: float | None) -> None:
-    """Reaction time is first hazard minus first alert, and empty unless the alert came strictly before."""
+    """The reaction time is the first hazard minus the first alert. It is empty unless the alert came
+    strictly earlier."""
     assert reaction_time(hazards, alerts) == expected

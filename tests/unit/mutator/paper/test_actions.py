@@ -1,4 +1,4 @@
-"""Unsafe control actions, as two traces show them."""
+"""Unsafe control actions, found by comparing two traces."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -14,18 +14,18 @@ NONE = np.zeros_like(T)
 
 
 def during(begin: float, end: float) -> np.ndarray:
-    """Half of full gas or brake from `begin` until before `end`, s."""
+    """An array of half of full gas or brake from `begin` until before `end`, in seconds."""
     return np.where((begin - 0.01 < T) & (end - 0.01 > T), 0.5, 0.0)
 
 
 def pair(golden: dict[str, np.ndarray], faulty: dict[str, np.ndarray]) -> Pair:
-    """A fault active at 2 s, an alert at 4 s, and what follows until 8 s."""
+    """The record of a fault that is active at 2 s, with an alert at 4 s and the given events until 8 s."""
     none = {"gas": NONE, "brake": NONE}
     return Pair(t=T, golden=none | golden, faulty=none | faulty, step_s=0.1, start=2.0, end=8.0, alert=4.0)
 
 
 def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
-    """First and last time of the steps that show it."""
+    """The times of the first and last step that show the action."""
     steps = look(given)
     return None if steps is None else (round(T[steps][0], 1), round(T[steps][-1], 1))
 
@@ -36,19 +36,19 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
         (2.0, None),  # no significant braking after the activation
         (3.0, (3.0, 5.9)),  # 1 s of 4 s
         (4.5, None),  # 2.5 s of 4 s
-        (6.0, None),  # as long as it should be
+        (6.0, None),  # as long as required
     ],
 )
 def test_braking_is_too_short_when_it_lasts_half_as_long_at_most(
     end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Braking time counts from the activation on; earlier braking is not due to the fault."""
+    """Braking time counts from the activation on. Earlier braking is not caused by the fault."""
     given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
     assert stretch(brake_too_short, given) == shown
 
 
 def test_braking_that_nobody_needs_is_not_too_short() -> None:
-    """If the fault-free run does not brake either, nothing is too short."""
+    """If the fault-free run does not brake either, no braking is too short."""
     assert brake_too_short(pair({}, {})) is None
 
 
@@ -56,16 +56,16 @@ def test_braking_that_nobody_needs_is_not_too_short() -> None:
     ("begin", "end", "shown"),
     [
         (5.0, 7.0, (5.0, 6.9)),
-        (5.0, 5.4, None),  # a flicker
+        (5.0, 5.4, None),  # only for a moment
         (0.5, 1.9, None),  # before the activation
         (8.1, 9.9, None),  # after the hazard
-        (3.0, 4.0, None),  # golden does the same
+        (3.0, 4.0, None),  # golden shows the same
     ],
 )
 def test_gas_is_at_a_wrong_time_where_golden_gives_none(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Wrong gas lies between activation and hazard and lasts at least half a second."""
+    """Wrong gas occurs between activation and hazard, and lasts at least half a second."""
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
     assert stretch(at_a_wrong_time("gas"), given) == shown
     assert at_a_wrong_time("brake")(given) is None
@@ -79,7 +79,7 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
     [
         (BOTH, 4.5, (4.5, 9.9)),
         (BOTH, 5.5, None),  # more than 1 s after the alert
-        ({"brake": during(1, 6)}, 4.5, None),  # golden needs no gas
+        ({"brake": during(1, 6)}, 4.5, None),  # golden uses no gas
     ],
 )
 def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
@@ -92,7 +92,8 @@ def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
 
 
 def test_a_pair_is_cut_to_the_steps_both_runs_have(record: Callable[..., Record]) -> None:
-    """The shorter run bounds the pair; hazard, activation and first alert are the record's."""
+    """The comparison ends with the shorter run. Hazard, activation and first alert are those of the
+    record."""
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):

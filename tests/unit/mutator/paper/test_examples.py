@@ -1,4 +1,5 @@
-"""Figures of single experiments on the toy car: found by query, confirmed on traces, drawn."""
+"""Figures of single experiments on the toy car: a query finds them, their traces confirm them, and they
+are drawn."""
 
 import shutil
 from collections.abc import Callable
@@ -36,7 +37,7 @@ BRAKE = Wanted(
 
 @pytest.fixture(scope="module")
 def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy car's folder with a run of shifted lanes."""
+    """A folder of the toy car, with a run whose faults shift the lanes."""
     place = tmp_path_factory.mktemp("driven")
     only = Choices(only='fault_type == "lane"')
     assert run_campaign(copy_toycar(place), "small", place / "run", choices=only).exit_code == 0
@@ -45,13 +46,13 @@ def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path
 
 @pytest.fixture
 def place(driven: Path, tmp_path: Path) -> Path:
-    """A copy of it."""
+    """A copy of that folder, which a test may change."""
     shutil.copytree(driven, tmp_path / "place")
     return tmp_path / "place"
 
 
 def drawn(place: Path, wanted: Wanted) -> Drawing:
-    """The figure of the run in `place`, with the toy car of that folder."""
+    """The figure for the run in `place`, with the toy car of that folder."""
     toy = place / "toy"
     workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
     run = place / "run"
@@ -65,10 +66,9 @@ def edit_target(place: Path) -> None:
 
 
 def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
-    """The figure has a panel for each recorded channel with its unit, the marks, both lines and the shade;
-    its note describes the experiment, and its code blocks have the query and the command for more. Nothing is
-    run.
-    """
+    """The figure has a panel for each recorded channel, with its unit, the marks, both lines and the
+    shade. The note describes the experiment. Its code blocks have the query and the command for more
+    examples. No experiment is run."""
     drawing = drawn(driven, BRAKE)
     [name] = [name for name in RunFolder.open(driven / "run").records() if name in drawing.note]
     assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]
@@ -83,7 +83,7 @@ def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
 
 
 def test_a_report_drives_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The report is rewritten, with its study's figures, where no process can start."""
+    """A report with its study's figures can be rewritten where no process can start."""
 
     def start(*words: object, **keywords: object) -> None:
         raise AssertionError("a report started a process")
@@ -98,7 +98,7 @@ def test_a_report_drives_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_series_is_enough(place: Path, tmp_path: Path) -> None:
-    """Drawn again after an edit of the target, the figure is the same file."""
+    """After an edit of the target, the figure is drawn again as the same file."""
     contents = []
     for _ in range(2):
         write_drawings([drawn(place, BRAKE)], tmp_path)
@@ -108,7 +108,7 @@ def test_a_series_is_enough(place: Path, tmp_path: Path) -> None:
 
 
 def test_what_cannot_be_drawn_is_said(place: Path, tmp_path: Path) -> None:
-    """A missing or damaged series, target or library gets one sentence each, and no figure is left over."""
+    """A missing or damaged series, target or library gets one sentence. No figure is left over."""
     for kind in ("svg", "png"):
         (tmp_path / "figures").mkdir(exist_ok=True)
         (tmp_path / "figures" / f"brake.{kind}").touch()
@@ -129,7 +129,8 @@ def test_what_cannot_be_drawn_is_said(place: Path, tmp_path: Path) -> None:
 
 
 def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
-    """Matching experiments are tried in order; if none shows it, the report gives their number."""
+    """Matching experiments are tried in order. If none of them shows the action, the report gives their
+    number."""
     looked_at: list[float] = []
 
     def second(pair: Pair) -> np.ndarray | None:
@@ -143,13 +144,13 @@ def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
 
 
 def test_a_query_that_finds_nothing_is_said(place: Path) -> None:
-    """The report says that a query matched nothing, also for a target without the actuator."""
+    """The report says that no experiment matched the query. This includes a target without the actuator."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 
 
 def test_candidates_come_largest_first_then_by_id() -> None:
-    """The order is numeric, not textual, and complete."""
+    """Experiments are sorted by number, not as text, and none is missing."""
     h1 = {"t_activation": 2, "t_h1": 5, "max_dev_gas": 0}
     frame: pd.DataFrame = results(
         h1 | {"max_dev_brake": 9.0},
@@ -163,7 +164,7 @@ def test_candidates_come_largest_first_then_by_id() -> None:
 
 
 def test_every_query_can_be_asked() -> None:
-    """Every query finds its experiment in hand-made results."""
+    """In results made by hand, every query finds its experiment."""
     had = {"t_activation": 2, "t_alert": 3, "t_h1": 5, "t_h2": 5, "max_dev_brake": 1, "max_dev_gas": 1}
     frame = results(had, had | {"fault_type": "jamming"})
     assert [list(candidates(frame, one)["experiment_id"]) for one in WANTED] == [["0"], ["0"], ["0"], ["1"]]

@@ -1,4 +1,4 @@
-"""The published observations: their queries on the published counts, and every verdict of every rule."""
+"""The published observations: their queries on the published counts, and each verdict of each rule."""
 
 import math
 from collections.abc import Iterable
@@ -23,7 +23,7 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 FILE = REFERENCES / observations.FILE
 HOLDS, FAILS, UNDECIDED = Verdict
 ACTIVATED = {"t_activation": 1.0}
-EVENTS = {  # by a tally's count: what happened in such a run
+EVENTS = {  # what happened in a run, by the count that it enters
     "manifested": {"t_manifest": 2.0},
     "alerts": {"alerts": "steer_saturated", "t_alert": 3.0},
     "hazards": {"h3": 1, "t_h3": 9.0},
@@ -31,7 +31,7 @@ EVENTS = {  # by a tally's count: what happened in such a run
 
 
 def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
-    """As many runs as a tally counts, each with its counted events."""
+    """As many runs as the counts say, each with the events that it is counted for."""
     warned = tally.hazards - (tally.hazards_no_alerts or 0)
     kinds = [
         (warned, ("manifested", "alerts", "hazards")),
@@ -47,7 +47,7 @@ def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
 
 
 def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """One frame of them; each run has an id, a partner of the other method, one of 40 faults, and an end."""
+    """A frame of these runs. Each has an id, a partner of the other method, one of 40 faults, and an end."""
     frame = pd.concat(parts, ignore_index=True)
     number = frame.groupby("method").cumcount()
     ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}
@@ -55,13 +55,13 @@ def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
 
 
 def of_rows(*rows: dict[str, Any]) -> pd.DataFrame:
-    """A frame of guided chaff runs in S1, given by their differences from one that was not activated."""
+    """A frame of guided chaff runs in S1, each given by its differences from a run without activation."""
     return frame_of([results(*rows)])
 
 
 @pytest.fixture(scope="module")
 def table_2() -> dict[str, JudgedClaim]:
-    """The claims, evaluated on runs with the counts of the paper's table II."""
+    """The claims, evaluated on runs with the counts of table II of the paper."""
     counts = load_paper(REFERENCES).summary
     frame = frame_of(runs_of(t, method=method, scenario=s) for (method, s), t in counts.items())
     return {one.number: one for each in judge(FILE, frame, []) for one in each.claims}
@@ -69,7 +69,7 @@ def table_2() -> dict[str, JudgedClaim]:
 
 @pytest.fixture(scope="module")
 def table_3() -> dict[str, JudgedClaim]:
-    """The claims, evaluated on runs with the counts of the paper's table III."""
+    """The claims, evaluated on runs with the counts of table III of the paper."""
     parts = []
     for (method, kind), tally in load_paper(REFERENCES).coverage.items():
         module, _, fault_type = kind.partition("/")
@@ -80,7 +80,7 @@ def table_3() -> dict[str, JudgedClaim]:
 
 @pytest.mark.parametrize("number", ["1.1", "1.2", "2.4", "3.4", "4.1", "4.2", "4.3"])
 def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, JudgedClaim], number: str) -> None:
-    """On runs with the paper's counts, a claim's query gives the paper's number and verdict."""
+    """On runs with the paper's counts, the query of a claim gives the paper's number and verdict."""
     one = table_2[number]
     [answer] = one.answers
     published = one.claim.published()
@@ -91,7 +91,7 @@ def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged
 
 @pytest.mark.parametrize("number", ["2.1", "2.2", "2.7", "4.1"])
 def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, JudgedClaim], number: str) -> None:
-    """The same holds for claims about fault types."""
+    """Claims about fault types also give the paper's numbers and verdicts."""
     one = table_3[number]
     published = one.claim.published()
     assert published is not None
@@ -99,9 +99,8 @@ def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, Judged
 
 
 def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, JudgedClaim]) -> None:
-    """The guided advantage holds for activated faults and reverses for injected ones, resampled by fault and
-    within fault type; each image effect is separate.
-    """
+    """Guided faults lead per activated fault and trail per injected fault. The resampling draws faults
+    within each fault type, and each image effect is separate."""
     assert table_3["4.4"].verdict is HOLDS
     assert table_3["4.5"].verdict is FAILS
     assert table_3["4.5"].paper is FAILS
@@ -111,7 +110,7 @@ def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, Judg
 
 
 def test_the_cited_time_is_the_drivers() -> None:
-    """The claims about a driver's time use the reaction time cited next to them."""
+    """Claims about a driver's time use the reaction time that is cited next to them."""
     driver_s = load_paper(REFERENCES).driver_reaction_s
     claims = [claim for one in judge(FILE, of_rows({}), []) for claim in one.claims]
     asked = [one.claim for one in claims if one.claim.measure in ("mean_time", "median_time")]
@@ -125,7 +124,7 @@ def test_the_cited_time_is_the_drivers() -> None:
         (Rule(above=0.5), of_share(share(60, 100)), HOLDS),
         (Rule(above=0.5), of_share(share(40, 100)), FAILS),
         (Rule(above=0.5), of_share(share(52, 100)), UNDECIDED),
-        (Rule(above=0.5), of_share(share(9, 9)), UNDECIDED),  # few runs, whatever their interval
+        (Rule(above=0.5), of_share(share(9, 9)), UNDECIDED),  # few runs, so undecided for any interval
         (Rule(below=0.05), of_share(share(0, 100)), HOLDS),
         (Rule(below=0.05), of_share(share(20, 100)), FAILS),
         (Rule(below=0.05), of_share(share(0, 0)), UNDECIDED),
@@ -141,12 +140,14 @@ def test_the_cited_time_is_the_drivers() -> None:
     ],
 )
 def test_each_rule_reaches_each_verdict(rule: Rule, found: Estimate, verdict: Verdict) -> None:
-    """The interval decides, or a single run if one is enough; few data leave it open."""
+    """The interval decides, or a single run if the rule needs only one. With too few data, the claim is
+    undecided."""
     assert rule.verdict(found) is verdict
 
 
 def test_an_observation_holds_if_all_it_rests_on_does() -> None:
-    """One claim against it is enough; one without enough data leaves the rest open."""
+    """One claim that fails decides against the observation. One claim without enough data leaves it
+    undecided."""
     assert together([HOLDS, HOLDS]) is HOLDS
     assert together([HOLDS, UNDECIDED]) is UNDECIDED
     assert together([UNDECIDED, FAILS]) is FAILS
@@ -154,7 +155,8 @@ def test_an_observation_holds_if_all_it_rests_on_does() -> None:
 
 
 def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, JudgedClaim]) -> None:
-    """A run of another mixture lacks the data for it, whatever its number; other claims are decided."""
+    """A run with another mixture of faults has no data for the claim, whatever its number. Other claims
+    are decided."""
     frame = of_rows(*[ACTIVATED] * 200, *[ACTIVATED | {"t_h1": 9.0, "t_h3": 8.0}] * 20)
     first = judge(FILE, frame, ["a type is missing", "5 are left"])[0].claims
     assert table_2["1.1"].verdict is HOLDS
@@ -164,7 +166,7 @@ def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, Judged
 
 
 def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
-    """FCW in one of the three scenarios does not count for all three."""
+    """An FCW in one of three scenarios is not enough for all three."""
     frame = of_rows(ACTIVATED | {"scenario": "S2", "alerts": "fcw", "t_alert": 2.0})
     fcw = judge(FILE, frame, [])[0].claims[4]
     assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNDECIDED, UNDECIDED]
@@ -172,9 +174,9 @@ def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
 
 
 def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
-    """The censored median exceeds every run if most alerts precede no hazard; if the curve falls past a half
-    in one step it is that step, unless few runs remain; without run ends there is none.
-    """
+    """If most alerts precede no hazard, the censored median exceeds every run. If the curve falls past one
+    half in one step, the median is that step, unless few runs remain. Without the ends of runs there is no
+    median."""
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf
@@ -186,7 +188,7 @@ def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
 
 
 def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
-    """A column that results lack is an error of the file, at the claim."""
+    """If the results lack a column, the file's claim is reported as an error."""
     file = tmp_path / "o.yaml"
     text = FILE.read_text()
     file.write_text(text.replace("part: not is_alert", "part: not is_allert", 1))
@@ -210,7 +212,7 @@ def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str)
 
 
 def test_what_is_shown_is_what_was_evaluated() -> None:
-    """The report's query lines, run as Python, give the numbers next to them."""
+    """The query lines in the report, run as Python, give the numbers next to them."""
     frame = of_rows(*[ACTIVATED] * 3, ACTIVATED | {"alerts": "fcw", "t_alert": 2.0, "t_h1": 9.0})
     told: tuple[JudgedObservation, ...] = judge(FILE, frame, [])
     names: dict[str, object] = {"runs": frame}

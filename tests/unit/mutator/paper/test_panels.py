@@ -1,4 +1,4 @@
-"""The published observations in a run's report: those that its experiments can decide."""
+"""The published observations in the report of a run, limited to those that its experiments can decide."""
 
 import shutil
 from pathlib import Path
@@ -17,13 +17,14 @@ from mutator.workspace import Workspace
 
 from ..statistics.results_frame import results
 
-SEEN: Any = None  # nothing of it is asked for
+SEEN: Any = None  # these tests do not use it
 REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 
 
 @pytest.mark.parametrize("shard", [None, "1/2"])
 def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, shard: str | None) -> None:
-    """Claims about all faults wait for the last experiment of the whole plan; a shard is only a part."""
+    """Claims about all faults are decided only after the last experiment of the whole plan. A shard is
+    only a part of the plan."""
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
@@ -42,9 +43,7 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         {"module": module, "fault_type": kind, "fault_id": str(i), "seed": i % 2}
         for i, (module, kind) in enumerate(kinds)
     ]
-    frame = results(
-        *all_kinds, against
-    )  # the paper saw no hazard of this kind: its second observation is decided
+    frame = results(*all_kinds, against)  # the paper saw no such hazard, so its second observation is decided
     of_all = (REFERENCES / "paper_observations.yaml").read_text().count("mixture: true")
     assert of_all
     for done in (folder.planned - 1, folder.planned):
@@ -57,7 +56,7 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
 
 
 def test_results_that_decide_nothing_say_nothing_of_the_study(toycar: Workspace, tmp_path: Path) -> None:
-    """If no fault of the paper was activated, the report has no such part, and there is no file."""
+    """If no fault of the paper was activated, the report has no such section, and no file is written."""
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")

@@ -1,4 +1,4 @@
-"""The paper's campaigns have the counts of the paper's table III for each kind, on every machine."""
+"""On every machine, the paper's campaigns have the counts of its table III for each kind of fault."""
 
 import os
 import subprocess
@@ -14,7 +14,7 @@ from mutator.model import Experiment, Method
 from mutator.workspace import Workspace
 
 ROOT = Path(__file__).parents[4]
-INJECTED = {  # table III, column "injected": for the guided campaign, and again for the random one
+INJECTED = {  # column "injected" of table III, for the guided campaign and for the random one
     ("radar", "chaff"): 480,
     ("radar", "invisible_vehicle"): 120,
     ("radar", "ghost_vehicle"): 620,
@@ -44,13 +44,13 @@ def library() -> Workspace:
 
 @pytest.fixture(scope="module")
 def paper(library: Workspace) -> Plan:
-    """The plan of both campaigns."""
+    """The plan with both campaigns."""
     return make_plan(library, "paper")
 
 
 @pytest.fixture(scope="module")
 def sample(library: Workspace) -> Plan:
-    """The plan of a tenth of them."""
+    """The plan for a tenth of both campaigns."""
     return make_plan(library, "paper_sample")
 
 
@@ -68,7 +68,7 @@ def of_method(plan: Plan, method: Method, key: Callable[[Experiment], object]) -
 
 
 def test_paper_is_table_three(paper: Plan) -> None:
-    """Both campaigns have 5640 experiments each, with the paper's number for every fault type."""
+    """Both campaigns have 5640 experiments each, with the paper's number for each fault type."""
     for method in Method:
         counts = kinds(paper, method)
         assert counts == INJECTED
@@ -77,9 +77,8 @@ def test_paper_is_table_three(paper: Plan) -> None:
 
 
 def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
-    """The 282 values appear in five scenarios and four contexts each, and every random one has its
-    partner.
-    """
+    """Each of the 282 values appears in five scenarios and four contexts. Each random experiment has its
+    partner."""
     guided = of_method(paper, Method.GUIDED, pair)
     assert guided == of_method(paper, Method.RANDOM, pair)
     faults = {e.fault.id for e in paper.experiments}
@@ -90,14 +89,14 @@ def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
 
 @pytest.mark.parametrize("method", Method)
 def test_one_method_alone_is_its_half(library: Workspace, paper: Plan, method: Method) -> None:
-    """`paper_guided` and `paper_random` are the experiments of `paper`, with frames."""
+    """`paper_guided` and `paper_random` have the experiments of `paper`, with camera frames."""
     half = make_plan(library, f"paper_{method.value}")
     assert [e.id for e in half.experiments] == [e.id for e in paper.experiments if e.method is method]
     assert {e.setting for e in half.experiments} == {("pictures", "paper_detector")}
 
 
 def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
-    """The other reading has the same numbers, and its triggers do not wait for the controller."""
+    """The other reading has the same numbers. Its triggers do not wait for the controller."""
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
@@ -105,7 +104,7 @@ def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
 
 
 def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
-    """The tenth has matched pairs of each fault type, scenario and method, in proportion."""
+    """The tenth has complete pairs of each fault type, scenario and method, in proportion."""
     assert len(sample.experiments) == 1128
     assert {e.id for e in sample.experiments} <= {e.id for e in paper.experiments}
     assert of_method(sample, Method.GUIDED, pair) == of_method(sample, Method.RANDOM, pair)
@@ -116,7 +115,7 @@ def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
 
 
 def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) -> None:
-    """The hundredth has each variant in both methods, and every scenario."""
+    """The hundredth has every scenario, and each variant with both methods."""
     smoke = make_plan(library, "paper_smoke").experiments
     assert len(smoke) == 113
     assert {e.id for e in smoke} <= {e.id for e in paper.experiments}
@@ -125,9 +124,8 @@ def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) ->
 
 
 def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> None:
-    """The campaign has every value of every fault type, guided and at random times, on the reference plant,
-    as coded.
-    """
+    """The campaign on the reference plant, as coded, has every value of every fault type, guided and at
+    random times."""
     plan = make_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
     setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")
@@ -136,7 +134,7 @@ def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> Non
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
-    """Another interpreter with another hash seed and locale gives the plan the same digest."""
+    """An interpreter with another hash seed and locale computes the same digest of the plan."""
     code = (
         "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
         "from mutator.workspace import Workspace;"

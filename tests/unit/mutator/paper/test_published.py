@@ -30,7 +30,7 @@ def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
 
 
 def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
-    """Scenarios and fault types both add up to the totals of the text."""
+    """The counts by scenario and by fault type both add up to the totals in the paper's text."""
     assert of(paper.summary, "guided") == Tally(
         injected=5640,
         activated=3678,
@@ -48,9 +48,8 @@ def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> No
 
 
 def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
-    """Guided faults lead with 35.8 against 29.0 % of the activated faults, and trail with 23.3 against 29.0 %
-    of the injected ones.
-    """
+    """Guided faults lead per activated fault, 35.8 against 29.0 %, and trail per injected fault, 23.3
+    against 29.0 %."""
     guided, random = of(paper.summary, "guided"), of(paper.summary, "random")
     rates = [
         round(100 * share(one.hazards, whole).rate, 1)
@@ -65,7 +64,7 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
 
 
 def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
-    """Our counts are listed by scenario below the paper's; cells that the paper lacks are empty."""
+    """Our counts are below the paper's, by scenario. Cells that the paper does not have are empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
     lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
@@ -81,7 +80,7 @@ def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
 
 
 def test_coverage_has_both_denominators(paper: Paper) -> None:
-    """Hazards are divided by the activated and by the injected faults; types are in the paper's order."""
+    """Hazards are given per activated and per injected fault. Fault types are in the paper's order."""
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
     sheet = coverage_sheet("guided", by_kind(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
@@ -91,7 +90,7 @@ def test_coverage_has_both_denominators(paper: Paper) -> None:
 
 
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
-    """Count, whole, rate and interval are numeric; an unknown cell is empty."""
+    """Count, total, rate and interval are numbers. An unknown cell is empty."""
     sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
     lines = list(csv.DictReader(io.StringIO(sheet.csv())))
     assert lines[0]["hazards/activated: count"] == "154"
@@ -101,7 +100,7 @@ def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
 
 
 def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Path) -> None:
-    """More hazards than activated faults in the cited file is reported with file and line."""
+    """More hazards than activated faults in the cited file are reported with file and line."""
     for file in REFERENCES.glob("paper_*.yaml"):
         (tmp_path / file.name).write_text(
             file.read_text().replace("guided_hazards: 154", "guided_hazards: 433")
@@ -111,7 +110,7 @@ def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Pa
 
 
 def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
-    """Held constant over fault types, guided faults are more hazardous only per activated fault."""
+    """With fault types held constant, guided faults are more hazardous only per activated fault."""
     activated, injected = (
         contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )
@@ -122,7 +121,7 @@ def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
 
 
 def test_the_sheets_tell_both_wholes_for_paper_and_here(paper: Paper) -> None:
-    """Per activated and per injected fault, the paper's counts go through the same tests as ours."""
+    """The paper's counts go through the same tests as ours, per activated and per injected fault."""
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
     assert [line[:2] for line in overall.lines] == [

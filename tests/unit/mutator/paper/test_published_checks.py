@@ -1,4 +1,5 @@
-"""Impossible published numbers, or ones that do not fit the library, are reported with file and line."""
+"""Published numbers that are impossible, or that do not match the library, are reported with file and
+line."""
 
 import re
 import shutil
@@ -16,7 +17,7 @@ CLONE = Path(__file__).parents[4]
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
-    """The shipped library, with a copy of its references that a test may break."""
+    """The shipped library with a copy of its references, which a test may break."""
     library = tmp_path / "fault_library"
     library.mkdir()
     for folder in (CLONE / "fault_library").iterdir():
@@ -33,7 +34,7 @@ def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
 
 
 def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None:
-    """If a campaign needs missing numbers, the error names the folder, the files and a remedy."""
+    """If a campaign needs numbers that are missing, the error names the folder, the files and a remedy."""
     references = workspace.library / "references"
     shutil.rmtree(references)
     [problem] = check_paper(workspace)
@@ -76,9 +77,8 @@ def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None
 def test_what_is_wrong_is_told_where_it_stands(
     workspace: Workspace, file: str, old: str, new: str, told: str
 ) -> None:
-    """An unknown key, name or method, a duplicate row, and inconsistent parts and sums are reported with
-    their line.
-    """
+    """An unknown key, name or method, a duplicate row, and parts that do not match their sum are reported
+    with their line."""
     path = workspace.library / "references" / f"paper_{file}.yaml"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
@@ -87,9 +87,8 @@ def test_what_is_wrong_is_told_where_it_stands(
 
 
 def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar: Workspace) -> None:
-    """A library with part of the published numbers is told which file is missing, if a campaign requests the
-    study.
-    """
+    """If a campaign requests the study and the library has only some of the published numbers, the missing
+    file is reported."""
     references = toycar.library / "references"
     references.mkdir()
     shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
@@ -104,7 +103,7 @@ def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar:
 
 
 def test_a_library_without_any_is_told_only_if_a_campaign_asks(toycar: Workspace) -> None:
-    """Without a campaign for the study, no published number is needed."""
+    """Without a campaign that requests the study, no published number is needed."""
     told = [str(problem) for problem in check_library(toycar, "toycar")]
     assert not any("references" in problem for problem in told)
     campaign = toycar.library / "campaigns" / "small.yaml"

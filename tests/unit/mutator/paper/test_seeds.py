@@ -1,4 +1,4 @@
-"""The observations by seed: how many seeds show each, for hand-made results with known answers."""
+"""The observations by seed: for results made by hand, the number of seeds that show each observation."""
 
 from pathlib import Path
 from typing import Any
@@ -31,21 +31,22 @@ observations:
 
 
 def seed(number: int, hazards: int, *, alert: bool = False) -> list[dict[str, Any]]:
-    """20 activated runs of a seed; the first ones have a hazard, and the very first one an alert."""
+    """A seed with 20 activated runs, of which the first ones have a hazard and the very first one an
+    alert."""
     ran = {"seed": number, "t_activation": 1.0}
     made = [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(20)]
     return [made[0] | ({"t_alert": 3.0} if alert else {}), *made[1:]]
 
 
 def frame() -> pd.DataFrame:
-    """Seed 3 shows the first observation, seed 1 denies it, two are undecided; all but 12 show the other."""
+    """Seed 3 shows the first observation, seed 1 contradicts it, and two seeds are undecided. All seeds
+    except 12 show the other observation."""
     return results(*seed(11, 11, alert=True), *seed(3, 20, alert=True), *seed(1, 0, alert=True), *seed(12, 9))
 
 
 def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
-    """Each observation has the verdict over all seeds, and the numbers of seeds in which it holds, fails, or
-    is undecided; seeds are in numeric order; claims that support nothing are skipped.
-    """
+    """Each observation has its verdict over all seeds, and the numbers of seeds that show it, contradict
+    it or are undecided. Seeds are sorted as numbers. Claims that support nothing are skipped."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: [])
@@ -60,7 +61,8 @@ def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
 
 
 def test_seeds_that_lack_fault_types_cannot_tell_of_all(tmp_path: Path) -> None:
-    """A seed without some fault types is judged by its own runs; a single seed has no comparison."""
+    """A seed that lacks some fault types is judged by its own runs. With a single seed, there is no
+    comparison."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])

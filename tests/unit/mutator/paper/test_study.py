@@ -15,7 +15,7 @@ HERE = Workspace.find(Path(__file__).parents[4])
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A made-up run of a campaign that requests the study; one hazard contradicts the second observation."""
+    """A made-up run of a campaign that requests the study. One hazard contradicts the second observation."""
     made = make_run(tmp_path, study="driving_agent_resilience", experiments=4)
     with (made / "results.csv").open("a", newline="") as file:
         kind = {"module": "vision_output", "fault_type": "relative_distance"}
@@ -24,14 +24,15 @@ def run(tmp_path: Path) -> Path:
 
 
 def study_forms(run: Path) -> tuple[str, str]:
-    """The text of the study's Markdown and of its page."""
+    """The texts of the study's Markdown and page."""
     building.write(run, HERE)
     report = run / "report"
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
 
 def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
-    """They are in the study's Markdown and page, not in the report's, and in separate files."""
+    """The observations are in the study's Markdown and page, which are separate files, and not in the
+    report's."""
     forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
@@ -41,7 +42,7 @@ def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path)
 
 
 def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
-    """A claim's query is in the file and in the page; the table has a line for each query."""
+    """The query of a claim is in the file and in the page. The table has a line for each query."""
     text, page = study_forms(run)
     file, table = run / "report/observations.md", run / "report/tables/observations.csv"
     query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
@@ -53,16 +54,15 @@ def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Pat
 
 
 def test_without_a_library_there_are_no_observations(run: Path) -> None:
-    """Without a library the report is written without the published observations."""
+    """Without a library, the report is written without the published observations."""
     written = building.write(run, None)
     assert "observation" not in written.markdown.read_text() + written.page.read_text()
     assert not (run / "report" / "observations.md").exists()
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """Both forms link to the page while it exists; it is deleted once the results do not concern
-    the study.
-    """
+    """Both forms of the report link to the page while it exists. It is deleted when the results no longer
+    concern the study."""
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
@@ -76,9 +76,8 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
 
 
 def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
-    """A hazard of an experiment outside the plan has no trace: both forms say so, and neither shows
-    a figure.
-    """
+    """If a hazard's experiment is outside the plan, it has no trace. Both forms say so, and neither has a
+    figure."""
     forms = study_forms(run)
     for text in forms:
         assert "No figure: its traces are not available" in text
@@ -88,7 +87,7 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
 
 
 def test_a_library_without_the_papers_numbers_is_said_in_the_origin(run: Path, toycar: Workspace) -> None:
-    """Both forms name the study and say that its data are missing; the shipped library has them."""
+    """Both forms name the study and say that its data are missing. The shipped library has the data."""
     said = "the published numbers are not in this library"
     for workspace, expected in ((toycar, True), (HERE, False)):
         written = building.write(run, workspace)
