@@ -1,6 +1,6 @@
-"""The report's page in the system's Chromium: a toy run with made-up records, and a browser to open it.
+"""The report page in the system's Chromium: a toy run with synthetic records, and a browser.
 
-Nothing is run: only the page is tested. Every test fails on an error in the browser's console.
+The fixtures run no experiment. Every test fails on an error in the browser's console.
 """
 
 import os
@@ -45,7 +45,7 @@ FLAGS = (
 
 @pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
-    """A headless Chromium; without one, or without playwright, the tests are skipped."""
+    """A headless Chromium. Without Chromium or Playwright, the tests are skipped."""
     sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed (extra `test`)")
     found = next(filter(None, map(shutil.which, BROWSERS)), None)
     if found is None:
@@ -58,8 +58,10 @@ def browser() -> Iterator[Any]:
 
 
 def record(experiment: Experiment, number: int, patch: bytes) -> Record:
-    """A made-up record with that patch: every fifth experiment is not active, and three of ten end in a
-    hazard; one harness error, one crash.
+    """Return a synthetic record with that patch.
+
+    Every fifth experiment is not activated, and three of ten end in a hazard. One is a harness error and one
+    a crash.
     """
     status = {3: Status.HARNESS_ERROR, 4: Status.CRASHED}.get(number, Status.OK)
     active = number % 5 > 0
@@ -83,8 +85,9 @@ def record(experiment: Experiment, number: int, patch: bytes) -> Record:
 
 @pytest.fixture(scope="session")
 def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A run folder of 24 experiments with its report; the series of the second is packed, that of the third
-    in a separate file.
+    """A run folder of 24 experiments with its report.
+
+    The series of the second experiment is packed, and that of the third is in a separate file.
     """
     folder = tmp_path_factory.mktemp("browser")
     workspace = copy_toycar(folder)
@@ -118,7 +121,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], 
 
 
 class Page:
-    """An open report: playwright's page with steps that several tests share."""
+    """An open report: Playwright's page, with steps that several tests share."""
 
     def __init__(self, page: Any, url: str) -> None:
         self.page = page
@@ -139,11 +142,11 @@ class Page:
 
     @property
     def found(self) -> str:
-        """The count above the table: `24 experiments`."""
+        """Return the count above the table, such as `24 experiments`."""
         return str(self.page.inner_text("#found"))
 
     def column(self, name: str) -> list[str]:
-        """The texts of a column in the rendered rows."""
+        """Return the texts of a column in the rendered rows."""
         script = """name => {
             const heads = [...document.querySelectorAll('#grid th')];
             const rows = [...document.querySelectorAll('#grid tr[data-at]')];
@@ -152,7 +155,7 @@ class Page:
         return list(self.page.evaluate(script, name))
 
     def texts(self, selector: str) -> list[str]:
-        """The texts of all selected elements."""
+        """Return the texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def wait_for_rows(self, count: int) -> None:
@@ -170,7 +173,7 @@ Serve = Callable[..., AbstractContextManager[str]]
 
 @pytest.fixture(scope="session")
 def serve() -> Serve:
-    """Serve a library in a thread of this process; return the address, including the token."""
+    """Serve a library in a thread of this process and return the address with its token."""
     pytest.importorskip("uvicorn", reason="extra `serve` is not installed")
     from mutator.serve.app import Site
     from mutator.serve.runs import Runs
@@ -201,8 +204,9 @@ def serve() -> Serve:
 
 @pytest.fixture
 def visit(browser: Any) -> Iterator[Callable[..., Any]]:
-    """Open an address as a separate visitor; an error in the console fails the test, except those that a
-    browser logs for a failed request.
+    """Open an address as a separate visitor.
+
+    An error in the console fails the test, except the errors that a browser logs for a failed request.
     """
     errors: list[str] = []
     contexts = []
@@ -233,7 +237,7 @@ SERIOUS = """async () => {
 
 @pytest.fixture(scope="session")
 def serious_faults() -> Callable[[Any], list[str]]:
-    """The serious accessibility faults that axe-core finds in the current state of a playwright page."""
+    """Return the serious accessibility faults that axe-core finds in the page's current state."""
     package = pytest.importorskip("axe_playwright_python", reason="extra `test` is not installed")
     source = (Path(package.__path__[0]) / "axe.min.js").read_text(encoding="utf-8")
 

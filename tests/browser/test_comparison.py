@@ -1,4 +1,4 @@
-"""The page of a comparison with more changes than it shows at once."""
+"""The page of a comparison with more changes than the page shows at once."""
 
 import dataclasses
 from collections.abc import Callable
@@ -23,7 +23,7 @@ def worse(e: Experiment) -> dict[str, Any]:
 
 @pytest.fixture
 def found(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> Comparison:
-    """Every pair changed, some of them to a hazard, each many times."""
+    """Return changes of every pair, some of them to a hazard, each many times."""
     few = compare(write_run(toycar, tmp_path / "before"), write_run(toycar, tmp_path / "after", worse))
     return dataclasses.replace(
         few, matching=dataclasses.replace(few.matching, pairs=few.matching.pairs * COPIES)
@@ -37,8 +37,9 @@ def test_more_changes_than_are_shown(
     serious_faults: Callable[[Any], list[str]],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """No more rows than the limit are laid out, new hazards first; filters search all changes, and axe-core
-    finds no serious fault.
+    """The page shows no more rows than the limit, new hazards first.
+
+    Filters search all changes, and axe-core finds no serious fault.
     """
     monkeypatch.setattr(pages, "SHOWN", SHOWN)
     page = browser.new_page()

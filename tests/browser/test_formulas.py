@@ -1,4 +1,4 @@
-"""The page evaluates a manifest's formulas as Python does."""
+"""The page evaluates a manifest's formulas with the same results as Python."""
 
 import random
 from typing import Any
@@ -17,7 +17,7 @@ COUNT = 150  # of each
 
 
 def term(rng: random.Random, depth: int = 3) -> str:
-    """A random number with at most that many levels."""
+    """Return a random term with at most that many levels."""
     if depth == 0:
         return rng.choice([*NAMES, "0", "1.5", "inf", "3e5"])
     a, b, c = (term(rng, depth - 1) for _ in range(3))
@@ -27,21 +27,21 @@ def term(rng: random.Random, depth: int = 3) -> str:
 
 
 def condition(rng: random.Random) -> str:
-    """A random condition."""
+    """Return a random condition."""
     a, b, c = (term(rng, 1) for _ in range(3))
     one = f"{a} {rng.choice(['<', '<=', '>', '>=', '==', '!='])} {b}"
     return rng.choice([one, f"not {one} and {c} > 1", f"ever({one}) or {c} < 0", f"{a} <= {b} < {c}", "True"])
 
 
 def formula(rng: random.Random) -> str:
-    """A random formula. `hypot` is outermost, because its last digit differs between languages."""
+    """Return a random formula. `hypot` is outermost, because its last digit differs between languages."""
     a, b = term(rng, 2), term(rng, 2)
     return rng.choice([term(rng), f"{a} if {condition(rng)} else {b}", f"hypot({a}, {b})"])
 
 
 @pytest.fixture
 def values() -> dict[str, np.ndarray]:
-    """Forty steps of each variable, including special values."""
+    """Return forty steps of each variable, including special values."""
     rng = np.random.default_rng(1)
     made = {name: rng.normal(0.0, 5.0, 40) for name in NAMES}
     for name in NAMES[1:]:

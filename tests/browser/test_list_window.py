@@ -1,4 +1,4 @@
-"""The window of the list of experiments: its height, and the rows in it after a filter."""
+"""The window of the list of experiments: its height and its rows after a filter."""
 
 from typing import TYPE_CHECKING
 
@@ -30,7 +30,7 @@ def height(page: "Page") -> float:
 
 
 def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None:
-    """No empty box stays below the rows; without the filter the list has its old height."""
+    """With few rows the window becomes low. Without the filter it has its old height again."""
     before = height(page)
     page.page.fill("#search", "crashed")
     page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length < 3")
@@ -42,7 +42,7 @@ def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None
 
 
 def test_other_rows_are_shown_from_the_first_on(page: "Page") -> None:
-    """A filter shows the worst of the matching rows, wherever the list was scrolled."""
+    """A filter shows its worst rows first, even if the list was scrolled before."""
     page.page.evaluate(LONG, COPIES)
     page.page.evaluate(f"{WINDOW}.scrollTop = 1e6")
     page.page.wait_for_function("!document.querySelector('#grid tr[data-at=\"0\"]')")
@@ -52,7 +52,7 @@ def test_other_rows_are_shown_from_the_first_on(page: "Page") -> None:
 
 
 def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: "Page") -> None:
-    """The row is marked, just as with the whole id in the address."""
+    """The start of an id in the address marks the row, as the whole id does."""
     name = page.page.inner_text("#grid tr[data-at='0'] code")
     page.open(f"e={name[:6]}")
     page.page.wait_for_selector("#experiment h2")
@@ -60,7 +60,7 @@ def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: 
 
 
 def test_the_same_rows_stay_where_they_are(page: "Page") -> None:
-    """Another measure of the map, or other columns, do not scroll the list."""
+    """If the map's measure or the columns change, the list does not scroll."""
     page.page.evaluate(LONG, COPIES)
     page.page.evaluate(f"{WINDOW}.scrollTop = 9000")
     page.page.select_option("#measure", "activated")

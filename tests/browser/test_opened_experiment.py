@@ -1,4 +1,4 @@
-"""An opened experiment: what the page says if it did not end well, and what closing it stops."""
+"""An opened experiment that did not end well, and the effects of closing an experiment."""
 
 from typing import TYPE_CHECKING
 
@@ -24,9 +24,7 @@ WITHOUT_EVENTS = """() => {
 def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
     page: "Page", status: str, said: str
 ) -> None:
-    """The page claims neither that its fault was never active nor that a command can rerun it for a
-    replay.
-    """
+    """The page says neither that the fault was never activated nor that a command can restore a replay."""
     page.open(f"status={status}")
     page.page.evaluate(WITHOUT_EVENTS)
     page.page.click(FIRST)
@@ -38,7 +36,7 @@ def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
 
 
 def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
-    """Closing stops the replay."""
+    """Closing an experiment stops its replay."""
     page.page.click(FIRST)
     page.page.wait_for_selector("#experiment .again")
     page.page.keyboard.press("Escape")

@@ -1,4 +1,4 @@
-"""Fault paths in the report's page: the strip of an experiment, and the campaign's control structure."""
+"""Fault paths in the report page: an experiment's strip and the campaign's control structure."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -53,7 +53,7 @@ def report(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """The report of made-up toy records with a control structure."""
+    """The report of synthetic toy records with a control structure."""
     folder = tmp_path_factory.mktemp("paths")
     workspace = copy_toycar(folder)
     manifest = workspace.library / "targets" / "toycar.yaml"
@@ -72,13 +72,14 @@ def report(
 
 @pytest.fixture
 def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
-    """That report on a wide screen."""
+    """The report on a wide screen."""
     return open_report(report)
 
 
 def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
-    """Boxes are in causal order, each with its state as a word and the time of its first channel; a replay
-    lights up the boxes reached so far.
+    """Boxes are in causal order, each with its state as a word and the time of its first channel.
+
+    A replay highlights the boxes reached so far.
     """
     opened.choose("kind", "sensor/lane")
     opened.page.click("#grid tr[data-at] >> nth=0")
@@ -100,7 +101,7 @@ def test_an_experiment_opens_with_its_path(opened: "Page") -> None:
 
 
 def test_a_held_fault_says_where(opened: "Page") -> None:
-    """A masked fault names the component that stopped it; one that was never active says so."""
+    """A masked fault names the component that stopped it. A fault that was never activated says so."""
     opened.choose("kind", "sensor/distance")
     opened.page.click("#grid tr[data-at] >> nth=0")
     opened.page.wait_for_selector(".path-box.is-held")
@@ -111,9 +112,9 @@ def test_a_held_fault_says_where(opened: "Page") -> None:
 
 
 def test_the_control_structure_counts_and_filters(opened: "Page") -> None:
-    """A link shows the share that got through, of all faults or of the chosen type.
+    """Each link shows the share of faults that passed, for all faults or for the chosen type.
 
-    A link leads to the experiments that got through, a box to those that it stopped; a table has the same
+    A link leads to the experiments that passed, and a box to those that it stopped. A table has the same
     numbers.
     """
     count = "#ways [data-link='commands'] .count"

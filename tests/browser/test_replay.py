@@ -1,4 +1,4 @@
-"""The replay of an experiment: what it shows at a time, and how to change the time."""
+"""The replay of an experiment: what it shows at a time and how the user changes the time."""
 
 import math
 from collections.abc import Iterator
@@ -72,7 +72,7 @@ T = "Number(document.querySelector('.replay-player').dataset.t)"
 
 
 class Replayed:
-    """A replay alone in a page."""
+    """A page with only a replay."""
 
     def __init__(self, page: Any) -> None:
         self.page = page
@@ -87,7 +87,7 @@ class Replayed:
         return float(self.page.evaluate(T))
 
     def settle(self) -> None:
-        """Wait until everything due is drawn."""
+        """Wait until the page has drawn everything that is due."""
         frames = "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
         self.page.evaluate(frames)
 
@@ -101,11 +101,11 @@ class Replayed:
         return str(self.page.inner_text(selector))
 
     def texts(self, selector: str) -> list[str]:
-        """The texts of all selected elements."""
+        """Return the texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def pixels(self, selector: str) -> set[tuple[int, ...]]:
-        """The opaque colours of a canvas."""
+        """Return the opaque colours of a canvas."""
         script = """(canvas) => {
             const { width, height } = canvas, copy = new OffscreenCanvas(width, height), found = new Set();
             const context = copy.getContext("2d", { willReadFrequently: true });
@@ -155,8 +155,9 @@ def test_it_waits_shortly_before_the_activation(browser: Any, replayed: Replayed
 
 
 def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
-    """An arrow moves by a sample, with Shift by a second; End goes to the end of the drive; the page's events
-    follow.
+    """An arrow key moves by a sample, or by a second with Shift. End goes to the end of the drive.
+
+    The page's events follow.
     """
     seek(replayed, 1.0)
     replayed.press("ArrowRight")
@@ -173,7 +174,10 @@ def test_keys_step_and_go_to_the_ends(replayed: Replayed) -> None:
 
 
 def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replayed) -> None:
-    """A drag to the middle is half of the run, a mark's button jumps to it, and the bar shows the state."""
+    """A drag to the middle shows half of the run, and a mark's button jumps to the mark.
+
+    The bar shows the state.
+    """
     bar = replayed.page.locator(".timebar").bounding_box()
     y = bar["y"] + bar["height"] / 2
     replayed.page.mouse.move(bar["x"] + 5, y)
@@ -190,7 +194,10 @@ def test_the_time_bar_is_dragged_and_has_a_button_for_each_mark(replayed: Replay
 
 
 def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
-    """Plots show the values at the replay's time and under the pointer, without moving there."""
+    """Plots show the values at the replay's time and under the pointer.
+
+    Moving the pointer does not change the time.
+    """
     seek(replayed, 3.0)
     at = TIMES.index(3.0)
     head = '.plot-of[data-channel="gap"] .value'
@@ -211,7 +218,10 @@ def test_values_of_plots_are_those_of_the_series(replayed: Replayed) -> None:
 def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
     replayed: Replayed, high: float, note: str | None
 ) -> None:
-    """The axis is cut off, with a note, for huge values but not for those a hundred times the usual ones."""
+    """If values are huge, the axis is cut off with a note.
+
+    Values a hundred times the usual ones are not cut off.
+    """
     values = {"golden": [2.0] * STEPS, "faulty": [3.0 if t > BEGIN else 2.0 for t in TIMES]}
     values["faulty"][50] = high
     channel = SERIES["channels"][0] | {"name": "hwt"} | values
@@ -225,7 +235,7 @@ def test_a_moment_of_huge_values_leaves_the_rest_to_be_seen(
 
 
 def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
-    """No button covers another, however many marks share a time."""
+    """No button covers another, even if many marks share a time."""
     marks = [["alert", 2.5 + i / 1000, f"alert_{i}"] for i in range(6)]
     replayed.show(FACTS, SERIES | {"marks": marks})
     script = "all => all.map((e) => { const { x, y } = e.getBoundingClientRect(); return `${x} ${y}`; })"
@@ -234,7 +244,10 @@ def test_marks_close_together_have_each_a_button(replayed: Replayed) -> None:
 
 
 def test_plots_are_chosen_and_zoomed(replayed: Replayed) -> None:
-    """An instrument switches its plot on and off; + and 0 zoom, and the bar shows the visible part."""
+    """An instrument switches its plot on and off.
+
+    The keys + and 0 zoom, and the bar shows the visible part.
+    """
     replayed.page.click(".gauge:has-text('calm')")
     assert replayed.page.locator('.plot-of[data-channel="calm"]').count() == 1
     assert replayed.page.get_attribute(".gauge:has-text('calm')", "aria-pressed") == "true"
@@ -270,7 +283,7 @@ def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
 
 
 def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) -> None:
-    """A ghost 170 m ahead, beyond the view, is still shown with its distance."""
+    """A ghost 170 m ahead, too far to be drawn, is still shown with its distance."""
     ghost = ACTOR | {"name": "believed_lead", "x": 172.0, "believed": True}
     replayed.show(FACTS | {"scene": SCENE | {"actors": [*SCENE["actors"], ghost]}})
     replayed.page.evaluate("""() => {
@@ -284,7 +297,7 @@ def test_what_the_controller_believes_is_named_out_of_sight(replayed: Replayed) 
 
 
 def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
-    """It pauses at the end of the drive and continues on request; its frame rate is shown."""
+    """The replay pauses at the end of the drive and continues on request. It shows its frame rate."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.press(" ")
@@ -301,7 +314,7 @@ def test_it_plays_and_pauses_where_the_drive_ends(replayed: Replayed) -> None:
 
 
 def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
-    """During playback the time above the plots equals that of the replay; only values update less often."""
+    """During playback, the time above the plots equals the replay's time. Only values update less often."""
     replayed.show(FACTS)
     seek(replayed, 2.2)
     replayed.page.evaluate("""() => {
@@ -319,7 +332,7 @@ def test_both_clocks_tell_one_time_in_each_picture(replayed: Replayed) -> None:
 
 
 def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
-    """The state names past events, even if their place on the road is out of sight."""
+    """The state lists past events, even if their place on the road is out of sight."""
     replayed.show(FACTS)
     seek(replayed, 2.02)
     assert replayed.texts(".states .chip") == ["fault active"]
@@ -329,7 +342,7 @@ def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
 
 
 def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) -> None:
-    """A missing scene, or one with a missing channel, leaves everything else in place."""
+    """If the scene or one of its channels is missing, instruments and plots are shown."""
     replayed.show(FACTS | {"scene": None})
     assert replayed.page.locator("canvas.scene").count() == 0
     assert replayed.page.locator(".gauge").count() == 4
@@ -350,7 +363,7 @@ def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> Non
 
 
 def test_a_replay_that_has_left_the_page_draws_no_more(replayed: Replayed) -> None:
-    """However many replays were opened before, playing or not, none requests another frame."""
+    """A replay that has left the page requests no frame, however many were opened before."""
     for _ in range(3):
         replayed.show(FACTS)
         replayed.page.click(".replay-player .play")

@@ -1,4 +1,4 @@
-"""The report's page in use."""
+"""The report page in the browser."""
 
 import csv
 import re
@@ -30,13 +30,13 @@ LOADED = """async (id) => {
 
 @pytest.fixture(scope="module")
 def rows(run: Path) -> list[dict[str, str]]:
-    """results.csv."""
+    """The rows of results.csv."""
     with (run / "results.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 
 
 def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Two facets and a search narrow the table to the matching rows of results.csv; Back undoes each step."""
+    """Two facets and a search leave the matching rows of results.csv. Back undoes each step."""
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     page.choose("outcome", "hazard")
     assert page.found == f"{len(hazards)} of {COUNT} experiments"
@@ -56,7 +56,7 @@ def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list
 
 
 def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A head sorts up, then down, then not; numbers by size, empty cells last."""
+    """A head sorts up, then down, then not at all. Numbers sort by size, and empty cells are last."""
     before = page.column("experiment_id")
     times = sorted(f"{float(row['t_activation']):.2f}" for row in rows if row["t_activation"])
     head = '#grid th[data-column="t_activation"]'
@@ -72,8 +72,9 @@ def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: l
 
 
 def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run: Path) -> None:
-    """The injected lines of its patch are shown side by side and unified; the commands contain the opened
-    folder; Back closes it.
+    """An opened experiment shows its injected lines side by side and unified.
+
+    Its commands contain the opened folder. Back closes the experiment.
     """
     page.page.click("#grid tr[data-at] >> nth=0")
     page.page.wait_for_selector("#experiment .diff")
@@ -101,8 +102,9 @@ def test_an_opened_experiment_shows_its_diff_spec_and_commands(page: "Page", run
 
 
 def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
-    """Its head shows its position among the filtered rows, the title follows, and a click in the list opens
-    another one.
+    """The experiment's head shows its position among the filtered rows, and the page's title follows.
+
+    A click in the list opens another experiment.
     """
     page.choose("outcome", "hazard")
     count, title = len(page.column("ending")), page.page.title()
@@ -131,7 +133,7 @@ def test_the_list_stays_beside_an_opened_experiment(page: "Page") -> None:
 
 
 def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[dict[str, str]]) -> None:
-    """The worst is a click away, and a link's list has as many experiments as its answer says."""
+    """One click opens the worst experiment. A link's list has as many experiments as its answer says."""
     hazards = [row for row in rows if row["outcome"] == "hazard"]
     silent = [row for row in hazards if not row["reaction_time"]]
     page.page.click(".dangerous td a >> nth=0")
@@ -145,7 +147,7 @@ def test_answers_lead_to_the_experiments_they_speak_of(page: "Page", rows: list[
 
 
 def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
-    """Without a chosen order the list starts with hazards."""
+    """If the user has chosen no order, the list starts with hazards."""
     endings = page.column("ending")
     assert endings == sorted(
         endings, key=["hazard", "crashed", "sdc", "not activated", "harness error"].index
@@ -155,7 +157,7 @@ def test_the_worst_is_the_first_of_the_list(page: "Page") -> None:
 
 
 def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
-    """A filter, value or column that these results lack is reported."""
+    """The page reports a filter, value or column in a link that these results lack."""
     page.open("alert=none")
     assert page.found == f'{COUNT} experiments. This page has no filter "alert"'
     page.open("scenario=Q")
@@ -189,8 +191,9 @@ def test_two_keys_lead_to_the_list(page: "Page") -> None:
 
 
 def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: list[dict[str, str]]) -> None:
-    """An experiment with a packed or separate series has a replay with the numbers that Python reads; one
-    without a series shows the command.
+    """A packed or separate series has a replay with the numbers that Python reads.
+
+    An experiment without a series shows the command.
     """
     series = SeriesFolder(run)
     assert series.index is not None
@@ -224,7 +227,7 @@ def test_series_are_loaded_from_beside_the_page(page: "Page", run: Path, rows: l
 def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_again(
     page: "Page", run: Path
 ) -> None:
-    """The opened experiment says what is damaged and how to restore its replay."""
+    """If a series is damaged, the opened experiment says what is damaged and how to restore its replay."""
     name = SeriesFolder(run).kept_ids()[0]
     page.page.evaluate(
         "() => { SeriesFile.load = () => Promise.reject(new Error('series/x.js is damaged')); }"
@@ -237,7 +240,10 @@ def test_a_series_that_cannot_be_read_comes_with_the_command_that_drives_it_agai
 
 
 def test_a_cell_of_the_heat_map_filters(page: "Page", rows: list[dict[str, str]]) -> None:
-    """Its text is the counts, which no filter for results changes; a second press releases it."""
+    """A cell's text is its counts, which filters for results do not change.
+
+    A second press removes the filter.
+    """
     cell = '#heat button[aria-label^="sensor/lane in B:"]'
     here = [row for row in rows if (row["fault_type"], row["scenario"]) == ("lane", "B")]
     used = [row for row in here if row["status"] != "harness_error"]
@@ -271,8 +277,9 @@ MEDIANS = """async () => {
 
 
 def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str, str]]) -> None:
-    """The map shows the median over the activated faults; medians and worst values can be chosen as well as
-    shares.
+    """The map shows the median over the activated faults.
+
+    The user can choose medians, worst values and shares.
     """
     used = [row for row in rows if row["status"] != "harness_error"]
     times = [float(row["t_activation"]) for row in used if row["t_activation"]]
@@ -282,8 +289,9 @@ def test_the_map_shows_the_median_of_a_metric(page: "Page", rows: list[dict[str,
 
 
 def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A chosen column is shown, can be sorted, and is in the address; a comparison in the search keeps the
-    matching rows.
+    """A chosen column is shown, can be sorted and is in the address.
+
+    A comparison in the search keeps the matching rows.
     """
     page.page.click("summary:has-text('Columns')")
     page.page.check(".option:has-text('max dev gas') input")
@@ -307,7 +315,7 @@ def test_columns_can_be_chosen_and_values_searched(page: "Page", rows: list[dict
 
 
 def test_a_shared_link_shows_the_same(page: "Page") -> None:
-    """The address alone restores filter, order and opened experiment."""
+    """The address restores filter, order and opened experiment."""
     page.choose("method", "guided")
     page.page.click('#grid th[data-column="scenario"] button')
     page.page.click("#grid tr[data-at] >> nth=2")
@@ -361,7 +369,7 @@ def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]])
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path, scheme: str) -> None:
-    """At 400 pixels only tables are wider than the screen; an experiment fills it."""
+    """At 400 pixels only tables are wider than the screen. An experiment fills the screen."""
     context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
     page = context.new_page()
     page.goto((run / "report" / "index.html").as_uri())
@@ -409,7 +417,7 @@ def test_axe_finds_no_serious_fault(
 
 
 def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:
-    """No column title is cut off; below the last row of a short table there is almost no space."""
+    """No column title is cut off. Below the last row of a short table there is almost no space."""
     cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
     assert page.page.eval_on_selector_all("#grid thead button", cut) == []
     page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
@@ -428,14 +436,14 @@ FIRST_ROW = "Number(document.querySelector('#grid tr[data-at]').dataset.at)"
 
 @pytest.fixture
 def scrolled(page: "Page") -> Iterator["Page"]:
-    """The table, scrolled so far that its first rows are not in the page."""
+    """The table, scrolled until its first rows are not in the page."""
     page.page.evaluate(SCROLLED)
     page.page.wait_for_function(f"{FIRST_ROW} === 2")
     yield page
 
 
 def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
-    """Paper gets every matching row, up to a stated limit, and nothing that only a screen needs."""
+    """Paper gets every matching row, up to a stated limit, and nothing that is only for screens."""
     page.page.emulate_media(media="print")
     page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert len(page.column("experiment_id")) == COUNT
@@ -460,7 +468,7 @@ def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due:
 
 
 def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
-    """Printed by the browser right after a scroll, paper has five rows, and the window keeps its position."""
+    """After a scroll, the printed page has five rows, and the window keeps its position."""
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))
@@ -472,14 +480,14 @@ def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scroll
 
 
 def rows_of(pdf: bytes) -> int:
-    """The number of rows in the tables of a tagged PDF."""
+    """Return the number of rows in the tables of a tagged PDF."""
     return len(re.findall(rb"/S\s*/TR\b", pdf))
 
 
 def test_a_target_without_alerts_has_no_column_for_them(
     page: "Page", run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the target has no alerts, neither table, filters nor map mention them, and sorting still works."""
+    """If the target has no alerts, table, filters and map do not mention them. Sorting still works."""
     other = tmp_path / "run"
     shutil.copytree(run, other, ignore=shutil.ignore_patterns("report"))
     monkeypatch.setattr(RunFolder, "has_alerts", False)

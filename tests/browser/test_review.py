@@ -1,4 +1,4 @@
-"""The review page in use."""
+"""The review page in the browser."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """The toy's five groups; one of them is approved."""
+    """A page of the toy's five groups, of which one is approved."""
     folder = tmp_path_factory.mktemp("review")
     toy = copy_toycar(folder)
     groups = of_library(toy, toy.manifest("toycar"), specs=["sensor/*"])
@@ -26,7 +26,7 @@ def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
 
 @pytest.fixture
 def open_page(browser: Any, file: Path) -> Iterator[Callable[..., Any]]:
-    """Open the page; an error in the console fails the test."""
+    """Open the page. An error in the console fails the test."""
     errors: list[str] = []
     contexts = []
 
@@ -73,7 +73,7 @@ def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[...
 
 
 def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
-    """Keys move between groups and mark them; the commands name them with shell quoting."""
+    """Keys move between groups and mark them. The commands name the marked groups with shell quoting."""
     page = open_page("q=gap")
     unfold(page)
     for key in "jajr":
@@ -92,7 +92,10 @@ def test_marks_become_commands(open_page: Callable[..., Any]) -> None:
 
 
 def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None:
-    """The first of them stands for all: one key opens the others, another marks them after a question."""
+    """The first group stands for all that are alike.
+
+    One key unfolds them, another marks all after a question.
+    """
     page = open_page("q=gap")
     assert shown(page) == 1
     assert page.inner_text("[data-do=unfold]:visible") == "1 more like this"
@@ -108,7 +111,7 @@ def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None
 
 
 def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
-    """The question states their number and states; without a yes nothing is marked."""
+    """The question states the number and the states. Without a yes, nothing is marked."""
     page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"
@@ -120,7 +123,7 @@ def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable
 
 
 def test_holes_and_values_are_there(open_page: Callable[..., Any]) -> None:
-    """The diff has its holes; a key opens the table of values, with their range above it."""
+    """The diff shows its holes. A key opens the table of values with their range above it."""
     page = open_page("q=longer")
     page.keyboard.press("j")
     assert page.locator(".group:visible mark.hole").all_inner_texts() == ["⟨by⟩"]

@@ -1,4 +1,4 @@
-"""A page reads the same numbers from series as Python, from a fixture of the format."""
+"""The page reads the same numbers from a series as Python, in a fixture of the format."""
 
 import json
 import shutil
@@ -47,7 +47,7 @@ def load(browser: Any, run: Path, name: str) -> Any:
 
 
 def as_read(run: Path, name: str) -> list[dict[str, Any]]:
-    """Channels as Python reads them, as bits, including the points between the values."""
+    """Return channels as Python reads them, as bits, including the points between the values."""
     read = SeriesFolder(run).read(name)
     assert read is not None
     golden, faulty = read
@@ -76,8 +76,9 @@ def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Pa
 
 
 def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> None:
-    """A page reads the points between values: a channel with a value at every second time, infinite values,
-    and a longer run.
+    """The page reads the points between values.
+
+    The cases are a value at every second time, infinite values and a longer run.
     """
     t = np.arange(9) / 20
     rows = [np.arange(7, dtype="<f4"), np.array([1, np.inf, -np.inf, np.nan], dtype="<f4")]
@@ -103,9 +104,7 @@ def test_a_page_has_the_points_between_the_values(browser: Any, run: Path) -> No
 
 
 def test_a_damaged_series_is_said_to_be(browser: Any, run: Path) -> None:
-    """A flipped bit in the middle of a series gives a message and no plot; an experiment without one gives
-    null.
-    """
+    """A flipped bit in a series gives a message and no plot. An experiment without a series gives null."""
     name = next(iter(json.loads((FIXTURE / "series.json").read_text())))
     for path in (run / "series").glob(f"{16 * '[0-9a-f]'}.js"):
         data = path.read_bytes()

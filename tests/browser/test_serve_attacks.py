@@ -1,4 +1,4 @@
-"""A hostile page, from another origin or in a run folder, cannot harm a server."""
+"""Hostile pages, from another origin or in a run folder, cannot attack a server."""
 
 import json
 import shutil
@@ -20,7 +20,7 @@ HACKED = "globalThis.hacked = true"
 def address(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace], serve: Callable[..., Any]
 ) -> Iterator[str]:
-    """A server of a copy of the made-up run, in runs/night."""
+    """The address of a server with a copy of the synthetic run in runs/night."""
     shutil.copytree(run, tmp_path / "runs" / "night")
     with serve(copy_toycar(tmp_path), (tmp_path / "runs",)) as found:
         yield found
@@ -40,8 +40,9 @@ def test_a_served_report_is_the_page_that_the_file_is(
 
 
 def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: Path) -> None:
-    """A tampered report, including its stamp, is shown, and none of its scripts runs: inline, as a handler,
-    in a link, from a file of the run or from elsewhere.
+    """A report with a valid stamp but foreign scripts is shown, and none of these scripts runs.
+
+    The scripts are inline, in a handler, in a link, from a file of the run and from elsewhere.
     """
     night = tmp_path / "runs" / "night"
     (night / "series/kept").mkdir(parents=True, exist_ok=True)
@@ -77,7 +78,7 @@ def test_a_hostile_report_runs_no_script(address: str, browser: Any, tmp_path: P
 
 
 def test_a_picture_of_a_run_is_no_page(address: str, browser: Any, tmp_path: Path) -> None:
-    """A plot opened directly runs no script either."""
+    """A plot that is opened directly runs no script."""
     plots = tmp_path / "runs/night/plots"
     plots.mkdir(exist_ok=True)
     (plots / "a.svg").write_text(
@@ -130,8 +131,10 @@ class _Foreign(BaseHTTPRequestHandler):
 
 
 def test_a_page_of_another_origin_reads_nothing(address: str, browser: Any, tmp_path: Path) -> None:
-    """The browser sends the cookie for the pages of another local server, but they get no response, script or
-    image, and cannot frame a page of ours.
+    """A page of another local server gets no response, script or image, although the browser sends the
+    cookie.
+
+    It also cannot frame a page of ours.
     """
     picture = tmp_path / "runs/night/plots/picture.png"
     picture.parent.mkdir(exist_ok=True)

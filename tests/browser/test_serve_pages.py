@@ -1,6 +1,4 @@
-"""The first page and the report of a server: they start the actions that otherwise need a shell, and report
-on them.
-"""
+"""The first page and the report of a server start jobs and report on them."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -17,7 +15,7 @@ Visit = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the made-up run in a folder of runs."""
+    """A folder of runs with a copy of the synthetic run."""
     runs = tmp_path_factory.mktemp("runs")
     shutil.copytree(run, runs / "night")
     return runs
@@ -27,7 +25,7 @@ def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def address(
     folder: Path, run: Path, serve: Callable[..., Any], module_patch: pytest.MonkeyPatch
 ) -> Iterator[str]:
-    """The server's address, with the library of the run, without the faults that are no mutants."""
+    """The server's address. Its library is the run's, without the faults that have no mutant."""
     module_patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds
     root = run.parent / "toy"
     with serve(Workspace(library=root / "fault_library", templates=root / "templates"), (folder,)) as found:
@@ -58,7 +56,7 @@ def test_the_first_page_leads_to_all_that_there_is(
 
 
 def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
-    """The server's message is shown next to the button."""
+    """The page shows the server's message next to the button."""
     page = visit(address)
     page.fill("[name=spec]", "no/such")
     page.click("text=Try it")
@@ -67,8 +65,9 @@ def test_a_job_that_is_refused_says_why(address: str, visit: Visit) -> None:
 
 @pytest.mark.slow
 def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visit, folder: Path) -> None:
-    """The job is shown next to the experiment and at the foot of the page, with its log, also after a reload;
-    the report then has the new plot.
+    """The job is shown next to the experiment and at the foot of the page, with its log, also after a reload.
+
+    When the job is finished, the report has the new plot.
     """
     page = visit(address, "/runs/night/report/index.html")
     page.wait_for_selector("html[data-ready]", state="attached")
@@ -88,9 +87,7 @@ def test_an_experiment_is_driven_again_from_its_report(address: str, visit: Visi
 
 @pytest.mark.slow
 def test_a_try_a_campaign_and_a_cancelled_job(address: str, visit: Visit, folder: Path) -> None:
-    """A fault is tried and its plot shown; a small campaign becomes a listed run; a waiting one is cancelled
-    and leaves no files.
-    """
+    """A try shows its plot, a small campaign becomes a listed run, and a cancelled job leaves no files."""
     page = visit(address)
     page.fill("[name=spec]", "sensor/distance")
     page.select_option("[name=variant]", "longer")

@@ -1,4 +1,4 @@
-"""A server's review page keeps marks despite other reviewers and server failures."""
+"""A server's review page keeps its marks if other reviewers write or the server fails."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -20,7 +20,7 @@ def library(
     copy_toycar: Callable[[Path], Workspace],
     give_eyes: Callable[..., None],
 ) -> Workspace:
-    """The toy's library with an image effect: six groups."""
+    """The toy's library with an image effect, which gives six groups."""
     toy = copy_toycar(tmp_path_factory.mktemp("served"))
     give_eyes(toy)
     return toy
@@ -28,14 +28,14 @@ def library(
 
 @pytest.fixture(scope="module")
 def address(library: Workspace, serve: Callable[..., Any]) -> Iterator[str]:
-    """The address that serves that library."""
+    """The address of a server of that library."""
     with serve(library) as found:
         yield found
 
 
 @pytest.fixture
 def review(address: str, library: Workspace, visit: Visit) -> Callable[..., Any]:
-    """Open the page as a reviewer; no group has a mark yet."""
+    """Open the page as a reviewer. No group has a mark yet."""
     rmtree(library.library / "reviews", ignore_errors=True)
 
     def opened(by: str, fragment: str = "", **options: Any) -> Any:
@@ -66,7 +66,7 @@ def words(page: Any, group: str) -> str:
 
 
 def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], library: Workspace) -> None:
-    """A decision, a flag and a remark, made by keys, are in the library and on the reloaded page."""
+    """A decision, a flag and a remark made by keys are in the library and on the reloaded page."""
     page = review("Jane <b>Doe</b>")
     for key in "jjaf":
         page.keyboard.press(key)
@@ -91,7 +91,7 @@ def test_marks_are_kept_and_found_after_a_reload(review: Callable[..., Any], lib
 
 
 def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], library: Workspace) -> None:
-    """The same key again, or `u`, removes the mark."""
+    """The same key again, or `u`, removes a mark."""
     page = review("Jane")
     page.keyboard.press("j")
     for key in "rffu":
@@ -103,7 +103,7 @@ def test_a_decision_and_a_flag_are_taken_back(review: Callable[..., Any], librar
 
 
 def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Workspace) -> None:
-    """The name is asked for first."""
+    """The page asks for a name before the first decision."""
     page = review("")
     page.keyboard.press("j")
     page.keyboard.press("a")
@@ -114,7 +114,10 @@ def test_nobody_decides_without_a_name(review: Callable[..., Any], library: Work
 def test_two_reviewers_do_not_overwrite_each_other_unseen(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """The second reviewer sees what the first one did and decides again; the first one sees the result."""
+    """The second reviewer sees the first one's decision and decides again.
+
+    The first reviewer sees the result.
+    """
     first, second = review("Jane"), review("Jim")
     for page in (first, second):
         page.keyboard.press("j")
@@ -131,7 +134,7 @@ def test_two_reviewers_do_not_overwrite_each_other_unseen(
 
 
 def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], library: Workspace) -> None:
-    """A remark overwrites nothing, so no second look is needed."""
+    """Remarks of two reviewers are both kept without a second look, because no remark overwrites another."""
     pages = [review(name) for name in ("Jane", "Jim")]
     for page in pages:
         page.keyboard.press("j")
@@ -143,7 +146,7 @@ def test_remarks_of_two_reviewers_are_both_kept(review: Callable[..., Any], libr
 
 
 def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any], library: Workspace) -> None:
-    """One question states number and states; then exactly these are approved."""
+    """One question states number and states. After a yes, exactly these groups are approved."""
     page = review("Jane", "q=gap")
     page.keyboard.press("Shift+A")
     assert page.inner_text("#ask-title") == "Approve 2 groups?"
@@ -154,7 +157,7 @@ def test_all_that_a_filter_shows_are_approved_at_once(review: Callable[..., Any]
 
 
 def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
-    """It shows frames before the effect and at three levels, each with its value, and they load."""
+    """An image effect shows the frame before it and at three levels, each with its value."""
     page = review("Jane", "q=light")
     page.wait_for_selector(".pictures figure:nth-child(4)")
     pictures = page.locator(".pictures img")
@@ -173,8 +176,9 @@ def test_an_image_effect_has_pictures(review: Callable[..., Any]) -> None:
 def test_what_changed_since_an_approval_is_shown_as_a_diff(
     review: Callable[..., Any], library: Workspace
 ) -> None:
-    """A changed line of an effect makes its approval stale, also in an open page; the card shows the old and
-    the new line.
+    """A changed line makes an effect's approval stale, also in an open page.
+
+    The card shows old and new line.
     """
     page = review("Jane", "q=light")
     page.keyboard.press("j")
@@ -202,7 +206,7 @@ def test_what_changed_since_an_approval_is_shown_as_a_diff(
 def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
-    """An approval that never reached a server does not become one of later code after a reload."""
+    """An approval that did not reach the server is not applied to later code after a reload."""
     rmtree(library.library / "reviews", ignore_errors=True)
     lens = library.library.parent / "tree/toycar/lens.py"
     text = lens.read_text()
@@ -230,9 +234,7 @@ def test_a_mark_that_waited_is_about_the_diff_that_was_shown(
 def test_marks_outlive_a_server_that_is_gone(
     library: Workspace, serve: Callable[..., Any], visit: Visit
 ) -> None:
-    """Marks wait in the tab, also through a reload if the page is still available, and go to the
-    next server.
-    """
+    """Marks wait in the tab and go to the next server, also after a reload if the page is still available."""
     rmtree(library.library / "reviews", ignore_errors=True)
     with serve(library, token="first") as address:
         page = visit(address, ADDRESS)
@@ -257,8 +259,9 @@ def test_marks_outlive_a_server_that_is_gone(
 def test_everyone_can_use_it_on_any_screen(
     review: Callable[..., Any], serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """With decisions, a flag, a remark and images, axe finds no serious fault in light and dark, and a narrow
-    screen does not scroll sideways.
+    """With decisions, a flag, a remark and images, axe-core finds no serious fault in light and dark.
+
+    A narrow screen does not scroll sideways.
     """
     page = review("Jane")
     for key in "jajrjf":

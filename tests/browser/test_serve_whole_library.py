@@ -1,4 +1,4 @@
-"""The shipped library, reviewed in the browser: twenty groups, with a server that is killed in between."""
+"""A reviewer marks twenty groups of the shipped library in the browser while the server is killed."""
 
 import shutil
 import signal
@@ -35,7 +35,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def serving(root: Path, port: int = 0) -> Iterator[tuple[subprocess.Popen[str], str]]:
-    """The server command: its process, and the address that it prints."""
+    """Start the server command and return its process and the address that it prints."""
     words = ["serve", str(root / "runs"), "--root", str(root), "--no-browser", "--port", str(port)]
     process = subprocess.Popen([sys.executable, "-m", "mutator", *words], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
@@ -57,7 +57,7 @@ def opened(context: Any, address: str) -> Any:
 
 
 def marked(page: Any, count: int) -> dict[str, str]:
-    """Mark the next groups by keys: group -> keys."""
+    """Mark the next groups by keys and return group -> keys."""
     made = {}
     for at in range(count):
         page.keyboard.press("j")
@@ -69,15 +69,16 @@ def marked(page: Any, count: int) -> dict[str, str]:
 
 
 def shown(page: Any, group: str) -> str:
-    """The marks that the page shows for a group, as keys."""
+    """Return the marks that the page shows for a group, as keys."""
     pressed = f"#group-{group} .head [data-mark][aria-pressed=true]"
     kinds = page.eval_on_selector_all(pressed, "all => all.map((button) => button.dataset.mark)")
     return "".join(kind[0] for kind in kinds)
 
 
 def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Path) -> None:
-    """Ten marks, a reload, a kill during five more, five after the restart: all twenty are in the page and in
-    the library.
+    """Twenty marks survive a reload and a killed server, in the page and in the library.
+
+    Ten come before the reload, five during the kill and five after the restart.
     """
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
@@ -111,7 +112,7 @@ def test_twenty_groups_outlive_reloads_and_killed_servers(browser: Any, root: Pa
 
 
 def test_an_effect_on_a_picture_of_the_road_is_seen(browser: Any, root: Path) -> None:
-    """The effect is shown on a camera frame of the road, before and at three levels."""
+    """The page shows the effect on a camera frame of the road, before it and at three levels."""
     context = browser.new_context(reduced_motion="reduce")
     context.set_default_timeout(90_000)
     with serving(root) as (_, address):

@@ -1,4 +1,4 @@
-"""The documentation site, built strictly and opened from its files in Chromium."""
+"""The documentation site, built with warnings as errors and opened from its files in Chromium."""
 
 import subprocess
 import sys
@@ -52,7 +52,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def visited(browser: Any) -> Iterator[Any]:
-    """A page that fails the test on a console error, a failed request or a request to the network."""
+    """A page that fails the test on a console error, a failed request or a network request."""
     context = browser.new_context(reduced_motion="reduce")
     page, wrong = context.new_page(), []
     page.on("console", lambda m: wrong.append(m.text) if m.type in ("error", "warning") else None)
@@ -101,7 +101,7 @@ def test_pages_are_accessible(
 
 
 def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
-    """For each word the page that answers it is among the first results."""
+    """For each word that newcomers type, the page that answers it is among the first results."""
     missed = {}
     for words, page in FOUND.items():
         visited.goto(f"{(site / 'search.html').as_uri()}?q={words}")
@@ -114,7 +114,10 @@ def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
 
 
 def test_a_console_block_is_copied_without_prompts_and_output(site: Path, visited: Any) -> None:
-    """The copy button takes only the commands of a console block, and the whole of any other block."""
+    """The button of a console block copies only its commands.
+
+    The button of any other block copies all of it.
+    """
     visited.context.grant_permissions(["clipboard-read", "clipboard-write"])
     visited.goto((site / "docs" / "tutorial" / "first-campaign.html").as_uri())
     copied = []

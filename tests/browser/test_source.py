@@ -1,4 +1,4 @@
-"""The source view of a run with operators' mutants in the report's page: marks lead to experiments."""
+"""The source view of a run with mutation operators: marks lead to experiments."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "hazards": (("H3", 4.0),), "t_manifest": 2.
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Permanent mutants do harm, transient ones are masked."""
+    """Return the effects: permanent mutants do harm, transient ones are masked."""
     return HAZARD if experiment.trigger.name == "always" else {}
 
 
@@ -30,7 +30,7 @@ def report(
     write_run: Callable[..., Path],
     of_operators: Callable[..., Any],
 ) -> Path:
-    """The report of made-up records of mutants of the toy's driver."""
+    """The report of synthetic records of mutants in the toy's driver."""
     folder = tmp_path_factory.mktemp("source")
     workspace = copy_toycar(folder)
     out = write_run(workspace, folder / "run", became, changed=of_operators(workspace, "toycar/driver.py"))
@@ -44,8 +44,9 @@ def report(
 def test_a_mark_lists_the_experiments_that_it_counts(
     report: Path, open_report: "Callable[[Path], Page]", serious_faults: Callable[[Any], list[str]]
 ) -> None:
-    """With the keyboard, the list shows a line's permanent or transient experiments or, by the line's number,
-    both; colours and roles are accessible.
+    """A mark lists the line's permanent or transient experiments, and the line's number lists both.
+
+    The keyboard works, and colours and roles are accessible.
     """
     page = open_report(report)
     assert serious_faults(page.page) == []
@@ -65,7 +66,7 @@ def test_a_mark_lists_the_experiments_that_it_counts(
 
 
 def test_the_source_fits_a_narrow_screen(report: Path, open_report: "Callable[[Path], Page]") -> None:
-    """Long lines scroll in their own box, in the dark theme, too; the page is no wider than the screen."""
+    """Long lines scroll in their own box, also in the dark theme. The page is no wider than the screen."""
     page = open_report(report).page
     page.set_viewport_size({"width": 390, "height": 800})
     page.emulate_media(color_scheme="dark")

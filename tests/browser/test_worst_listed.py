@@ -1,4 +1,4 @@
-"""The page of a run with more experiments than it lists shows the worst, and its counts cover all."""
+"""The page of a run with more experiments than it lists shows the worst ones and counts all."""
 
 import shutil
 from collections.abc import Callable
@@ -18,7 +18,7 @@ LISTED = 10
 
 @pytest.fixture
 def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The run of the other tests; its page lists ten of the 24 experiments."""
+    """The run of the other tests with a page that lists ten of the 24 experiments."""
     shutil.copytree(run, tmp_path / "run")
     monkeypatch.setattr(browse, "LISTED", LISTED)
     monkeypatch.setattr(figures, "drawings", lambda frame: ())
@@ -29,8 +29,10 @@ def large(run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_worst_are_listed_and_the_map_counts_all(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
-    """The page says how many it lists and how to see the others; its list is the start of the whole one, and
-    its map and tiles equal the whole one's in every measure.
+    """The page says how many experiments it lists and how to see the others.
+
+    Its list is the start of the whole list. In every measure, its map and tiles equal those of the whole
+    page.
     """
     whole, page = open_report(run), open_report(large)
     assert page.found == "10 experiments listed, the worst of 24"
@@ -52,7 +54,7 @@ def test_the_worst_are_listed_and_the_map_counts_all(
 def test_an_experiment_that_is_not_listed_is_told(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
-    """A link to an unlisted experiment shows the command that prints it."""
+    """A link to an experiment that is not listed shows the command that prints it."""
     ids = open_report(run).page.evaluate(
         "Packed.read('table').then((t) => t.columns.find((c) => c.name === 'experiment_id').texts)"
     )

@@ -1,4 +1,4 @@
-"""The harness serves any controller, so it contains no names of one."""
+"""The harness serves any controller, so it contains no car names."""
 
 import ast
 import re
@@ -20,7 +20,7 @@ HEADINGS = re.compile(r"\"h[123]\"|\bh[123](?=[ ,:{])")  # in scripts and style 
 
 
 def words(tree: ast.AST) -> Iterator[tuple[int, str]]:
-    """Line and text of each identifier and string."""
+    """Return line and text of each identifier and string."""
     for node in ast.walk(tree):
         line = getattr(node, "lineno", 0)
         for field in ("id", "attr", "arg", "name", "asname", "module", "value"):

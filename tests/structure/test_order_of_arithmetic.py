@@ -52,7 +52,7 @@ EXACT = {  # whole numbers, and sums that a double holds exactly, where order do
 
 
 def found(source: str) -> Iterator[str]:
-    """Expressions with an order or last digits that depend on Python or the processor."""
+    """Return expressions whose order or last digits depend on Python or the processor."""
     for node in ast.walk(ast.parse(source)):
         is_product = isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.MatMult)
         by_name = isinstance(node, ast.ImportFrom) and node.module in {"numpy", "numpy.linalg"}

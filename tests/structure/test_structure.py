@@ -21,7 +21,7 @@ def modules(root: Path) -> Iterator[Path]:
 
 
 def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
-    """(imported module, whether inside a function) of a module, including imports under TYPE_CHECKING."""
+    """Return (imported module, whether inside a function) pairs, including imports under TYPE_CHECKING."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     inside = {node for function in functions for node in ast.walk(function)}
@@ -36,7 +36,7 @@ def imports(path: Path, root: Path) -> Iterator[tuple[str, bool]]:
 
 
 def source(name: str, root: Path) -> Path | None:
-    """File of a module of the harness."""
+    """Return the file of a module of the harness."""
     base = root / name.replace(".", "/")
     return next((p for p in (base.with_suffix(".py"), base / "__init__.py") if p.is_file()), None)
 
@@ -46,7 +46,7 @@ def top_modules(root: Path) -> list[str]:
 
 
 def hidden_imports(root: Path) -> list[str]:
-    """Disallowed imports of the harness inside functions."""
+    """Return disallowed imports of the harness inside functions."""
     return [
         f"{path.relative_to(root)}: {name}"
         for path in modules(root)
@@ -58,7 +58,7 @@ def hidden_imports(root: Path) -> list[str]:
 
 
 def cycle(root: Path) -> list[str]:
-    """The modules of an import cycle; empty if there is none."""
+    """Return the modules of an import cycle, or nothing if there is none."""
     edges: dict[str, set[str]] = {str(path.relative_to(root)): set() for path in modules(root)}
     for path in modules(root):
         for name, _ in imports(path, root):
@@ -86,7 +86,7 @@ def strangers_in_target(root: Path) -> list[str]:
 
 
 def namesakes(root: Path) -> list[str]:
-    """Modules that define a function or class with the module's name."""
+    """Return modules that define a function or class with the module's name."""
     return [
         str(path.relative_to(root))
         for path in modules(root)
@@ -110,7 +110,7 @@ def is_clean(root: Path) -> bool:
 
 
 def test_contracts_hold() -> None:
-    """Packages import in one direction, without cycles, and harness and target do not import each other."""
+    """Packages import in one direction, without cycles. Harness and target do not import each other."""
     done = lint(CLONE)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -132,12 +132,12 @@ def test_what_runs_inside_a_target_needs_little() -> None:
 
 
 def test_no_function_bears_its_modules_name() -> None:
-    """`package.name` is either a module or a function, so nobody imports one for the other."""
+    """No function has its module's name, so `package.name` has one meaning."""
     assert not namesakes(CLONE)
 
 
 def test_every_package_says_what_it_is_for() -> None:
-    """The docstring of a package says what lives there, and what never does."""
+    """The docstring of each package says what belongs there and what does not."""
     for path in (CLONE / "mutator").rglob("__init__.py"):
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
         assert text and len(text) > 60, path
