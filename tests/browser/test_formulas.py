@@ -50,7 +50,7 @@ def values() -> dict[str, np.ndarray]:
 
 
 def test_python_and_the_page_agree_on_formulas(browser: Any, values: dict[str, np.ndarray]) -> None:
-    """Many formulas and conditions have the same value in both, with infinite and missing inputs, too."""
+    """Python and the page compute equal values, also for infinite and missing inputs."""
     rng = random.Random(18)
     formulas = [check_formula(formula(rng), NAMES, over_time=True) for _ in range(COUNT)]
     conditions = [check_condition(condition(rng), variables=NAMES, over_time=True) for _ in range(COUNT)]

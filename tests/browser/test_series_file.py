@@ -64,7 +64,7 @@ def as_read(run: Path, name: str) -> list[dict[str, Any]]:
 
 
 def test_a_page_and_python_read_the_numbers_of_the_fixture(browser: Any, run: Path) -> None:
-    """Packed or in a separate file, the numbers are bit for bit those recorded with the fixture."""
+    """From a packed or separate series, Python and the page read the fixture's recorded bits."""
     expected = json.loads((FIXTURE / "series.json").read_text())
     for name, known in expected.items():
         told = [{key: one[key] for key in ("name", "t", "golden", "faulty")} for one in known["channels"]]

@@ -29,9 +29,7 @@ def address(
 def test_a_served_report_is_the_page_that_the_file_is(
     address: str, visit: Callable[..., Any], run: Path, tmp_path: Path
 ) -> None:
-    """The server's policy allows the report's scripts, styles and series: an experiment with series opens
-    with its replay.
-    """
+    """The server's policy allows the report's scripts, styles and series, so its replay works."""
     series = json.loads((tmp_path / "runs/night/plan/experiments.jsonl").read_text().splitlines()[1])
     page = visit(address, f"/runs/night/report/index.html#e={series['id']}")
     page.wait_for_selector("html[data-ready]", state="attached")

@@ -17,7 +17,7 @@ TOY = Path(__file__).parents[1] / "toy"
 
 @dataclass(frozen=True)
 class Answer:
-    """The output and exit code of a command."""
+    """A command's output and exit code."""
 
     code: int
     out: str
@@ -63,7 +63,7 @@ def root(toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kept_c
 
 @pytest.fixture
 def nowhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty current folder, with no library in the environment."""
+    """An empty current folder. The environment names no library."""
     for name in ("ROOT", "LIBRARY", "TEMPLATES", "TARGET"):
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     monkeypatch.chdir(tmp_path)

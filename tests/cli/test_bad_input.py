@@ -1,4 +1,4 @@
-"""How the command line answers mistakes in specs, templates and run folders."""
+"""The command line's errors for mistakes in specs, templates and run folders."""
 
 import json
 import re
@@ -32,7 +32,7 @@ variants:
 
 @pytest.fixture
 def own(root: Path) -> Path:
-    """A valid spec of the user."""
+    """A valid spec that the user wrote."""
     own = Path("own.yaml")
     own.write_text(SPEC)
     return own
@@ -66,7 +66,7 @@ def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
 def test_a_mistake_in_a_spec_is_told_with_its_place(
     cli: Cli, own: Path, right: str, wrong: str, line: int, said: str
 ) -> None:
-    """The error gives file, line, finding and remedy; exit code 2, no traceback."""
+    """The error gives file, line, finding and remedy. The exit code is 2, and there is no traceback."""
     assert right in SPEC
     own.write_text(SPEC.replace(right, wrong))
     answer = cli("diff", own)
@@ -98,7 +98,7 @@ def test_a_template_that_does_not_parse_is_told_with_its_place(cli: Cli, own: Pa
 
 
 def test_a_mutant_that_does_not_compile_is_the_users_to_mend(cli: Cli, own: Path, root: Path) -> None:
-    """`try` says what does not compile, runs nothing, and exits with 2."""
+    """`try` says what does not compile, runs nothing and exits with 2."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = = {{ by }}\n")
     answer = cli("try", own, "-s", "A")
@@ -134,7 +134,7 @@ def test_a_mistake_on_the_command_line_is_told(
 
 
 def test_an_injected_line_that_raises_is_named(cli: Cli, own: Path, root: Path) -> None:
-    """An exception in injected code makes the mutant invalid: its line is shown, and the command succeeds."""
+    """If injected code raises, the mutant is invalid and its line is shown. The command succeeds."""
     template = root / "templates" / "offset.py.j2"
     template.write_text("if _fi.active('{{ fi }}'):\n    {{ target }} = [][int({{ by }})]\n")
     answer = cli("try", own, "-s", "A")
@@ -186,7 +186,7 @@ def test_the_command_line_names_its_options(
 
 
 def test_two_targets_are_told_apart_by_an_option(cli: Cli, own: Path, root: Path) -> None:
-    """The API's argument `target` becomes --manifest, since --target is the controller's source."""
+    """The API's argument `target` is the option --manifest, because --target is the controller's source."""
     targets = root / "fault_library" / "targets"
     (targets / "other.yaml").write_text((targets / "toycar.yaml").read_text())
     answer = cli("diff", "own.yaml")

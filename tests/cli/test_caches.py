@@ -1,4 +1,4 @@
-"""`mutator cache`."""
+"""The `cache` command lists and deletes cached files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -24,8 +24,9 @@ def filled() -> Path:
 
 
 def test_the_cache_is_listed(cli: Cli, filled: Path) -> None:
-    """The list shows what is cached, how many files, their size and location; JSON holds the same; no library
-    is needed.
+    """The list shows the cached files' kinds, number, size and location.
+
+    JSON has the same. No library is needed.
     """
     answer = cli("cache")
     assert answer.code == 0, answer.err
@@ -51,7 +52,7 @@ def test_the_path_alone(cli: Cli) -> None:
     [(("--max", "25kB"), 2), (("--max", "0"), 0), (("--max", "2 GB"), 3), (("--clear",), 0)],
 )
 def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, ...], left: int) -> None:
-    """--max deletes down to a size, --clear deletes everything; both report how much they deleted."""
+    """--max deletes files down to a size, and --clear deletes all. Both report how much they deleted."""
     answer = cli("cache", *words, "--json")
     assert (answer.code, len(answer.json["kept"]), len(answer.json["deleted"])) == (0, left, 3 - left)
     assert len(list(filled.iterdir())) == left
@@ -70,7 +71,7 @@ def test_what_is_too_much_is_deleted(cli: Cli, filled: Path, words: tuple[str, .
 def test_what_makes_no_sense_deletes_nothing(
     cli: Cli, filled: Path, words: tuple[str, ...], said: str
 ) -> None:
-    """An invalid size, or two options at once, is wrong input and deletes nothing."""
+    """An invalid size, or both options at once, is wrong input and deletes nothing."""
     answer = cli("cache", *words)
     assert answer.code == 2 and said in answer.err
     assert len(list(filled.iterdir())) == 3

@@ -40,7 +40,7 @@ def mutator(root: Path, *words: object) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess.CompletedProcess[str]]:
-    """A root with runs/first, a finished run of twelve experiments, and the output of its command."""
+    """A root with runs/first, a finished run of twelve experiments, and the output of the command."""
     root = tmp_path_factory.mktemp("finished") / "toy"
     shutil.copytree(TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates", "hostile"))
     shutil.copytree(TESTS.parent / "templates", root / "templates")
@@ -51,7 +51,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess
 
 @pytest.fixture
 def run(finished: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The finished run's folder; its root is the current folder."""
+    """The finished run's folder. Its root is the current folder."""
     root, _ = finished
     monkeypatch.chdir(root)
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
@@ -63,7 +63,7 @@ def results(run: Path) -> list[str]:
 
 
 def experiment_with(run: Path, word: str) -> str:
-    """The id of the first experiment with `word` in its row."""
+    """Return the id of the first experiment with `word` in its row."""
     return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
 
 
@@ -80,7 +80,7 @@ def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
 
 
 def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without -n, `plan` expects and `run` starts as many workers as there are usable cores."""
+    """Without -n, `plan` expects and `run` starts one worker for each usable core."""
     monkeypatch.setattr(campaigns, "usable_cores", lambda: 3)
     started: list[int] = []
 
@@ -99,7 +99,7 @@ def test_a_run_has_a_worker_for_each_core(cli: Cli, root: Path, monkeypatch: pyt
 
 @pytest.mark.parametrize("engine", ["reference", "warm", "fork"])
 def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: str) -> None:
-    """A fault that would make a module's name local is refused with file and line, before any run."""
+    """A fault that would make a module's name local is refused with file and line before any run."""
     driver = root / "tree" / "toycar" / "driver.py"
     driver.write_text("HEADWAY_S = 1.5\n" + driver.read_text().replace("1.5 * speed", "HEADWAY_S * speed"))
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
@@ -114,7 +114,7 @@ def test_a_fault_that_hides_a_name_drives_nothing(cli: Cli, root: Path, engine: 
 
 
 def test_a_plan_is_the_same_each_time(cli: Cli, root: Path) -> None:
-    """The same campaign and seed give the same digest; another seed gives another one."""
+    """The same campaign and seed give the same digest. Another seed gives another digest."""
     one, two = (cli("plan", "toy", "--out", out, "--json").json for out in "ab")
     other = cli("plan", "toy", "--out", "c", "--seed", "8", "--json").json
     assert one["digest"] == two["digest"] != other["digest"]
@@ -167,7 +167,7 @@ def test_a_finished_run_is_not_run_again(cli: Cli, run: Path) -> None:
 
 
 def test_run_as_json(cli: Cli, run: Path) -> None:
-    """With --json, standard output holds numbers and paths, and nothing else."""
+    """With --json, standard output holds only numbers and paths."""
     answer = cli("run", "toy", "--out", run, *CHOSEN, "-n", "0", "--json").json
     assert (answer["planned"], answer["done"], answer["ran"]) == (12, 12, 0)
     assert sum(answer["outcomes"].values()) == 12
@@ -182,16 +182,16 @@ def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
 
 
 def wait_for(folder: Path, files: str) -> None:
-    """Wait at most a minute for such files in the folder."""
+    """Wait at most a minute until the folder contains files that match."""
     deadline = time.monotonic() + 60
     while not any(folder.glob(files)) and time.monotonic() < deadline:
         time.sleep(0.05)
 
 
 def test_an_interrupted_run_says_how_to_go_on(cli: Cli, root: Path) -> None:
-    """Ctrl-C exits with 130 and prints progress and the command that resumes; that command completes the run.
+    """Ctrl-C exits with 130 and prints the progress and the command that resumes the run.
 
-    While a command runs, a second one in the same folder is refused.
+    That command completes the run. While a command runs, a second one in the same folder is refused.
     """
     words = ["run", "toy", "--out", "runs/cut", "-n", "0", "--limit", "6"]
     command = [sys.executable, "-m", "mutator", *words]
@@ -240,7 +240,10 @@ def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_pa
 
 
 def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """The report is written with the failure on top; the command exits with 1 and names the experiment."""
+    """If the proof failed, the report shows the failure at the top.
+
+    The command exits with 1 and names the experiment.
+    """
     run = Path(shutil.copytree(run, tmp_path / "run"))
     shutil.copytree(run / "records", run / "proof", dirs_exist_ok=True)
     path = next(path for path in sorted((run / "proof").iterdir()) if len(path.read_text().splitlines()) > 1)
@@ -257,7 +260,7 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
 
 
 def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
-    """A report is written even where no library is found; a library that is named must exist."""
+    """A report is written without a library, but a library that the user names must exist."""
     assert cli("report", run).code == 0
     assert cli("report", run, "--root", root).code == 0
     answer = cli("report", run, "--root", nowhere / "none")
@@ -275,7 +278,7 @@ def test_the_page_needs_nothing_from_elsewhere(run: Path) -> None:
 
 
 def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
-    """`show` prints diff, times and verdict and says where it drew the plot; the page can also draw one."""
+    """`show` prints diff, times and verdict and the path of its plot. The page can also draw one."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
@@ -289,7 +292,7 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
 
 
 def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None:
-    """Hazards come first; a filter over the results leaves out the rest."""
+    """Hazards come first. A filter leaves out the results that do not match."""
     listed = cli("show", "--json").json
     endings = [line["ending"] for line in listed["worst"]]
     assert endings == sorted(endings, key=lambda ending: ending != "hazard")
@@ -305,7 +308,7 @@ def test_show_without_an_experiment_lists_the_worst(cli: Cli, run: Path) -> None
 
 
 def test_show_takes_the_start_of_an_id(cli: Cli, run: Path) -> None:
-    """Any unique start of an id is enough; the newest run is used unless one is named."""
+    """Any unique start of an id works. Without a named run, the newest one is used."""
     name = experiment_with(run, "hazard")
     answer = cli("show", name[:8], "--json", "--no-plot").json
     assert answer["experiment"] == name
@@ -325,7 +328,7 @@ def test_an_experiment_that_is_not_one_is_answered(cli: Cli, run: Path, name: st
 
 
 def test_show_before_the_run(cli: Cli, root: Path) -> None:
-    """`show` accepts a planned experiment, says that it has not run, and how to run it."""
+    """`show` accepts a planned experiment and says that it has not run and how to run it."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     name = results_id(Path("runs/p/plan.csv"))
     answer = cli("show", name)
@@ -339,7 +342,7 @@ def results_id(table: Path) -> str:
 
 
 def test_rerun_gives_the_same_again(cli: Cli, run: Path) -> None:
-    """A rerun reproduces the record; without --trace it leaves no files behind."""
+    """A rerun reproduces the record. Without --trace it leaves no files."""
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name)
     assert answer.code == 0
@@ -357,7 +360,7 @@ def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
 
 
 def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: Reseal) -> None:
-    """A rerun that differs from the record is a failed check."""
+    """If a rerun differs from the record, the check fails."""
     copy = tmp_path / "copy"
     shutil.copytree(run, copy)
     name = experiment_with(run, "hazard")
@@ -374,7 +377,7 @@ def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: R
 
 
 def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
-    """`clean` deletes a run folder only after a yes, and never any other folder."""
+    """`clean` deletes a run folder only after a yes, and never deletes any other folder."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     Path("mine").mkdir()
     assert cli("clean", "mine", "--yes").code == 2
@@ -389,7 +392,7 @@ KNOWN = {pattern.partition("/")[0] for pattern in CONTENT}  # names in a run fol
 
 
 def test_clean_knows_all_that_a_run_writes(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """After every command that writes into a run folder, `clean` deletes it; it refuses a link."""
+    """After every command that writes into a run folder, `clean` deletes the folder. It refuses a link."""
     copy, other = tmp_path / "copy", tmp_path / "other"
     for folder in (copy, other):
         shutil.copytree(run, folder)

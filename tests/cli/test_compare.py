@@ -16,7 +16,7 @@ Write = Callable[..., Path]
 
 
 def worse(e: Experiment) -> dict[str, Any]:
-    """One fault becomes hazardous, the rest stays the same."""
+    """Return runs in which one fault becomes hazardous and the rest stays the same."""
     hazard = {"outcome": Outcome.HAZARD, "hazards": (("H1", 3.0),)}
     return hazard if e.fault.fault_type == "silence" and e.scenario == "A" else {}
 
@@ -39,9 +39,7 @@ def test_compare_tells_and_writes(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> None:
-    """Before any table, one remark says that one run has fewer experiments by choice; the page has
-    it, too.
-    """
+    """One remark before any table says that one run has fewer experiments by choice. The page has it, too."""
     workspace = Workspace.find(root)
     runs = write_run(workspace, Path("whole")), write_run(workspace, Path("part"), limit=6)
     said = "The runs are different parts of a campaign: whole has all of it, part has --limit 6."
@@ -58,7 +56,7 @@ def test_unlike_parts_are_told_first(cli: Cli, root: Path, write_run: Write) -> 
 def test_alerts_of_fault_free_runs_are_named(
     cli: Cli, runs: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The terminal, the page and the Markdown name alerts of fault-free runs of either side."""
+    """Terminal, page and Markdown name the alerts of fault-free runs of either side."""
     note = "Not every alert is caused by a fault: fault-free runs raise fcw in A."
     monkeypatch.setattr(mutator.Run, "alerts_note", lambda run: note if run.path.name == "after" else "")
     answer = cli("compare", *runs, "--out", "c")
@@ -73,7 +71,10 @@ def test_alerts_of_fault_free_runs_are_named(
 
 
 def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """With --fail-on, a new hazard is named and exits with 1; in the other direction the gate passes."""
+    """With --fail-on, a new hazard is named and the exit code is 1.
+
+    In the other direction the gate passes.
+    """
     failed = cli("compare", *runs, "--out", "c", "--fail-on", "new-hazard,unmatched")
     assert failed.code == 1
     assert "new-hazard: sensor/silence/no_data, A, guided" in failed.err
@@ -90,7 +91,7 @@ def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run: Write) -> None:
-    """A gate with missing results exits with 3, because a regression cannot be ruled out."""
+    """If results are missing, the gate exits with 3, because it cannot rule out a regression."""
     workspace = Workspace.find(root)
     whole = write_run(workspace, Path("whole"), campaign="small")
     part = write_run(
@@ -114,7 +115,7 @@ def test_a_gate_does_not_pass_what_has_no_result(cli: Cli, root: Path, write_run
     ],
 )
 def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: str) -> None:
-    """An unknown kind or filter is wrong input; the error lists the known ones."""
+    """An unknown kind or filter is wrong input. The error lists the known ones."""
     answer = cli("compare", *runs, *words)
     assert answer.code == 2
     assert told in answer.err
@@ -122,7 +123,7 @@ def test_wrong_input(cli: Cli, runs: tuple[Path, Path], words: list[str], told: 
 
 
 def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """Each format is written to the given path, by default into the run folder."""
+    """Each format is written to the given path, or into the run folder if no path is given."""
     _, after = runs
     answer = cli("export", after, "--format", "mutation-elements", "--out", "m.json")
     assert answer.code == 0, answer.err
@@ -142,7 +143,7 @@ def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_on_severity_needs_classes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """A gate on severity is wrong input for a target without severity classes."""
+    """For a target without severity classes, a gate on severity is wrong input."""
     answer = cli("compare", *runs, "--fail-on", "severity:S2")
     assert answer.code == 2
     assert "has no severity classes" in answer.err

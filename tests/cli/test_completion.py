@@ -1,4 +1,4 @@
-"""What a shell offers when Tab is pressed."""
+"""The completions that a shell offers for Tab."""
 
 import os
 import subprocess
@@ -69,7 +69,7 @@ def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli
 def test_a_library_that_is_named_is_looked_into(
     complete: Complete, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Library options before and after the verb count; without them, the environment does."""
+    """Library options before and after the verb count. Without them, the environment's library is used."""
     monkeypatch.delenv("MUTATOR_ROOT")
     assert "small" not in complete("run", "")
     assert "small" in complete("--root", str(root), "run", "")

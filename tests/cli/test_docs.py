@@ -1,9 +1,9 @@
-"""README and docs print what the commands print, and their links resolve.
+"""README and docs show what the commands print, and their links work.
 
-The test works through a page as a reader would: it runs its commands in order, writes a block after a line
-with a file name (`` `late.yaml`: ``) to that file, and applies diffs. After a change that alters the output,
-`UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py` writes it into the pages; read the difference before you
-keep it.
+The test follows a page as a reader does. It runs the commands in order, writes a block after a line with a
+file name (`` `late.yaml`: ``) to that file, and applies diffs. If your change alters the output, write it
+into the pages with `UPDATE_DOCS=1 pytest -m slow tests/cli/test_docs.py`. Read the difference before you keep
+it.
 """
 
 import json
@@ -75,12 +75,12 @@ def name(page: Path) -> str:
 
 
 def sessions(page: Path) -> list[tuple[str, list[str]]]:
-    """The commands of a page with the lines that the page says they print."""
+    """Return the commands of a page with the lines that the page shows for them."""
     return [step for step in steps(page) if isinstance(step[1], list)]  # type: ignore[misc]
 
 
 def steps(page: Path) -> list[tuple[str, list[str] | str]]:
-    """What a reader does, in order: (command, lines it prints), (file, its text) or ("", a diff)."""
+    """Return a reader's steps in order: (command, lines it prints), (file, its text) or ("", a diff)."""
     found: list[tuple[str, list[str] | str]] = []
     for before, kind, text in FENCE.findall(page.read_text(encoding="utf-8")):
         if kind == "console":
@@ -115,7 +115,7 @@ def work(tmp_path: Path) -> Path:
 
 
 def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
-    """Follow the page in `folder`; return the commands with their output."""
+    """Follow the page in `folder` and return the commands with their output."""
     printed = []
     for what, text in steps(page):
         if isinstance(text, list):
@@ -131,7 +131,10 @@ def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
 
 
 def run(command: str, folder: Path) -> str:
-    """Standard output of a command line that must succeed; `mutator` is that of this interpreter."""
+    """Run a command line that must succeed and return its standard output.
+
+    `mutator` is this interpreter's.
+    """
     bin_folder = str(Path(sys.executable).parent)
     environment = os.environ | {"PATH": bin_folder + os.pathsep + os.environ["PATH"]}
     environment.pop("COLUMNS", None)  # pages show piped output
@@ -143,7 +146,7 @@ def run(command: str, folder: Path) -> str:
 
 
 def lines_of(output: str) -> list[str]:
-    """Lines as a page prints them: without trailing blanks."""
+    """Return lines as a page shows them, without trailing blanks."""
     return [line.rstrip() for line in output.rstrip("\n").splitlines()]
 
 
@@ -212,14 +215,14 @@ def test_the_readme_shows_the_table_of_the_tutorial() -> None:
 
 
 def anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as Markdown sites build them; code fences have no headings."""
+    """Return the anchors of a page's headings, as Markdown sites build them. Code fences have no headings."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
 def links(page: Path) -> list[tuple[Path, str]]:
-    """The files that a page links, with anchors, including its own."""
+    """Return the files and anchors that a page links, including its own anchors."""
     text = CODE.sub("", page.read_text(encoding="utf-8"))
     return [
         ((page.parent / target).resolve() if target else page, anchor)
@@ -229,7 +232,7 @@ def links(page: Path) -> list[tuple[Path, str]]:
 
 @pytest.mark.parametrize("page", PAGES, ids=name)
 def test_links_lead_somewhere(page: Path) -> None:
-    """Each relative link is a file of the clone, and each anchor is a heading in it."""
+    """Each relative link is a file of the clone, and each anchor is one of its headings."""
     for file, anchor in links(page):
         assert file.exists(), f"{name(page)}: {file}"
         assert not anchor or anchor in anchors(file), f"{name(page)}: {file.name}#{anchor}"
@@ -249,7 +252,7 @@ def test_installing_by_name_would_be_noticed(command: str) -> None:
 
 
 def test_every_page_can_be_reached() -> None:
-    """The documentation's index names every page, except those that belong to a page it names."""
+    """The documentation's index names every page, except the pages that belong to a page it names."""
     listed = {file for file, _ in links(INDEX)}
     pages = {page for page in PAGES if INDEX.parent in page.parents and page != INDEX}
     assert pages - listed == set()
@@ -264,7 +267,7 @@ def test_every_page_can_be_reached() -> None:
 
 
 def test_no_two_pages_differ_in_their_suffix_alone() -> None:
-    """A page and a notebook of one folder have different names, since the site drops the suffix."""
+    """A page and a notebook in one folder have different names, because the site drops the suffix."""
     names = [file.with_suffix("") for kind in ("*.md", "*.ipynb") for file in INDEX.parent.rglob(kind)]
     assert len(set(names)) == len(names)
 
@@ -282,13 +285,13 @@ def test_editors_are_told_of_every_schema() -> None:
 
 
 def test_every_benchmark_is_told_of() -> None:
-    """The table of benchmarks has one line for each benchmark and no others."""
+    """The table of benchmarks has exactly one line for each benchmark."""
     told = re.findall(r"^\| `(\w+\.py)` ", BENCHMARKS.read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(file.name for file in BENCHMARKS.parent.glob("*.py"))
 
 
 def test_the_readme_has_both_command_lines() -> None:
-    """The README has one line to install and run, and one to install and test, ready to copy."""
+    """The README has one line that installs and runs and one that installs and tests, both ready to copy."""
     lines = [line for line in README.read_text().splitlines() if line.startswith("python3 -m venv ")]
     assert [("mutator run quickstart" in line, "pytest" in line) for line in lines] == [
         (True, False),

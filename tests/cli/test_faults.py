@@ -1,4 +1,4 @@
-"""`diff` and `generate`: faults without running them."""
+"""`diff` and `generate` show and write faults without running them."""
 
 import csv
 import shutil
@@ -15,7 +15,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
-    """Values of a variant share one diff, which is shown once, without the probe's file."""
+    """The values of a variant share one diff. It is shown once and leaves out the probe's file."""
     answer = cli("diff", "sensor/distance")
     assert answer.code == 0
     headings = [line for line in answer.out.splitlines() if line.startswith("# ")]
@@ -33,7 +33,7 @@ def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
 
 
 def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
-    """With `--patch` the output is a patch for the target's root, with or without a heading."""
+    """With `--patch` the output is a patch for the target's root. It applies with or without its heading."""
     answer = cli("diff", "sensor/silence", "--trigger", "near", "--patch")
     tree = root / "tree"
     subprocess.run(["patch", "-p1", "-s"], input=answer.out, text=True, cwd=tree, check=True)
@@ -41,7 +41,7 @@ def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
 
 
 def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
-    """A spec file may be anywhere; its path works like a name."""
+    """A spec file outside the library works by its path as by its name."""
     own = Path("own.yaml")
     shutil.move(root / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
     assert cli("diff", own).code == 0
@@ -93,7 +93,10 @@ def test_generate_writes_patches_that_apply(cli: Cli, root: Path) -> None:
 
 
 def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
-    """With `--trees` each mutant's whole tree is written next to its patch, and equals the patched target."""
+    """With `--trees`, `generate` writes each mutant's whole tree next to its patch.
+
+    The tree equals the patched target.
+    """
     out = Path("mutants")
     cli("generate", "sensor/distance", "--out", out, "--trees", "--trigger", "near", "--trigger", "3")
     for line in read_index(out):
@@ -107,7 +110,7 @@ def test_generated_trees_are_the_patched_ones(cli: Cli, root: Path) -> None:
 
 
 def test_generate_makes_mutants_of_operators(cli: Cli, root: Path) -> None:
-    """Without a spec, `generate` samples the operators' mutants of a function, in executed lines."""
+    """Without a spec, `generate` samples a function's mutants of operators, in executed lines."""
     words = ("--operators", "arithmetic,branch", "--in", "toycar/*.py::Driver.drive", "--scenario", "A")
     answer = cli("generate", *words, "--sample", 5, "--seed", 3, "--out", "m")
     assert answer.code == 0 and "5 draws of " in answer.err
@@ -148,14 +151,14 @@ def test_ids_are_stable(cli: Cli, root: Path) -> None:
     ],
 )
 def test_generate_refuses_what_it_cannot_do(cli: Cli, root: Path, words: list[str], said: str) -> None:
-    """Nothing to generate, or two sources at once, is wrong input."""
+    """`generate` refuses input that generates nothing and two sources at once."""
     answer = cli("generate", *words, "--out", "m")
     assert answer.code == 2
     assert said in answer.err
 
 
 def test_generate_does_not_mix_with_older_files(cli: Cli, root: Path) -> None:
-    """A folder with content is refused and left unchanged."""
+    """`generate` refuses a folder with content and leaves it unchanged."""
     Path("m").mkdir()
     (Path("m") / "mine.txt").write_text("keep")
     answer = cli("generate", "sensor/distance", "--out", "m")

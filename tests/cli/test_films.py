@@ -1,4 +1,4 @@
-"""`mutator show --video` and `--still`, with the commands of the toy's manifest."""
+"""`show --video` and `show --still`, with the film commands of the toy's manifest."""
 
 import base64
 import gzip
@@ -36,7 +36,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
 
 @pytest.fixture
 def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The id of an experiment with a hazard, in the newest run."""
+    """Return the id of an experiment with a hazard in the newest run."""
     monkeypatch.chdir(finished)
     monkeypatch.setenv("MUTATOR_ROOT", str(finished))
     lines = Path("runs/a/results.csv").read_text().splitlines()
@@ -44,7 +44,7 @@ def name(finished: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
-    """The target's command receives the films of both runs, the event times, and the time of a still."""
+    """The target's command receives both runs' films, the event times and the time of a still."""
     answer = cli("show", name, "--no-plot", "--video", "out/a.json", "--still", "1.5=b.json", "--json").json
     assert answer["films"] == ["b.json", "out/a.json"]
     video, still = (json.loads(Path(path).read_text()) for path in ("out/a.json", "b.json"))
@@ -61,7 +61,7 @@ def test_both_runs_are_shown_with_their_events(cli: Cli, name: str) -> None:
 
 
 def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
-    """The run folder keeps the same files, and the record stays byte for byte the campaign's."""
+    """The run folder has the same files as before, and the record is still the campaign's byte for byte."""
     before = sorted(Path("runs/a").rglob("*"))
     answer = cli("show", name, "--no-plot", "--video", "a.json")
     assert sorted(Path("runs/a").rglob("*")) == before
@@ -71,7 +71,7 @@ def test_a_film_leaves_nothing_else(cli: Cli, name: str) -> None:
 
 
 def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
-    """A still without a file name is kept next to the plots, and the page shows it with its time."""
+    """A still without a file name is stored next to the plots, and the page shows it with its time."""
     answer = cli("show", name, "--no-plot", "--still", "1.5", "--json").json
     assert [Path(path).name for path in answer["films"]] == [f"{name}-1.50s.jpg"]
     page = Path(cli("report", "runs/a", "--json").json["page"])
@@ -83,8 +83,10 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
 
 
 def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run takes stills of its worst experiments with visible changes, at activation and hazard, in
-    proportion to the plan. Running the command again takes none; nor does `--no-stills`.
+    """A run takes stills of its worst experiments with visible changes, at activation and hazard.
+
+    Their number is in proportion to the plan. If the command is repeated, or with `--no-stills`, it takes
+    none.
     """
     manifest = root / "fault_library/targets/toycar.yaml"
     manifest.write_text(manifest.read_text().replace("still: [", "pictures: [alone]\n  still: ["))
@@ -107,7 +109,7 @@ def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pyte
 
 
 def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
-    """A format that the target cannot write is wrong input; the error quotes the target."""
+    """A format that the target cannot write is wrong input. The error quotes the target's message."""
     answer = cli("show", name, "--no-plot", "--video", "a.avi")
     assert answer.code == 2
     assert "a.avi: no .avi here" in answer.err
@@ -129,7 +131,7 @@ def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
 
 @pytest.mark.parametrize("still", ["early", "early=a.json", "=a.json", "nan=a.json", "1.5="])
 def test_a_still_needs_a_time(cli: Cli, name: str, still: str) -> None:
-    """Any other time, or a file without a time, is wrong input; the error shows the syntax."""
+    """An invalid time, or a file without a time, is wrong input. The error shows the syntax."""
     answer = cli("show", name, "--no-plot", "--still", still)
     assert answer.code == 2
     assert "14.5=early.png" in answer.err

@@ -1,4 +1,4 @@
-"""`list`, `check`, `doctor`."""
+"""`list`, `check` and `doctor` report on the library and the machine."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -47,14 +47,14 @@ def test_a_piped_table_has_no_control_characters(cli: Cli, root: Path) -> None:
 
 
 def test_check_says_all_is_well(cli: Cli, root: Path) -> None:
-    """A library that fits its target passes with 0 and the counts."""
+    """For a library that fits its target, `check` exits with 0 and prints the counts."""
     answer = cli("check")
     assert answer.code == 0
     assert "all well: 3 specs, 11 faults" in answer.out
 
 
 def test_check_tells_each_problem_with_its_place(cli: Cli, root: Path) -> None:
-    """An anchor missing from the target fails the check with file and line."""
+    """An anchor that the target lacks fails the check, with file and line."""
     spec = root / "fault_library" / "faults" / "sensor" / "distance.yaml"
     spec.write_text(spec.read_text().replace("after_assign: gap", "after_assign: pace"))
     answer = cli("check")
@@ -95,7 +95,7 @@ def test_check_tells_a_draw_that_nothing_uses(cli: Cli, root: Path) -> None:
 
 
 def test_check_drive_tells_everything_that_it_looked_at(cli: Cli, root: Path) -> None:
-    """`--drive` also shows what passed; in JSON each finding has its level."""
+    """`--drive` also shows what passed. In JSON each finding has its level."""
     answer = cli("check", "--drive", "--scenario", "A")
     assert answer.code == 0
     for name in ("golden A: the same bytes twice", "fast engines: ", "statements: ", "triggers: ", "canary "):
@@ -135,7 +135,7 @@ def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
 def test_doctor_without_library_fails_and_helps(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without a library `doctor` still checks the rest, says what to do, and exits with 1."""
+    """Without a library, `doctor` checks the rest, says what to do and exits with 1."""
     monkeypatch.setenv("MUTATOR_ROOT", str(nowhere / "gone"))
     answer = cli("doctor")
     assert answer.code == 1

@@ -1,4 +1,4 @@
-"""Non-ASCII names, with and without UTF-8 in the environment."""
+"""Non-ASCII names work with and without UTF-8 in the environment."""
 
 import os
 import subprocess
@@ -45,7 +45,7 @@ def test_names_of_any_letters_in_a_plain_locale(place: Path) -> None:
 
 
 def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
-    """Where output must be ASCII, other characters are printed as escapes; JSON stays valid."""
+    """If output must be ASCII, other characters are printed as escapes. JSON stays valid."""
     answer = mutator(place, NARROW, "list", "specs")
     assert (answer.returncode, "Ma\\xdf \\u2192" in answer.stdout) == (0, True)
     answer = mutator(place, NARROW, "list", "specs", "--json")
@@ -54,7 +54,7 @@ def test_texts_of_any_letters_in_a_narrow_environment(place: Path) -> None:
 
 @pytest.mark.parametrize("what", ["run folder", "library", "target file"])
 def test_names_that_are_no_text(place: Path, what: str) -> None:
-    """A name that the environment cannot decode is refused in one message that says what to set."""
+    """A name that the environment cannot decode is refused. The message says what to set."""
     out = "run"
     if what == "run folder":
         out = "läufe"

@@ -136,7 +136,7 @@ def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
 def test_an_error_shows_place_expectation_and_remedy(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A MutatorError is printed in one piece: file:line, finding, expectation, remedy."""
+    """A MutatorError is printed in one block: file:line, finding, expectation, remedy."""
     here = Path.cwd() / "spec.yaml"
     fail_with(monkeypatch, MutatorError("[bold]x", where=here, line=7, expected="a number", remedy="mend it"))
     answer = cli("list", "specs")
@@ -158,8 +158,10 @@ def test_an_error_shows_place_expectation_and_remedy(
 def test_exit_codes(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, error: BaseException, code: int, said: str
 ) -> None:
-    """Exit codes: failed check 1, unreadable folder 2, full disk 3 (whichever library raises it),
-    interruption 130; no traceback.
+    """The exit code is 1 for a failed check, 2 for an unreadable folder, 3 for a full disk and 130 for
+    Ctrl-C.
+
+    There is no traceback, whichever library raises the error.
     """
     fail_with(monkeypatch, error)
     answer = cli("list", "specs")
@@ -169,7 +171,7 @@ def test_exit_codes(
 
 
 def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An unexpected error keeps its traceback, is called a defect, and exits with 3."""
+    """An unexpected error is called a defect, keeps its traceback and exits with 3."""
     fail_with(monkeypatch, ZeroDivisionError("oops"))
     answer = cli("list", "specs")
     assert answer.code == 3
@@ -179,7 +181,7 @@ def test_a_defect_is_shown_in_full(cli: Cli, root: Path, monkeypatch: pytest.Mon
 
 @pytest.mark.parametrize("words", ["list --json", "list targets", "--help"], ids=["long", "short", "help"])
 def test_a_closed_pipe_is_no_error(words: str) -> None:
-    """`mutator list | head` ends quietly when head closes the pipe, even before any output."""
+    """`mutator list | head` ends without an error when head closes the pipe, even before any output."""
     clone = Path(__file__).parents[2]
     command = f"{sys.executable} -m mutator {words} | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=clone)
@@ -187,7 +189,7 @@ def test_a_closed_pipe_is_no_error(words: str) -> None:
 
 
 def test_main_returns_the_code_of_a_verb(root: Path) -> None:
-    """`main` returns instead of exiting, so that a program can call it."""
+    """`main` returns its exit code, so that a program can call it."""
     assert main(["list", "targets"]) == 0
 
 
@@ -200,9 +202,7 @@ def test_main_returns_the_code_of_a_verb(root: Path) -> None:
     ],
 )
 def test_remarks_that_nobody_can_read(root: Path, tmp_path: Path, streams: str) -> None:
-    """A command with closed, full or unread standard error still does its work and returns the right exit
-    code.
-    """
+    """If standard error is closed, full or unread, a command still works and returns the right exit code."""
     words = ["plan", "small", "--out", str(tmp_path / "run"), "--root", str(root)]
     begin = f"import os, sys; {streams}; os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
     for code in (0, 2):

@@ -1,4 +1,4 @@
-"""`init`: an editable new library, and a first library for a foreign controller."""
+"""`init` writes an editable copy of the library, or a first library for another controller."""
 
 import re
 from collections.abc import Callable
@@ -88,8 +88,9 @@ TREES: dict[str, tuple[dict[str, str], str, str]] = {
 def test_a_first_library_runs_once_its_marks_are_gone(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """For a controller with an ordinary step the library is complete: once the marks are deleted it passes
-    the check, and the likeliest value is injected and run.
+    """For a controller with an ordinary step, the library is complete.
+
+    Once the marks are deleted, it passes the check, and the likeliest value is injected and run.
     """
     files, manifest, place = TREES[name]
     cli("init", "faults", "--target", tree(files))
@@ -127,8 +128,9 @@ FOREIGN: dict[str, dict[str, str]] = {
 def test_check_lists_every_place_to_fill_in(
     name: str, cli: Cli, tree: Callable[..., Path], nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A library is written for any tree, and `check` lists each mark once, with file, line and what to fill
-    in.
+    """`init` writes a library for any tree.
+
+    `check` lists each mark once, with file, line and what to fill in.
     """
     told = cli("init", "faults", "--target", tree(FOREIGN[name]), "--json").json
     assert (nowhere / "faults" / "README.md").exists()
@@ -161,7 +163,7 @@ NOTHING: dict[str, tuple[dict[str, str], str]] = {
 
 @pytest.mark.parametrize("name", NOTHING)
 def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable[..., Path]) -> None:
-    """The library is written, with a warning that no controller was found, and why."""
+    """If no controller is found, the library is written with a warning that says why."""
     files, told = NOTHING[name]
     folder = tree(files)
     answer = cli("init", "faults", "--target", folder)
@@ -171,7 +173,7 @@ def test_a_tree_without_a_controller_is_told(name: str, cli: Cli, tree: Callable
 
 
 def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., Path]) -> None:
-    """If a step was found there is no warning, even when another file cannot be read."""
+    """If a step is found, there is no warning, even if another file cannot be read."""
     assert cli("init", "faults", "--target", tree(FOREIGN["syntax errors"])).err == ""
 
 
@@ -179,7 +181,7 @@ def test_a_tree_with_a_controller_has_no_warning(cli: Cli, tree: Callable[..., P
 def test_a_tree_may_have_any_name(
     name: str, cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A name with a special meaning in YAML is quoted, and the manifest finds the tree."""
+    """A name with a special meaning in YAML is quoted, so the manifest finds the tree."""
     folder = nowhere / name
     folder.mkdir()
     for file in ("steer.py", "null.py"):
@@ -193,7 +195,7 @@ def test_a_tree_may_have_any_name(
 def test_marks_tell_all_that_their_comment_says(
     cli: Cli, nowhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`check` prints the whole comment of a mark, including its continuation lines, but no other comment."""
+    """`check` prints the whole comment of a mark, with its continuation lines, and no other comment."""
     cli("init", "faults", "--target", "installed:typer")
     path = nowhere / "faults/fault_library/scenarios/first.yaml"
     path.write_text("# TODO(init): the speed\n# in m/s\nspeed: 3\n# another\n")
@@ -215,7 +217,7 @@ def test_the_new_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> No
 
 
 def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
-    """The manifest names the package and the requirement, and nothing of the shipped target is copied."""
+    """The manifest names the package and its requirement. Nothing of the shipped target is copied."""
     assert "places to fill in" in cli("init", "faults", "--target", "installed:typer").out
     manifest = (nowhere / "faults/fault_library/targets/typer.yaml").read_text()
     assert "root: installed:typer\n" in manifest
@@ -228,7 +230,7 @@ def test_init_for_an_installed_package(cli: Cli, nowhere: Path) -> None:
     [("nowhere", "no folder nowhere"), ("installed:no.where", "no installed package 'no.where'")],
 )
 def test_init_refuses_a_target_that_is_not_there(target: str, told: str, cli: Cli, nowhere: Path) -> None:
-    """A missing folder or package is wrong input, reported by its option; no library is written."""
+    """A missing folder or package is wrong input. The error names the option, and no library is written."""
     answer = cli("init", "faults", "--target", target)
     assert answer.code == 2
     assert f"error: --target: {told}" in answer.err

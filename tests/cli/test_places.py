@@ -1,4 +1,4 @@
-"""`mutator places`."""
+"""The `places` command."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ def place(toy: Workspace) -> tuple[str, ...]:
 
 
 def test_lists_places(cli: Cli, toy: Workspace) -> None:
-    """The table has line, anchor and models; JSON has the same with the file, ready for a spec."""
+    """The table has line, anchor and models. JSON has the same with the file, ready for a spec."""
     answer = cli("places", "toycar/sensing.py::Sensor.sense", *place(toy))
     assert answer.code == 0
     assert "{function: Sensor.sense, after_assign: gap}" in answer.out

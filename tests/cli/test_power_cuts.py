@@ -1,4 +1,4 @@
-"""Power cuts: the disk keeps what was synced and any part of the rest."""
+"""After a power cut the disk has everything that was synced and any part of the rest."""
 
 import os
 import re
@@ -53,7 +53,7 @@ def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]
 
 @pytest.fixture
 def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
-    """The seal of the same run without a power cut."""
+    """Return the seal of the same run without a power cut."""
     if not driven[1:]:
         shutil.copytree(cut, "whole")
         whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
@@ -65,7 +65,7 @@ def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
 
 
 def last_block(path: Path) -> int:
-    """The offset of a file's last block."""
+    """Return the offset of a file's last block."""
     data = path.read_bytes()
     return data.rindex(b"FIB1", 0, read_blocks(path).blocks[-1].offset)
 
@@ -105,8 +105,9 @@ def test_records_are_synced_after_what_they_refer_to(
 
 @pytest.mark.parametrize("rest", ["cut off", "zeros"])
 def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest: str) -> None:
-    """However much of the block survives, the folder is rejected with a remedy, and the mended run reaches
-    the original result.
+    """A folder with a record but without its patch is rejected with a remedy.
+
+    This holds however much of the block survives. The repaired run reaches the original result.
     """
     [path] = (cut / "patches").iterdir()
     data, name = path.read_bytes(), read_blocks(path).blocks[-1].key
@@ -129,8 +130,9 @@ def test_a_record_without_its_patch_is_told(cli: Cli, cut: Path, seal: str, rest
 
 
 def test_a_record_without_its_series_has_none(cli: Cli, cut: Path) -> None:
-    """However much of the block survives, nothing replaces the lost series: the others keep theirs, the run
-    completes as usual, and a rerun restores it.
+    """A lost series is not replaced, however much of its block survives.
+
+    The other experiments keep theirs, the run completes as usual, and a rerun restores the series.
     """
     [path] = segments(cut)
     data = path.read_bytes()

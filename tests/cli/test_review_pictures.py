@@ -1,4 +1,4 @@
-"""`review show --pictures`: the result of an image effect, as files."""
+"""`review show --pictures` writes the frames of an image effect as files."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,8 +10,9 @@ from mutator.workspace import Workspace
 def test_pictures_are_written_and_named(
     cli: Callable[..., Any], root: Path, toy: Workspace, tmp_path: Path, give_eyes: Callable[..., None]
 ) -> None:
-    """One image before and one for each level; a group without an image effect has none, and the command says
-    so.
+    """The command writes one frame before the effect and one for each level.
+
+    For a group without an image effect it writes none and says so.
     """
     give_eyes(toy, values="[10, 50]")
     groups = {group["model"]: group["group"] for group in cli("review", "--json").json}

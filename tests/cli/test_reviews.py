@@ -1,4 +1,4 @@
-"""`review`: list, show, decide, walk through, and write a page; `run --require-reviewed`."""
+"""`review` lists, shows, decides, walks and writes a page. `run --require-reviewed` needs approvals."""
 
 import base64
 import gzip
@@ -40,7 +40,10 @@ def about(known: dict[str, str], words: str) -> str:
 
 
 def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """`review` alone lists the groups: approved ones last, those with a changed template before them."""
+    """`review` alone lists the groups.
+
+    Approved ones are last, and those with a changed template come before them.
+    """
     first, *rest = known
     cli("review", "approve", first, *JANE)
     lines = cli("review").out.splitlines()
@@ -53,7 +56,7 @@ def test_it_lists_what_is_new_or_changed_first(cli: Cli, root: Path, known: dict
 
 
 def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Filters use the table's columns; the start of an id is enough if it is unique."""
+    """Filters use the table's columns. A unique start of an id is enough."""
     silent = about(known, "omission()")
     only = 'model == "omission" and match(trigger, "*time*") and not flagged'
     assert ids(cli, "--only", only, "--exclude", "faults > 7") == [silent]
@@ -65,7 +68,10 @@ def test_a_group_is_found_by_filter_and_start_of_its_id(cli: Cli, root: Path, kn
 
 
 def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A group shows its diff with holes, a row of values for each fault, and the conditions; in JSON, too."""
+    """A group shows its diff with holes, a row of values for each fault and the conditions.
+
+    JSON has the same.
+    """
     longer = about(known, "offset(by, target=gap)")
     answer = cli("review", "show", longer)
     assert f"group {longer}: new" in answer.out
@@ -79,7 +85,7 @@ def test_a_group_is_shown_with_holes_and_values(cli: Cli, root: Path, known: dic
 
 
 def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A review covers the whole library, some specs, or a campaign; for a campaign the runs are counted."""
+    """A review covers the whole library, some specs or a campaign. For a campaign it counts the runs."""
     assert set(ids(cli, "--spec", "sensor/lane")) < known.keys()
     campaign = cli("review", "--campaign", "small", "--json").json
     assert {group["group"] for group in campaign} <= known.keys()
@@ -88,7 +94,10 @@ def test_what_is_reviewed_can_be_chosen(cli: Cli, root: Path, known: dict[str, s
 
 
 def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Decisions keep who approved or rejected what, with remarks; a change shows what has changed since."""
+    """Decisions keep the reviewer, the choice and the remark.
+
+    After a change, the command shows what changed.
+    """
     group = about(known, "omission()")
     answer = cli("review", "reject", group[:6], *JANE, "--remark", "too much")
     assert re.fullmatch(rf"{group} rejected by Jane Doe on 20..-..-..", answer.out.splitlines()[0])
@@ -108,7 +117,7 @@ def test_decisions_are_told_and_kept(cli: Cli, root: Path, known: dict[str, str]
 def test_no_name_is_no_decision(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A decision needs a name: the given one, or git's user name."""
+    """A decision needs a name, either the given one or git's user name."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     group = next(iter(known))
@@ -124,8 +133,9 @@ def test_no_name_is_no_decision(
 def test_all_that_a_filter_finds_is_decided_after_a_question(
     cli: Cli, root: Path, known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The command states the number of groups; without a terminal it needs --yes; ids plus a filter are
-    refused.
+    """The command states the number of groups and asks. Without a terminal it needs --yes.
+
+    It refuses ids together with a filter.
     """
     words = ("review", "approve", "--only", 'state == "new" and model == "offset"', *JANE)
     asked = cli(*words)
@@ -143,7 +153,7 @@ def test_all_that_a_filter_finds_is_decided_after_a_question(
 
 
 def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """Remarks and flags are shown with their authors and can be filtered; a cleared decision is gone."""
+    """Remarks and flags are shown with their authors and can be filtered. A cleared decision is gone."""
     first, second, *_ = known
     cli("review", "approve", first, *JANE)
     cli("review", "remark", first, second, *JANE, "--text", "why not\nbelow?")
@@ -161,7 +171,7 @@ def test_remarks_and_flags_are_kept_and_taken_back(cli: Cli, root: Path, known: 
 
 
 def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """The status shows counts, changes with reasons, flags, and what keeps a campaign from running."""
+    """The status shows counts, changes with reasons, flags, and what prevents a campaign from running."""
     gap = about(known, "offset(by, low, target=gap)")
     cli("review", "approve", *known, *JANE)
     cli("review", "flag", gap, *JANE)
@@ -184,7 +194,10 @@ def test_the_status_says_what_is_left(cli: Cli, root: Path, known: dict[str, str
 
 
 def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A group that changed since its approval shows the diff; other groups say that there is none."""
+    """A group that changed since its approval shows the diff.
+
+    For other groups the command says there is none.
+    """
     gap = about(known, "offset(by, target=gap)")
     assert "no decision yet" in cli("review", "show", gap, "--changes").out
     cli("review", "approve", gap, *JANE)
@@ -200,9 +213,7 @@ def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[s
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:
-    """A wrong hand edit, such as an unknown decision or a missing reviewer, stops the command with
-    its line.
-    """
+    """An unknown decision or missing reviewer in an edited file stops the command with the line."""
     cli("review", "approve", next(iter(known)), *JANE)
     file = root / "fault_library/reviews/toycar.yaml"
     good = file.read_text()
@@ -222,7 +233,7 @@ def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
 
 @pytest.fixture
 def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
-    """Simulate somebody who presses these keys at a terminal and types these remarks."""
+    """Simulate a user who presses these keys at a terminal and types these remarks."""
 
     class Tty:
         def __init__(self, stream: Any) -> None:
@@ -247,7 +258,10 @@ def keys(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 def test_a_walk_asks_group_by_group(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str]
 ) -> None:
-    """a, r, s and q do what they say, another key asks again; each decision is saved at once."""
+    """The keys a, r, s and q do what they say, and any other key asks again.
+
+    Each decision is saved at once.
+    """
     first, second, third, *_ = known
     keys("axrsq", "good", "")
     answer = cli("review", "walk", *JANE)
@@ -263,7 +277,7 @@ def test_a_walk_asks_group_by_group(
 def test_a_walk_tells_what_somebody_else_says_meanwhile(
     cli: Cli, root: Path, keys: Callable[..., None], known: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A concurrent decision is kept: the group is shown again with it, and the question is repeated."""
+    """If another reviewer decides meanwhile, the group is shown again with that decision and asked again."""
     first, *_ = known
     keys("aaq", "", "")
     ask = typer.getchar
@@ -284,7 +298,7 @@ def test_a_walk_tells_what_somebody_else_says_meanwhile(
 def test_a_walk_ends_with_the_input(
     cli: Cli, root: Path, keys: Callable[..., None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ctrl-D works like q: nothing is decided, and the exit code is 0."""
+    """Ctrl-D works like q. Nothing is decided, and the exit code is 0."""
 
     def over() -> str:
         raise EOFError
@@ -297,7 +311,10 @@ def test_a_walk_ends_with_the_input(
 
 
 def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: dict[str, str]) -> None:
-    """One self-contained file has all groups, states, diffs, values and options; twice the same bytes."""
+    """One self-contained file has all groups, states, diffs, values and options.
+
+    It has the same bytes each time.
+    """
     out = tmp_path / "review.html"
     first = next(iter(known))
     cli("review", "approve", first, *JANE)
@@ -321,8 +338,9 @@ def test_the_page_holds_everything(cli: Cli, root: Path, tmp_path: Path, known: 
 
 @pytest.mark.slow
 def test_only_what_is_approved_is_run(cli: Cli, root: Path, tmp_path: Path) -> None:
-    """A run is refused, with names, numbers and commands, until all groups are approved; a changed template
-    is refused again.
+    """A run is refused until all groups are approved. The error has names, numbers and commands.
+
+    A changed template is refused again.
     """
     out = tmp_path / "run"
     words = ("run", "small", "--out", out, "--require-reviewed")

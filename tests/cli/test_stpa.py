@@ -1,4 +1,4 @@
-"""`stpa`."""
+"""The `stpa` command and hazard analyses in `check`."""
 
 import shutil
 from collections.abc import Callable
@@ -12,7 +12,7 @@ Cli = Callable[..., Any]
 
 
 def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
-    """All parts of the shipped analysis are shown, with what was proved, and the diagram is written."""
+    """`stpa` prints all parts of the shipped analysis with what was proved, and writes the diagram."""
     answer = cli("--root", CLONE, "stpa", "--svg", "structure.svg")
     assert answer.code == 0, answer.err
     for wanted in (
@@ -31,7 +31,7 @@ def test_the_analysis_is_printed_and_drawn(cli: Cli, nowhere: Path) -> None:
 
 
 def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
-    """`--json` is one document with the same parts and no problems."""
+    """With `--json` the output is one document with the same parts and no problems."""
     answer = cli("--root", CLONE, "stpa", "--json")
     assert answer.json["problems"] == []
     assert answer.json["hazards"]["H3"]["leads_to"] == ["A1", "A3"]
@@ -43,7 +43,7 @@ def test_the_analysis_for_programs(cli: Cli, nowhere: Path) -> None:
 
 @pytest.fixture
 def library(tmp_path: Path) -> Path:
-    """A copy of the shipped library; its target is the clone's."""
+    """A copy of the shipped library. Its target is the clone's."""
     library = tmp_path / "fault_library"
     shutil.copytree(CLONE / "fault_library", library)
     (tmp_path / "target").symlink_to(CLONE / "target")
@@ -71,7 +71,7 @@ def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) 
 
 
 def test_a_library_without_an_analysis(cli: Cli, root: Path) -> None:
-    """Without the files the verb names the missing one; campaigns need none of them."""
+    """If the files are missing, the error names the missing one. Campaigns need none of them."""
     answer = cli("stpa")
     assert answer.code == 2
     assert "no control_structure.yaml" in answer.err
@@ -107,7 +107,7 @@ def test_no_campaign_on_a_wrong_table(cli: Cli, root: Path, new: str, said: str)
 
 
 def test_a_picture_that_cannot_be_written(cli: Cli, nowhere: Path) -> None:
-    """A missing folder is reported with the file's name."""
+    """If the picture's folder is missing, the error names the file."""
     answer = cli("--root", CLONE, "stpa", "--svg", "no/such/structure.svg")
     assert answer.code == 2
     assert "no/such/structure.svg: cannot write the file" in answer.err

@@ -44,7 +44,7 @@ def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_diff_is_coloured_line_by_line(cli: Cli, root: Path, terminal: None) -> None:
-    """Inserted lines are green; without the colours the diff equals the piped one."""
+    """Inserted lines are green. Without colours, the diff equals the piped one."""
     answer = cli("diff", "sensor/silence")
     assert re.search(r"\x1b\[32m\+ +if not _fi.active", answer.out)
     assert "+        if not _fi.active" in ANSI.sub("", answer.out)
@@ -63,7 +63,7 @@ def test_json_stays_plain_in_a_terminal(cli: Cli, root: Path, terminal: None) ->
 
 
 def notify_all(notify: Callable[[Progress], None]) -> None:
-    """The notifications of a campaign from begin to end."""
+    """Send the notifications of a campaign from beginning to end."""
     notify(Progress(stage="checks", done=1, total=7))
     counts = Counter(hazard=2, sdc=1)
     run = Progress(stage="experiments", total=60, outcomes=counts)
@@ -95,12 +95,12 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
 def test_durations(seconds: float, words: str) -> None:
-    """Durations are printed in a fitting unit."""
+    """Durations are printed in a suitable unit."""
     assert duration(seconds) == words
 
 
 def test_a_diff_for_reading_leaves_the_probe_out() -> None:
-    """New files are left out and named; the rest stays unchanged."""
+    """New files are left out and named. The rest stays unchanged."""
     text, note = readable(PATCH)
     assert text == PATCH[PATCH.index("diff --git a/p/a.py") :]
     assert "p/_fi.py" in note
@@ -144,8 +144,9 @@ def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
 def test_a_pipe_gets_lines_of_100_columns(
     columns: str | None, width: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Results, remarks and errors are folded to 100 columns, or to COLUMNS; tables and copyable
-    text are not.
+    """Results, remarks and errors are folded to 100 columns, or to COLUMNS.
+
+    Tables and text to copy are not.
     """
     monkeypatch.delenv("COLUMNS")
     if columns:
@@ -167,7 +168,7 @@ def test_a_pipe_gets_lines_of_100_columns(
 
 
 def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """In a terminal of 120 columns the lines are folded to 120."""
+    """In a terminal of 120 columns, lines are folded to 120 columns."""
     Terminal().say(f"{LONG}; or {COMMAND}")
     lines = ANSI.sub("", capsys.readouterr().out).splitlines()
     assert all(len(line) <= 120 for line in lines)

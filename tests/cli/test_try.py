@@ -1,4 +1,4 @@
-"""The commands that need no run folder: `try` and `generate`, on the toy target."""
+"""`try` and `generate`, which need no run folder, on the toy target."""
 
 import shutil
 from collections.abc import Callable
@@ -11,8 +11,9 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
-    """`try` takes a fault from any file: diff, verdict, plot and traces, with nothing written to
-    the library.
+    """`try` takes a fault from any file and shows diff, verdict, plot and traces.
+
+    It does not write to the library.
     """
     shutil.move(root / "fault_library/faults/sensor/silence.yaml", "own.yaml")
     answer = cli("try", "own.yaml", "--scenario", "A", "--trigger", "2")
@@ -24,7 +25,7 @@ def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
 
 
 def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
-    """If the fault-free run reaches a hazard itself, one line says so, and so does the JSON."""
+    """If the fault-free run reaches a hazard, one line says so, and so does the JSON."""
     words = ("try", "sensor/lane", "-s", "A", "--trigger", "1")
     said = "the fault-free run also reaches"
     assert said not in cli(*words).out
@@ -38,7 +39,7 @@ def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:
 
 
 def test_try_as_json(cli: Cli, root: Path) -> None:
-    """JSON has verdict, times and paths; the same fault always has the same id."""
+    """JSON has verdict, times and paths. The same fault always has the same id."""
     words = ("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1", "--json")
     one, two = cli(*words).json, cli(*words).json
     assert one == two
@@ -63,7 +64,7 @@ def test_what_cannot_be_tried_is_answered(cli: Cli, root: Path, words: list[str]
 
 
 def test_generate_gives_the_mutants_of_a_campaign(cli: Cli, root: Path) -> None:
-    """Each mutant of the plan is written once, however many scenarios share it."""
+    """Each mutant of the plan is written once, even if several scenarios share it."""
     index = cli("generate", "--campaign", "toy", "--out", "m", "--json").json
     assert 0 < len(index) <= 24
     assert len({line["mutant_id"] for line in index}) == len(index)

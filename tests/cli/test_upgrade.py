@@ -1,4 +1,4 @@
-"""`mutator upgrade`: manifests of the older schema."""
+"""`upgrade` rewrites manifests of the older schema."""
 
 import json
 import shutil
@@ -27,8 +27,9 @@ def changed(before: TargetManifest, after: TargetManifest) -> list[str]:
 
 
 def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
-    """The new manifest says the same, keeps comments elsewhere, and the comments that it cannot keep are
-    printed.
+    """The new manifest has the same meaning and keeps comments elsewhere.
+
+    Comments that it cannot keep are printed.
     """
     text = path.read_text().replace("step_s:", "# of the world\nstep_s:")
     text = text.replace("compare:", "compare:  # pedals").replace("target/1\n", "target/1\n\n")
@@ -47,7 +48,7 @@ def test_an_older_manifest_is_written_anew(cli, path: Path) -> None:
 
 @pytest.mark.parametrize("indent", [None, 1])
 def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | None) -> None:
-    """Where keys share a line the whole manifest is rewritten and says the same."""
+    """If keys share a line, the whole manifest is rewritten with the same meaning."""
     path.write_text(json.dumps(yaml.safe_load(path.read_text()), indent=indent) + "  # all of it\n")
     before = load_manifest(path)
     answer = cli("upgrade", path)
@@ -58,7 +59,7 @@ def test_a_manifest_in_one_mapping_loses_nothing(cli, path: Path, indent: int | 
 
 
 def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
-    """A channel in both sections keeps what `compare` says about it."""
+    """A channel in both sections keeps its settings for `compare`."""
     path.write_text(path.read_text().replace("plot:\n", 'plot:\n  gas: {unit: "%"}\n'))
     loaded = load_manifest(path)
     assert cli("upgrade", path).code == 0
@@ -99,7 +100,7 @@ def test_a_manifest_that_lacks_something_stays(cli, path: Path, line: str, messa
 
 
 def test_a_value_that_loads_nowhere_stays(cli, path: Path) -> None:
-    """The result is checked as in use, including formulas and placeholders, before it is written."""
+    """Before it is written, the result is checked as it will be used, including formulas and placeholders."""
     path.write_text(path.read_text().replace('"{out}", --number', '"{oot}", --number'))
     before = path.read_bytes()
     assert "{oot}" in cli("upgrade", path).err

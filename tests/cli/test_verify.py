@@ -1,4 +1,4 @@
-"""`verify` on the command line, and the seal that it compares."""
+"""`verify` and the seal that it compares."""
 
 import re
 import shutil
@@ -24,7 +24,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
     """The seal of the run folder `run`, as `mutator run` prints it.
 
-    The folder is run once, since each test has the same library.
+    The test runs the folder once, because each test has the same library.
     """
     kept, *seals = driven
     if not seals:
@@ -40,7 +40,7 @@ def sealed(cli: Cli, root: Path, driven: list[Any]) -> str:
 
 
 def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
-    """One page lists what was checked, the versions, what was drawn, and the seal."""
+    """One page lists the checks, the versions, the drawn sample and the seal."""
     found = cli("verify", "run", "--rerun", 2, "--expect", sealed)
     assert (found.code, found.err) == (0, "")
     assert found.out.rstrip().endswith("no difference") and len(found.out.splitlines()) < 50
@@ -53,7 +53,7 @@ def test_a_run_is_verified(cli: Cli, sealed: str) -> None:
 
 
 def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
-    """The seal is printed by `run`, by `run` with nothing left to do, in JSON, and in the report."""
+    """The seal is printed by `run`, also with nothing left to do, in JSON and in the report."""
     again = cli("run", "small", "--out", "run", "-n", "0", "--json")
     assert (again.code, again.json["ran"], again.json["seal"]) == (0, 0, sealed)
     assert f"| seal | {sealed} |" in Path("run/report/REPORT.md").read_text()
@@ -64,7 +64,7 @@ def test_the_seal_is_told_wherever_a_run_ends(cli: Cli, sealed: str) -> None:
 
 
 def test_a_damaged_run_is_repaired_and_run_again(cli: Cli, sealed: str) -> None:
-    """The run's own command lists the damage, moves it aside and repairs it, and the seal is the old one."""
+    """The run's own command lists the damage, moves it aside and repairs it. The seal stays the same."""
     records, patch = next(Path("run/records").iterdir()), next(Path("run/patches").iterdir())
     golden = next(Path("run/golden").rglob("log.npz"))
     lines = records.read_bytes().splitlines(keepends=True)
@@ -96,7 +96,7 @@ def packed() -> Index:
 
 
 def chunks() -> dict[str, str]:
-    """The files of packed series: golden runs, experiments, and the index."""
+    """Return the files of packed series: golden runs, experiments and the index."""
     (goldens, _), (experiments, _) = packed().chunks
     return {"goldens": f"{goldens}.js", "experiments": f"{experiments}.js", "index": "index.js"}
 
@@ -187,7 +187,7 @@ def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
 
 
 def test_other_sources_are_a_difference(cli: Cli, sealed: str, root: Path) -> None:
-    """With another target no tree can be compared; the audit says so and does not pass."""
+    """If the target differs, no tree can be compared. The audit says so and does not pass."""
     with (root / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("\n")
     found = cli("verify", "run", "--expect", sealed)

@@ -32,7 +32,7 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
     ],
 )
 def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnings: list[str]) -> None:
-    """A value without effect, or outside the declared range, gets a warning and is built."""
+    """A value without effect, or outside the declared range, gets a warning and the mutant is built."""
     answer = cli("diff", *words)
     assert answer.code == 0
     assert "+" in answer.out
@@ -41,8 +41,9 @@ def test_a_chosen_value_is_judged(cli: Cli, root: Path, words: list[str], warnin
 
 
 def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> None:
-    """The plan counts experiments with values that change nothing and names the faults; with a bound the same
-    value may have an effect.
+    """The plan counts experiments with values that change nothing and names the faults.
+
+    With a bound, the same value may have an effect.
     """
     spec = root / "fault_library" / "faults" / "sensor" / "lane.yaml"
     listed = spec.read_text().replace(
@@ -58,7 +59,7 @@ def test_a_plan_warns_of_values_that_change_nothing(cli: Cli, root: Path) -> Non
 
 
 def test_a_run_warns_of_triggers_that_never_come(cli: Cli, root: Path) -> None:
-    """Before the experiments, a run says how many triggers never fire, and which."""
+    """Before the experiments, a run says which triggers never fire and how many there are."""
     campaign = root / "fault_library" / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{at_s: 50}, {at_s: 2}]"))
