@@ -130,9 +130,8 @@ def test_a_worker_with_another_version_is_refused(
     assert "no worker is left" in summary.problem
 
 
-@pytest.mark.parametrize(
-    ("number", "code"), [(KILL, -KILL), pytest.param(INT, 130, marks=pytest.mark.slow)], ids=["KILL", "INT"]
-)
+@pytest.mark.parametrize(("number", "code"), [(KILL, -KILL), (INT, 130)], ids=["KILL", "INT"])
+@pytest.mark.slow
 def test_a_dead_command_leaves_nothing_at_work(
     toy: Workspace,
     tmp_path: Path,

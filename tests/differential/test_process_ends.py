@@ -264,7 +264,12 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize("how", FULL)
+SLOW_TO_FILL = "without end in folders"
+
+
+@pytest.mark.parametrize(
+    "how", [pytest.param(how, marks=pytest.mark.slow) if how == SLOW_TO_FILL else how for how in FULL]
+)
 def test_a_limit_of_space(misbehave: Misbehave, how: str) -> None:
     """A run that exceeds its space in the output folder and TMPDIR is a timeout that names the limit, in each
     engine.

@@ -26,6 +26,7 @@ def cli(pole: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureF
     return run
 
 
+@pytest.mark.slow
 def test_a_foreign_tree_by_both_engines(cli: Cli, pole: Workspace, tmp_path: Path) -> None:
     """Both engines give the same table, the proof covers every experiment, the folder verifies, a rerun gives
     the same record, and the report shows only what the target has.

@@ -161,6 +161,7 @@ def test_pytest_refuses_and_accepts_as_the_command_does(
     assert len(RunFolder.open(half).stretches) == 2
 
 
+@pytest.mark.slow
 def test_another_machine_drives_the_golden_runs_again(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, driven: list[str]
 ) -> None:
@@ -202,6 +203,7 @@ def shard(
     return run
 
 
+@pytest.mark.slow
 def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
     """Exit code 2 with the list; if accepted, the merged run keeps and lists the stretches of both."""
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
@@ -218,6 +220,7 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
     assert sorted(cpus) == ["machine 1"] * 6 + ["machine 2"] * 6
 
 
+@pytest.mark.slow
 def test_shards_of_other_machines_are_merged(
     cli: Cli, shard: Shard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

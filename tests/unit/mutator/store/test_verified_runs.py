@@ -37,6 +37,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
+@pytest.mark.slow
 def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, Path], tmp_path: Path) -> None:
     """Each record equals that of a run with the seed alone, and the run can be proved."""
     workspace, run = made
@@ -114,6 +115,7 @@ def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Pa
         digests.write(run, ledger)
 
 
+@pytest.mark.slow
 def test_room_is_made_for_the_pictures_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

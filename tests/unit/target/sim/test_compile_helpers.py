@@ -90,6 +90,7 @@ def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
 
 
 @needs_compiler
+@pytest.mark.slow
 def test_compiling_again_gives_the_same_bytes_and_leaves_nothing_old(all_compiled, tmp_path):
     """A library's name contains the digest of the code it replaces. Libraries of other code are deleted."""
     old = tmp_path / f"warp-0{compiled.SUFFIX}"
