@@ -11,16 +11,15 @@ _MODEL = re.compile(r"\[(\w+)\]\(\.\./reference/fault-models\.md#(\w+)\)")
 
 
 def rows(heading: str) -> list[list[str]]:
-    """The cells of the table under a heading, without the head's."""
+    """The cells of the table below a heading, without the head row."""
     section = PAGE.read_text().partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]
 
 
 def test_each_model_has_its_row(clone: Workspace) -> None:
-    """Every template is in one row, linked to its section, and every row refers to existing templates and
-    states their failure mode.
-    """
+    """Every template is in one row, with a link to its section. Every row names existing templates and
+    states their failure mode."""
     found = [name for first, *_ in rows("The models") for name in _MODEL.findall(first)]
     assert all(name == section for name, section in found)
     assert sorted(name for name, _ in found) == sorted(clone.fault_models().models)
@@ -28,7 +27,7 @@ def test_each_model_has_its_row(clone: Workspace) -> None:
 
 
 def test_what_cannot_be_expressed_has_its_reason(clone: Workspace) -> None:
-    """Each unreachable failure mode has a reason, and the models named there exist."""
+    """Each unreachable failure mode has a reason. The models that the reason names exist."""
     missing = rows("What cannot be expressed, and why")
     assert len(missing) > 5 and all(len(row) == 2 and all(row) for row in missing)
     named = {name for row in missing for cell in row for name in re.findall(r"`([a-z_]+)`", cell)}
@@ -36,7 +35,7 @@ def test_what_cannot_be_expressed_has_its_reason(clone: Workspace) -> None:
 
 
 def test_sources_are_named_in_the_text() -> None:
-    """Each listed source is cited by its first author or number, and each cited one is listed."""
+    """Each listed source is cited by its first author or its number, and each cited source is listed."""
     text, _, sources = PAGE.read_text().partition("\n## Sources\n")
     listed = [line[2:].partition(",")[0] for line in sources.splitlines() if line.startswith("* ")]
     assert listed == sorted(listed) and len(listed) > 10

@@ -1,4 +1,4 @@
-"""docs/reference/formats.md and the code name the same formats."""
+"""docs/reference/formats.md and the code list the same formats."""
 
 import importlib.util
 import re
@@ -21,17 +21,17 @@ def in_code() -> set[str]:
 
 
 def test_every_schema_of_the_code_is_in_the_page() -> None:
-    """Every stored or transmitted format has a line with its writers and readers."""
+    """Every stored or transmitted format has a line that names its writers and readers."""
     assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(PAGE))
 
 
 def test_every_schema_in_the_page_is_in_the_code() -> None:
-    """The page names no removed format."""
+    """The page does not name any removed format."""
     assert set(IN_PAGE.findall(PAGE)) - in_code() == set()
 
 
 def test_every_module_in_the_page_exists() -> None:
-    """Writers and readers are existing modules."""
+    """All writers and readers are existing modules."""
     modules = set(re.findall(r"`((?:mutator|selfdrive)\.[\w.]+)`", PAGE))
     assert len(modules) > 40
     assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []

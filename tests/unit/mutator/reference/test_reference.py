@@ -1,4 +1,4 @@
-"""The generated reference: pages and JSON Schemas match the program."""
+"""The generated reference: its pages and JSON Schemas match the program."""
 
 import json
 import math
@@ -51,7 +51,7 @@ def _generated() -> dict[Path, str]:
 
 
 def test_nothing_else_says_that_it_is_generated() -> None:
-    """A page or schema without its source must not exist. (The target generates its own scenarios page.)"""
+    """A page or schema without a source must not exist. The target generates its scenarios page."""
     pages = [
         path
         for path in (CLONE / "docs").rglob("*.md")
@@ -63,7 +63,7 @@ def test_nothing_else_says_that_it_is_generated() -> None:
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_every_model_and_key_is_described(kind: Format) -> None:
-    """Each model of a file format has a title, and each of its keys a sentence."""
+    """Each model of a file format has a title, and each key has a sentence."""
     parts = described(kind)
     assert parts
     for name, part in parts.items():
@@ -73,20 +73,21 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
 
 
 def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
-    """The file's own model comes first, then those of its keys, each where it is first needed."""
+    """The model of the file comes first. The models of its keys follow in the order in which they are
+    first needed."""
     names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
 
 def test_every_verb_is_in_a_group() -> None:
-    """Help and page list verbs by groups, so every verb needs one."""
+    """Help and page list verbs in groups, so every verb must be in a group."""
     command: Any = get_command(app)
     assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_library_files_follow_their_schema(kind: Format) -> None:
-    """For each file of the library, the editors' schema accepts what the program accepts."""
+    """The editors' schema accepts each file of the library that the program accepts."""
     files = sorted(CLONE.glob(kind.files))
     assert files
     check = validator(kind.name)
@@ -110,7 +111,7 @@ def test_library_files_follow_their_schema(kind: Format) -> None:
     ],
 )
 def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...], value: Any) -> None:
-    """The editor marks a misspelt key or parameter, a wrong word, or a number out of range."""
+    """The editor marks a misspelt key or parameter, an invalid word, and a number out of range."""
     data = yaml_files.load(CHAFF).data
     check = validator("fault_spec")
     assert check.is_valid(data)
@@ -122,7 +123,7 @@ def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...]
 
 
 def test_a_schema_takes_a_model_of_ones_own() -> None:
-    """A schema accepts an unknown fault model, since it may be the user's own."""
+    """A schema accepts an unknown fault model, because users can add models."""
     data = yaml_files.load(CHAFF).data
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
@@ -130,7 +131,8 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
 
 
 def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a library from a wheel there is no clone to write pages into."""
+    """With a library from a wheel, the reference is not generated, because there is no clone to write it
+    into."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"

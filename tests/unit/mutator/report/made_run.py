@@ -68,9 +68,10 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """A run folder from before digests, with a hazard, a crash and a harness error.
+    """A run folder without digests, as older versions wrote it, with a hazard, a crash and a harness
+    error.
 
-    The hazard has its patch and a still. `head` is added to its run.json.
+    The hazard has a patch and a still. `head` is added to run.json.
     """
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     with (folder / "results.csv").open("w", newline="") as file:
@@ -87,7 +88,7 @@ def make_run(folder: Path, **head: object) -> Path:
 
 
 class Page(HTMLParser):
-    """Text and links of a page; fails on tags that are not closed in order."""
+    """Parse the text and the links of a page. Fail if tags are not closed in order."""
 
     VOID = ("meta", "link", "br", "img", "input", "wbr")
 

@@ -1,4 +1,4 @@
-"""A report's first answers, compared with hand counts."""
+"""The first answers of a report, compared with counts by hand."""
 
 import csv
 import json
@@ -44,7 +44,8 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    """A made-up run of `RUNS`; the experiments cost 1, 2, 4, ... s of CPU time, the last one none."""
+    """A made-up run with the rows of `RUNS`. The experiments cost 1, 2, 4, ... s of CPU time, except the
+    last one, which has none."""
     make_run(tmp_path, metrics=METRICS)
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:
@@ -77,7 +78,7 @@ def said(run: ReportedRun) -> dict[str, Answer]:
 
 
 def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    """Harder contacts come first, then smaller margins; a row opens its experiment in the list of hazards."""
+    """Harder contacts come first, then smaller margins. A row opens its experiment in the list of hazards."""
     answer = said["dangerous"]
     assert (
         answer.says
@@ -102,7 +103,7 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
 
 
 def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
-    """Three of four hazards had no alert before: two none, one an alert too late."""
+    """Three of four hazards had no alert before them: two had no alert, and one had an alert too late."""
     answer = said["unwarned"]
     assert answer.says == (
         "3 of 4 hazards (75 %) were silent (no alert came before): 2 with no alert at all, 1 with an "
@@ -118,9 +119,8 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
 
 
 def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str, Answer]) -> None:
-    """The number of silent hazards decides, then the shortest time to one; a link opens the fastest silent
-    one.
-    """
+    """The type with the most silent hazards comes first; the shortest time to one decides ties. A link
+    opens the fastest silent hazard."""
     answer = said["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
@@ -139,7 +139,8 @@ def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str
 
 
 def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
-    """Silent hazards of a fault type, a class of severity and a time after activation, the worst first."""
+    """A frame of silent hazards, each given by fault type, severity class and time after the activation,
+    worst first."""
     names = ["kind", "severity", "after"]
     frame = pd.DataFrame(rows, columns=names)
     frame["t_hazard"] = 2 + frame["after"]
@@ -150,9 +151,8 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
 
 
 def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() -> None:
-    """One of class S3 ranks before many of S1; with equal numbers in each class, the faster one
-    ranks first.
-    """
+    """One hazard of class S3 ranks before many of S1. With equal numbers in each class, the faster one
+    ranks first."""
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
     answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
@@ -167,15 +167,15 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
 
 
 def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
-    """An experiment with a fault that reached its first actuator through a component, or was stopped."""
+    """The course of a fault that reached its first actuator through the link `by`, or was stopped at
+    components."""
     entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
     return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    """The link through which most faults reached the first actuator decides; the type's stops are counted,
-    and faults without a path are in neither number.
-    """
+    """The answer names the link through which most of a type's faults reached the first actuator, and
+    counts the faults that were stopped. Faults without a path are in neither number."""
     courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
@@ -192,7 +192,8 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
 
 
 def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
-    """With many of each, six contacts and four others are listed; each list opens its own kind of hazards."""
+    """With many contacts and many other hazards, six contacts and four others are listed. Each list opens
+    hazards of its own kind."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)
@@ -203,9 +204,8 @@ def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
 
 
 def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
-    """A fault that never became active was not survived; the weakest fault type is first, and those without a
-    hazard are named.
-    """
+    """A fault that never became active does not count as survived. The weakest fault type comes first, and
+    types without a hazard are named."""
     answer = said["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
@@ -217,7 +217,7 @@ def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answ
 
 
 def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) -> None:
-    """The most expensive fault type is first; an experiment that did not run takes no time."""
+    """The fault type with the most CPU time comes first. An experiment that did not run costs no time."""
     answer = said["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 "
@@ -229,7 +229,7 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
 
 
 def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
-    """The same run with only these experiments."""
+    """The same run, with these experiments only."""
     return replace(
         run,
         texts=run.texts[run.texts["experiment_id"].isin(names)].reset_index(drop=True),
@@ -238,12 +238,12 @@ def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
 
 
 def names_of(run: ReportedRun, empty: str) -> set[str]:
-    """The experiments in which something did not happen."""
+    """The ids of the experiments for which this column is empty."""
     return {row["experiment_id"] for row in lines_of(run.texts) if not row[empty]}
 
 
 def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
-    """A run without hazards shows neither an empty table nor a share of zero."""
+    """The report of a run without hazards has no empty table and no share of zero."""
     panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
     assert "## What came without a warning\n\nNo hazard came." in panel.markdown
@@ -252,9 +252,8 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
 
 
 def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
-    """If no fault was activated, nothing is reported as dangerous or survived; no link leads to an empty
-    list.
-    """
+    """If no fault was activated, nothing is reported as dangerous or as survived, and no link leads to an
+    empty list."""
     idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
@@ -265,7 +264,7 @@ def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None
 
 
 def test_a_crash_is_not_survived(run: ReportedRun) -> None:
-    """A crash is no hazard either, and is counted separately."""
+    """A crash is not a hazard and is counted separately."""
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
     found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
     assert found["survived"].says == (
@@ -275,7 +274,7 @@ def test_a_crash_is_not_survived(run: ReportedRun) -> None:
 
 
 def test_one_is_singular(run: ReportedRun) -> None:
-    """A count of one hazard or one experiment uses the singular."""
+    """A single hazard or experiment is reported in the singular."""
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
@@ -283,7 +282,7 @@ def test_one_is_singular(run: ReportedRun) -> None:
 
 
 def test_a_link_names_facets_as_the_page_reads_them() -> None:
-    """Values are escaped, and the order comes last."""
+    """The values in a link are escaped, and its sort order comes last."""
     assert (
         to_list({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end") == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
     )

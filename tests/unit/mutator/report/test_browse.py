@@ -1,4 +1,4 @@
-"""The page's data on experiments: columns, details, images."""
+"""The data on experiments in a page: columns, details and images."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -62,14 +62,13 @@ def row(name: str) -> Row:
     ],
 )
 def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str], made: object) -> None:
-    """Ids stay texts, empty cells stay empty, and non-finite numbers are written by name; name columns have a
-    dictionary for the filters, even without equal names, and are no numbers.
-    """
+    """Ids stay text, empty cells stay empty, and non-finite numbers are written by name. Columns of names
+    have a dictionary for the filters, even if no names are equal, and are not read as numbers."""
     assert column(name, values) == made
 
 
 def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
-    """The page of a target without alerts has no empty alert column."""
+    """The page has no empty column of alerts if the target has no alerts."""
     line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)
@@ -79,7 +78,7 @@ def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
 
 
 def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:
-    """The members of a shape are in row order; a row without a patch or plan has none."""
+    """The members of a shape are in the order of rows. A row without a patch or a plan has no shape."""
     one, two = experiment(3.0), experiment(4.0)
     rows = [row(two.id), row("none"), row(one.id)]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
@@ -97,7 +96,7 @@ def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., 
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    """The first images by time are in the page; films and exact plots are always links."""
+    """The first images by time are embedded in the page. Films and plots of exact traces are always links."""
     write_json(tmp_path / "run.json", {"schema": "run/1"})
     plots = tmp_path / "plots"
     plots.mkdir()
@@ -114,8 +113,7 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
 
 
 def test_rows_are_read_in_one_order() -> None:
-    """Rows are sorted by fault, scenario, method, trigger, then id, so the page does not depend on the order
-    of results.
-    """
+    """Rows are sorted by fault, scenario, method, trigger and id, so the page is independent of the order
+    of results."""
     rows = [row("b"), row("a")]
     assert sorted(rows, key=browse.reading_order) == [rows[1], rows[0]]

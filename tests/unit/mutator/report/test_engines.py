@@ -1,4 +1,4 @@
-"""What a report says about how experiments ran, and about their proof."""
+"""The report's description of how experiments ran, and of their equivalence check."""
 
 import json
 from collections.abc import Callable
@@ -42,9 +42,8 @@ Finish = Callable[..., Path]
 
 @pytest.fixture
 def finish(toycar: Workspace, tmp_path: Path) -> Finish:
-    """Create a finished run of four experiments; `proven` of their records are in its proof, too, after
-    `change` (None: it has no proof).
-    """
+    """Create a finished run of four experiments, of which `proven` have a record in the proof, after
+    `change`. With None, there is no proof."""
 
     def made(
         proven: int | None, change: Callable[[Record], Record] = lambda r: r, ways: object = WAYS
@@ -88,7 +87,7 @@ def summary(run: Path) -> engines.EngineSummary | None:
 
 
 def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
-    """There is a line for each way, and one for each reason against forking."""
+    """There is a line for each way of running, and a line for each reason against forking."""
     told = summary(finish(4))
     assert told is not None
     ways = dict(told.table.rows)
@@ -98,7 +97,7 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
 
 
 def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
-    """Rare reasons share one line, and every experiment is counted."""
+    """Rare reasons share a line, and every experiment is counted."""
     run = finish(None)
     more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)
@@ -109,7 +108,7 @@ def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
 
 
 def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
-    """The report uses the newest of several timings."""
+    """If an experiment has several timings, the report uses the newest one."""
     run = finish(4)
     again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
@@ -136,7 +135,7 @@ def record_ids(run: Path) -> list[str]:
     ],
 )
 def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
-    """The report distinguishes a complete proof, a partial one, and none."""
+    """The report distinguishes a complete proof, a partial proof, and no proof."""
     told = summary(finish(proven))
     assert told is not None
     assert said in told.proof
@@ -148,7 +147,8 @@ def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: 
 def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If many experiments ran on the reference engine by choice, forking is not reported as useless."""
+    """If the harness chose the reference engine for many experiments, the report does not say that forking
+    is useless."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
@@ -156,9 +156,8 @@ def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
 
 
 def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
-    """Both forms report a wrong record first, and again among the facts; how experiments ran comes later,
-    escaped.
-    """
+    """Both forms report a wrong record first, and again in the facts. How experiments ran comes later, and
+    its text is escaped."""
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
     written = building.write(run, None)
@@ -170,7 +169,8 @@ def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
 
 
 def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
-    """More of its proof makes the report out of date, even with unchanged results."""
+    """Additional results of the proof make the report out of date, even if the run's results are
+    unchanged."""
     run = finish(3)
     build(run)
     before = stamp.made_from(RunFolder.open(run), None)
@@ -180,9 +180,8 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
 
 
 def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Path], None]) -> None:
-    """A trace digest, which the proof compares, is in no result; a changed one makes the report out
-    of date.
-    """
+    """The proof compares the digests of traces, which are not part of the results. A changed digest makes
+    the report out of date."""
     run = finish(4)
     build(run)
     results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
@@ -195,12 +194,12 @@ def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Pat
 
 
 def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
-    """A failed proof is reported even if the run's timings name no engine."""
+    """A failed proof is reported even if the run's timings do not name an engine."""
     told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
     assert told.failed
 
 
 def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
-    """If timings do not name an engine, neither does the report."""
+    """If the timings do not name an engine, the report does not name one."""
     assert summary(finish(None, ways=())) is None

@@ -1,4 +1,4 @@
-"""The history of a folder of runs."""
+"""The history of the runs in a folder."""
 
 import csv
 import os
@@ -15,7 +15,7 @@ from .made_run import COLUMNS, NONE, OK, Page, make_run
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Two runs of one plan with different hazards, and one damaged folder."""
+    """Two runs of one plan with different hazards, and a damaged run folder."""
     calm = OK | NONE | {"outcome": "masked"}
     for hour, (name, lines) in enumerate((("before", (OK, calm, calm)), ("after", (calm, OK, calm))), 1):
         (tmp_path / name).mkdir()
@@ -32,7 +32,8 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
-    """A new hazard and one that disappeared are two changes; the command that compares them is shown."""
+    """A new hazard and one that disappeared count as two changes. The command that compares the two runs
+    is shown."""
     written = write_history(folder)
     text = written.markdown.read_text()
     assert written.runs == 2
@@ -43,7 +44,7 @@ def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
 
 
 def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
-    """A run name with a space is quoted."""
+    """The name of a run is quoted if it has a space."""
     (folder / "before").rename(folder / "the night before")
     written = write_history(folder)
     assert (
@@ -53,7 +54,7 @@ def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
 
 
 def test_a_folder_without_results_is_named(folder: Path) -> None:
-    """A folder without results is named, and the rest is shown."""
+    """A folder without results is named, and the other folders are shown."""
     written = write_history(folder)
     [why] = written.left_out
     assert why.startswith("broken: ")
@@ -62,7 +63,7 @@ def test_a_folder_without_results_is_named(folder: Path) -> None:
 
 
 def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) -> None:
-    """The page links to existing reports, and to comparisons of neighbouring runs, and nothing else."""
+    """The page links only to existing reports and to comparisons of neighbouring runs."""
     for page in ("after/report/index.html", "after/report/compare-before/index.html"):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / page).write_text("")

@@ -1,4 +1,4 @@
-"""A report's data on paths: shapes and columns for the page, counts by fault type."""
+"""A report's data on paths of faults: shapes and columns for the page, and counts by fault type."""
 
 from collections.abc import Callable
 from math import inf
@@ -15,7 +15,7 @@ CHANNELS = [
 
 
 def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
-    """Through eyes, pedals and car."""
+    """The path through eyes, pedals and car."""
     names = ("eyes", "pedals", "car")
     stages = tuple(Stage(component=n, state=s, channels=()) for n, s in zip(names, states, strict=True))
     through = {State.REACHED: Passage.THROUGH, State.HELD: Passage.STOPPED, State.UNSEEN: Passage.UNKNOWN}
@@ -27,9 +27,8 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
 
 
 def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths share a shape; an experiment without a path has none; deviations have three digits, or a
-    name, and columns of channels are empty if nothing left golden.
-    """
+    """Equal paths share a shape, and an experiment without a path has none. Deviations have three digits
+    or are a name. If nothing left golden, the columns of channels are empty."""
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
@@ -48,10 +47,10 @@ def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
 
 
 def test_counts_of_links_and_components() -> None:
-    """A link counts the faults that reached its start, unless the part after it is not recorded.
+    """A link counts the faults that reached its start, unless the component after it is not recorded.
 
-    A component counts those that it stopped and, of these, the masked ones, which count once for all that
-    stopped them.
+    A component counts the faults that it stopped, and how many of these were masked. If several components
+    stopped a masked fault, it counts once.
     """
     counts = PathCounts()
     counts.add(path(State.INJECTED, State.REACHED, State.REACHED))

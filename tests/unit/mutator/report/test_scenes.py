@@ -1,4 +1,4 @@
-"""The page's data on a target's scene."""
+"""The data on a target's scene in a page."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ from mutator.workspace import Workspace
 
 
 def names(tree: Tree) -> Iterator[str]:
-    """The channels in a tree."""
+    """The names of the channels in a tree."""
     if isinstance(tree, str):
         yield tree
     elif isinstance(tree, list):
@@ -17,7 +17,8 @@ def names(tree: Tree) -> Iterator[str]:
 
 
 def test_the_shipped_scene_is_of_channels() -> None:
-    """Every formula of it uses channels of the target; it follows an actor that is always in sight."""
+    """Every formula of the scene uses channels of the target. The scene follows an actor that is always
+    visible."""
     manifest = Workspace.find().manifest("openpilot")
     scene = scene_facts(manifest)
     assert scene is not None

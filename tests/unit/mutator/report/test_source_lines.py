@@ -1,4 +1,5 @@
-"""The source of a run with operators' mutants: marks of lines, and the page's parts based on them."""
+"""The source of a run with operators' mutants: the marks of lines, and the parts of the page that use
+them."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -26,15 +27,14 @@ FAILED = {"status": Status.HARNESS_ERROR, "outcome": None, "detail": "the disk i
 
 
 def at(text: str) -> int:
-    """The line (from 1) of the driver that begins with a text."""
+    """The number, from 1, of the driver's line that begins with this text."""
     lines = (Path(__file__).parents[3] / "toy" / "tree" / DRIVER).read_text().splitlines()
     return next(number for number, line in enumerate(lines, 1) if line.strip().startswith(text))
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """Permanent mutants of the line of `wanted` do harm, one of them was not active; transient ones are
-    masked; results for the pedals are unknown.
-    """
+    """The result of a mutant: on the line of `wanted`, permanent ones do harm, except one that was not
+    active, and transient ones are masked. Results for the pedals are unknown."""
     place = str(experiment.fault.value)
     if "3.0" in place or "6.0" in place:
         return FAILED
@@ -47,7 +47,7 @@ def became(experiment: Experiment) -> dict[str, Any]:
 def run(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path], of_operators: Callable[..., Any]
 ) -> Path:
-    """A run folder of such mutants of the toy's driver."""
+    """A run folder with such mutants of the toy's driver."""
     out = write_run(toycar, tmp_path / "run", became, changed=of_operators(toycar, DRIVER))
     results.build(out)
     (out / "report").mkdir()
@@ -55,7 +55,8 @@ def run(
 
 
 def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: Path) -> None:
-    """Each line has its permanent and transient outcomes, each mutant once; a harness error is no outcome."""
+    """Each line has the outcomes of its permanent and its transient mutants, each mutant once. A harness
+    error is not an outcome."""
     source = ReportedRun.open(RunFolder.open(run), toycar).source
     assert source is not None
     (file,) = source.files
@@ -68,7 +69,7 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
 
 
 def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
-    """The panel's links search columns of the page's table, with values of at least one row."""
+    """The links of the panel search columns of the page's table for values that at least one row has."""
     reported = ReportedRun.open(RunFolder.open(run), toycar)
     panel = source_panel(reported)
     assert panel is not None
@@ -88,7 +89,7 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
 
 
 def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> None:
-    """The totals equal those of the command line; without golden runs no alert is compared."""
+    """The totals equal those of the command line. Without golden runs, alerts are not compared."""
     loaded = load_run(run, workspace=toycar)
     totals = loaded.mutation_totals()
     assert totals.heads[:3] == ("mutation score", "number", "not activated")
@@ -104,7 +105,7 @@ def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> Non
 
 
 def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:
-    """If the source has changed, its lines are not shown; the score stays."""
+    """If the source has changed, its lines are not shown, and the score is."""
     path = toycar.library.parent / "tree" / DRIVER
     path.write_text("# one more line\n" + path.read_text())
     reported = ReportedRun.open(
@@ -120,7 +121,7 @@ def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) ->
 def test_a_run_without_operators_has_neither_panel(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """Its report is unchanged: no panel, no column of lines."""
+    """The report of a run without operators' mutants has neither the panel nor the column of lines."""
     out = write_run(toycar, tmp_path / "run")
     results.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)

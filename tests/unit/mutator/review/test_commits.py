@@ -1,4 +1,4 @@
-"""With `four_eyes` the author of the last change in git cannot approve it."""
+"""With `four_eyes`, the author of the last change in git cannot approve that change."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ def git(folder: Path, *words: str) -> str:
 
 
 def commit(root: Path, path: str, author: str) -> str:
-    """Change a file and commit it as the author; return the commit."""
+    """Change a file, commit it as the author, and return the commit."""
     with (root / path).open("a") as file:
         file.write("{# more #}\n" if path.endswith("j2") else "# more\n")
     git(root, "commit", "-qam", "more", f"--author={author}")
@@ -36,7 +36,7 @@ def commit(root: Path, path: str, author: str) -> str:
 
 @pytest.fixture
 def root(toycar: Workspace) -> Path:
-    """The toy in a clone, with `four_eyes`, written entirely by Git Smith."""
+    """The toy in a clone with `four_eyes`, written by Git Smith alone."""
     root = toycar.library.parent
     (root / "fault_library/reviews").mkdir()
     (root / "fault_library/reviews/toycar.yaml").write_text(HEAD)
@@ -60,9 +60,8 @@ def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
 
 
 def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root: Path) -> None:
-    """The author is refused for any part of a group (spec, template, its YAML) and under any signature;
-    others may approve.
-    """
+    """An author of any part of a group (spec, template, or its YAML) is refused under any signature.
+    Others may approve."""
     for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
@@ -76,7 +75,8 @@ def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root:
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
 def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path, path: str) -> None:
-    """Only the last author of the spec or template is refused, not earlier ones; no other file counts."""
+    """Only the last author of the spec or the template is refused, not earlier authors. Other files are
+    ignored."""
     sha = commit(root, path, "Jane Doe <jane@example.org>")
     commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
     with pytest.raises(MutatorError, match=sha[:12]):
@@ -86,7 +86,7 @@ def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path,
 
 
 def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> None:
-    """A co-author in the commit's message is refused like the author."""
+    """A co-author named in the commit's message is refused like the author."""
     commit(root, LANE, "Joe <joe@example.org>")
     words = "more\n\nCo-authored-by: Jane  Doe <jane@example.org>\nCo-Authored-By: Jim <jim@example.org>"
     git(root, "commit", "-q", "--amend", "-m", words)
@@ -97,7 +97,8 @@ def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> N
 
 
 def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
-    """A merge does not let the later of two authors approve their own change, and the merger is no author."""
+    """After a merge, the later of two authors still cannot approve their own change. The person who merges
+    is not an author."""
     git(root, "checkout", "-qb", "side")
     commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
     git(root, "checkout", "-q", "-")
@@ -109,7 +110,7 @@ def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
 
 
 def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> None:
-    """An uncommitted change, an untracked file and a library without git are refused with a remedy."""
+    """An uncommitted change, an untracked file, and a library without git are refused with a remedy."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
     with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):
@@ -125,7 +126,7 @@ def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> Non
 
 
 def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> None:
-    """The commit has `-dirty` if anything except reviews is uncommitted."""
+    """The commit ends in `-dirty` if anything is uncommitted, except reviews."""
     sha = git(root, "rev-parse", "HEAD")
     for _ in range(2):  # the second time the first decision is uncommitted
         decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
@@ -135,7 +136,7 @@ def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> 
 
 
 def test_who_is_at_work(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The name is the clone's own `user.name`, or empty."""
+    """The reviewer's name is the clone's own `user.name`, or empty."""
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     assert user_name(toycar) is None

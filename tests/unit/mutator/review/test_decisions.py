@@ -1,4 +1,5 @@
-"""Reviewers' decisions are stored unchanged, under one lock; a stale view causes a conflict."""
+"""Reviewers' decisions are stored unchanged under one lock. A decision made from an old view is a
+conflict."""
 
 import os
 import subprocess
@@ -42,14 +43,14 @@ def group(name: str, bound: Bound = BOUND, diff: str = "+x = 1\n") -> Group:
 
 
 def say(toy: Workspace, kind: Kind, *names: str, by: str = "Jane Doe", text: str = "") -> Review:
-    """Apply these changes to these groups, by somebody who has seen everything so far."""
+    """Apply these changes to these groups, by a reviewer who has seen the latest decisions."""
     changes = [Change(group=group(name), kind=kind, by=by, text=text) for name in names]
     review = load_review(toy, "toycar")
     return record(toy, "toycar", changes, {one.group.id: review.revision(one.group.id) for one in changes})
 
 
 def test_what_is_said_is_kept(toycar: Workspace) -> None:
-    """Decisions, remarks and flags in any alphabet are read as written, together with revisions."""
+    """Decisions, remarks and flags in any alphabet are read as written, and so are their revisions."""
     say(toycar, Kind.APPROVE, "b", "0", text="fine")
     say(toycar, Kind.REJECT, "1", by="Ünï 'x' # \"y\"", text="a: b\\n")
     say(toycar, Kind.REMARK, "a", text="- [not yaml]")
@@ -68,9 +69,8 @@ def test_what_is_said_is_kept(toycar: Workspace) -> None:
 
 
 def test_states(toycar: Workspace) -> None:
-    """A group is new until decided, then has its decision, and is changed once anything that it depends on
-    differs.
-    """
+    """A group is new until it is decided. Then it has its decision until something that the decision
+    depends on changes."""
     say(toycar, Kind.APPROVE, "a")
     found = say(toycar, Kind.REJECT, "b")
     other = replace(BOUND, function="e" * 16, template="1" * 16, calls="2" * 16)
@@ -101,13 +101,13 @@ def test_states(toycar: Workspace) -> None:
 def test_values_must_lie_within_the_approved_ones(
     toycar: Workspace, values: dict[str, tuple[float | str, ...]], changed: list[str]
 ) -> None:
-    """A subset of the approved values is approved; a value outside is reported with both ranges."""
+    """A subset of the approved values is approved. A value outside them is reported with both ranges."""
     found = say(toycar, Kind.APPROVE, "a")
     assert found.changed(replace(group("a"), values=values)) == changed
 
 
 def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
-    """A group has one block and one decision; earlier remarks stay."""
+    """A group has one block with one decision, and keeps its earlier remarks."""
     say(toycar, Kind.APPROVE, "a", text="fine")
     found = say(toycar, Kind.REJECT, "a", by="Joe", text="no")
     assert found.describe(group("a")).startswith("rejected by Joe")
@@ -116,7 +116,7 @@ def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
 
 
 def test_what_is_taken_back_is_gone(toycar: Workspace) -> None:
-    """A cleared decision leaves the remarks; an empty block is deleted, too."""
+    """If a decision is cleared, the remarks stay. An empty block is deleted."""
     say(toycar, Kind.APPROVE, "a", "b", text="fine")
     say(toycar, Kind.FLAG, "c")
     found = say(toycar, Kind.CLEAR, "a")
@@ -126,7 +126,8 @@ def test_what_is_taken_back_is_gone(toycar: Workspace) -> None:
 
 
 def test_who_has_not_seen_the_latest_writes_nothing(toycar: Workspace) -> None:
-    """A conflict names the groups and the other's decision; none of the changes is written."""
+    """The error for a conflict names the groups and the other reviewer's decision. None of the changes is
+    written."""
     before = load_review(toycar, "toycar")
     say(toycar, Kind.REJECT, "a", by="Joe", text="too much")
     changes = [Change(group=group(name), kind=Kind.APPROVE, by="Jane") for name in ("a", "b")]
@@ -138,7 +139,8 @@ def test_who_has_not_seen_the_latest_writes_nothing(toycar: Workspace) -> None:
 
 
 def test_different_groups_never_conflict(toycar: Workspace) -> None:
-    """A decision about one group does not need the latest of other groups."""
+    """A decision about a group is accepted even if the reviewer has not seen the latest decisions about
+    other groups."""
     say(toycar, Kind.REJECT, "a", by="Joe")
     found = record(toycar, "toycar", [Change(group=group("b"), kind=Kind.APPROVE, by="Jane")], {})
     assert [found.state(group(name)) for name in "ab"] == [State.REJECTED, State.APPROVED]
@@ -159,7 +161,7 @@ for name in sys.argv[4]:
 
 
 def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
-    """Two processes that decide about different groups at the same time both keep all their decisions."""
+    """Two processes that decide about different groups at the same time lose no decision."""
     words = [sys.executable, "-c", _WRITER, str(Path(__file__).parent), str(toycar.library)]
     shares = {"Jane": "02468ace", "Joe": "13579bdf"}
     with_pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "env": dict(os.environ)}
@@ -196,9 +198,8 @@ def test_a_change_tells_what_it_is_part_of(tmp_path: Path) -> None:
 
 
 def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
-    """A changed group shows the diff between the approved text and the current one; without the stored text,
-    nothing.
-    """
+    """A changed group shows the diff between the approved and the current text, or no diff if the approved
+    text is not stored."""
     found = say(toycar, Kind.APPROVE, "a")
     now = group("a", replace(BOUND, diff="e" * 16), "+x = 2\n")
     assert found.changes(group("a")) == ""
@@ -206,7 +207,7 @@ def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
     path = toycar.library / "reviews" / "seen" / "toycar" / f"{'a' * 12}.txt"
     text = path.read_text()
     path.write_text(text.replace("d" * 16, "9" * 16))
-    assert found.changes(now) == ""  # of another decision
+    assert found.changes(now) == ""  # belongs to another decision
     path.unlink()
     assert found.changes(now) == ""
     assert found.state(now) is State.CHANGED
@@ -222,7 +223,7 @@ def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
     ],
 )
 def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, argument: str) -> None:
-    """A change has an author's name, and its content is text."""
+    """A change has its author's name, and its content is text."""
     with pytest.raises(MutatorError) as caught:
         record(toycar, "toycar", [Change(group=group("a"), kind=kind, by=by, text=text)], {})
     assert caught.value.argument == argument
@@ -230,13 +231,13 @@ def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, a
 
 
 def test_a_remark_is_one_line(toycar: Workspace) -> None:
-    """Line breaks in a remark become spaces."""
+    """Line breaks in a remark are replaced by spaces."""
     found = say(toycar, Kind.REMARK, "a", text="one\n two\ttabs")
     assert found.remarks("a" * 12)[0].text == "one two tabs"
 
 
 def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A failed write leaves the old file and no temporary one."""
+    """After a failed write, the old file is there and no temporary file."""
     path = say(toycar, Kind.APPROVE, "a").path
     before = path.read_bytes()
 
@@ -253,7 +254,7 @@ def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytes
 def test_the_shipped_library_takes_no_decisions(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A decision about a library from a wheel is refused before anything is written."""
+    """A decision about a library from a wheel is refused, and nothing is written."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "cache"))
     library = tmp_path / "cache" / "mutator" / "shipped" / "0"

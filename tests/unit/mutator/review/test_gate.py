@@ -1,4 +1,4 @@
-"""`--require-reviewed`: a plan with unapproved groups does not start."""
+"""With `--require-reviewed`, a plan with unapproved groups does not start."""
 
 from pathlib import Path
 
@@ -21,14 +21,14 @@ def plan(toycar: Workspace) -> Plan:
 
 
 def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | None = None) -> None:
-    """Approve or reject the groups of the plan, or its first `count`."""
+    """Approve or reject the plan's groups, or only the first `count`."""
     changes = [Change(group=one, kind=kind, by=f"Reviewer {count}") for one in of_plan(toy, plan)[:count]]
     review = load_review(toy, "toycar")
     record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
 
 
 def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
-    """The run folder stores who approved what, for the report."""
+    """The run folder stores for the report who approved which group."""
     run = freeze(plan, tmp_path / "run", toycar).path
     assert gate.approval_summary(run) == ""
     decide(toycar, plan)
@@ -44,7 +44,8 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
 
 
 def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
-    """Missing, changed and rejected groups are listed in this order, with reasons, experiments and remedy."""
+    """The error lists missing, changed and rejected groups, in this order, with reasons, experiments and a
+    remedy."""
     groups = of_plan(toycar, plan)
     missing, changed, rejected = groups[0], groups[1], groups[-1]
     decide(toycar, plan)
@@ -67,7 +68,7 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
 
 
 def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Plan) -> None:
-    """A group that no experiment uses is listed without a number of experiments."""
+    """A group that no experiment uses is listed without a count of experiments."""
     alone = [group for group in of_plan(toycar, plan) if not group.runs]
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, plan)
@@ -76,7 +77,7 @@ def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Pl
 
 
 def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
-    """A campaign whose name or text is not in the library is named by its path."""
+    """A campaign is named by its path if its name or its text is not in the library."""
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:
@@ -85,16 +86,15 @@ def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: P
 
 
 def test_nothing_is_planned_without_approval(toycar: Workspace, tmp_path: Path) -> None:
-    """A refused run leaves no plan, so that it can be given other options."""
+    """A refused run leaves no plan, so that it can be started again with other options."""
     with pytest.raises(CheckFailed):
         run_campaign(toycar, "small", tmp_path / "run", reviewed=True)
     assert not (tmp_path / "run" / "run.json").exists()
 
 
 def test_a_run_goes_on_without_the_spec_file_of_its_campaign(toycar: Workspace, tmp_path: Path) -> None:
-    """A run's own copy of a campaign cannot find a file next to the original; its drawn faults are
-    approved.
-    """
+    """A run's copy of a campaign cannot find a file that was next to the original. Its drawn faults are
+    still approved."""
     mine = tmp_path / "mine"
     mine.mkdir()
     spec = (toycar.library / "faults/sensor/lane.yaml").read_text()

@@ -1,4 +1,4 @@
-"""Shapes of patches: varying parts become holes, the rest stays text."""
+"""Shapes of patches: the parts that vary become holes, and the rest is text."""
 
 from dataclasses import replace
 
@@ -30,9 +30,8 @@ def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
 
 
 def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
-    """Faults of a variant share one diff with holes; filled with a fault's values, it is that
-    fault's patch.
-    """
+    """The faults of a variant share a diff with holes. Filled with the values of one fault, it is the
+    patch of that fault."""
     pairs = [(fault, trigger) for fault in faults(toycar, "longer") for trigger in (NEAR, FAR)]
     (shape,) = grouped(toycar, pairs)
     assert shape.members == tuple(str(i) for i in range(8))
@@ -42,7 +41,8 @@ def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
 
 
 def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
-    """The table has ids, the trigger's condition and the fault's parameter; common parts stay text."""
+    """The table has the ids, the trigger's condition and the fault's parameter. Parts that all share stay
+    text."""
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
     named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)
@@ -53,7 +53,7 @@ def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
 
 
 def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
-    """`+ 3` and `- 3` fill the same hole of one diff."""
+    """`+ 3` and `- 3` fill the same hole of the same diff."""
     first, second, *_ = faults(toycar, "longer")
     (injection,) = second.injections
     less = replace(second, injections=(replace(injection, params=(("by", -3.0), ("target", "gap"))),))
@@ -73,7 +73,7 @@ def test_not_a_number_is_a_value(toycar: Workspace) -> None:
 
 
 def test_what_must_be_in_common(toycar: Workspace) -> None:
-    """Another place or model, or bounds versus none, makes another shape."""
+    """Another place or another model gives another shape, and so does a bound that is set or not set."""
     longer, nearer = faults(toycar, "longer")[0], faults(toycar, "nearer")[0]
     shifted = faults(toycar, "shifted", "sensor/lane")[0]
     silent = faults(toycar, "no_data", "sensor/silence")[0]
@@ -82,18 +82,19 @@ def test_what_must_be_in_common(toycar: Workspace) -> None:
 
 
 def test_what_triggers_a_change_makes_no_other_shape(toycar: Workspace) -> None:
-    """A context, a time or neither, held for a time or to the end, share one diff."""
+    """Faults share a diff whether they have a context, a time or neither, and whether they hold for a time
+    or to the end."""
     longer = faults(toycar, "longer")[0]
     triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
     assert len(grouped(toycar, [(longer, trigger) for trigger in triggers])) == 1
 
 
 def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
-    """A shape has the same id whichever faults it was built from."""
+    """The id of a shape does not depend on the faults from which it was built."""
     one, other, *_ = faults(toycar, "longer")
     (first,), (second,) = grouped(toycar, [(one, NEAR)]), grouped(toycar, [(other, FAR)])
     assert first.id == second.id
-    assert first.diff != second.diff  # for a single member, everything is text
+    assert first.diff != second.diff  # for a single member, all parts are text
 
 
 @pytest.mark.parametrize(
@@ -106,13 +107,14 @@ def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
     ],
 )
 def test_any_text_is_given_back(patch: str) -> None:
-    """Text that is no mutant's patch is a shape of itself."""
+    """Text that is not a mutant's patch is a separate shape."""
     (shape,) = shapes([("a", "", patch), ("b", "", patch)])
     assert shape.patch(1) == patch
 
 
 def test_pristine_lines_are_never_cut() -> None:
-    """Numbers outside injected lines are the target's: patches that differ in them have different shapes."""
+    """Numbers outside injected lines belong to the target, so patches that differ in them have different
+    shapes."""
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,2 @@\n x = 3\n+y = 4  # fi:01234567\n"
     )
@@ -122,7 +124,8 @@ def test_pristine_lines_are_never_cut() -> None:
 
 
 def test_a_tag_of_several_injections_has_no_numbers() -> None:
-    """Mutants that change the same two values in a line are alike, whatever the ids in its tag."""
+    """Mutants that change the same two values in a line have the same shape, regardless of the ids in its
+    tag."""
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,1 @@\n-x = y, z\n"
         '+x = (0 if _fi.active("0123456a") else y), (0 if _fi.active("0123456b") else z)'

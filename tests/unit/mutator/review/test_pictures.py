@@ -1,4 +1,4 @@
-"""Images before and after image effects, for any target, by running the injected lines."""
+"""Images before and after image effects, for any target. The injected lines are run to draw them."""
 
 import io
 from collections.abc import Callable
@@ -23,7 +23,7 @@ Lit = Callable[..., tuple[Workspace, Group]]
 
 @pytest.fixture
 def lit(toycar: Workspace, give_eyes: Callable[..., None]) -> Lit:
-    """Give the toy eyes and a fault in what they see; return the workspace and its group."""
+    """Give the toy a camera and a fault in its images. Return the workspace and the fault's group."""
 
     def make(**given: str) -> tuple[Workspace, Group]:
         give_eyes(toycar, **given)
@@ -59,7 +59,7 @@ def grey(jpeg: bytes) -> float:
 
 
 def test_three_levels_of_an_effect(lit: Lit) -> None:
-    """There is the target's own image, and those with the least, a middle and the largest value."""
+    """The images are the target's own one, and those for the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
@@ -72,9 +72,8 @@ def test_three_levels_of_an_effect(lit: Lit) -> None:
 
 
 def test_one_level_is_asked_for(lit: Lit) -> None:
-    """One level is a pair of files; None for a level that a group with fewer values lacks, and for any other
-    group.
-    """
+    """The images of a level are a pair of files. The result is None for a level that a group with few
+    values lacks, and for a group without images."""
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
@@ -85,7 +84,8 @@ def test_one_level_is_asked_for(lit: Lit) -> None:
 
 
 def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
-    """Nothing is run twice; a changed line of the effect, or a damaged entry, is drawn again."""
+    """An image is not drawn twice. It is drawn again after a line of the effect changed or its entry was
+    damaged."""
     workspace, group = lit()
     first = drawn(workspace, group)
     runs.clear()
@@ -101,7 +101,7 @@ def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
 
 
 def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -> None:
-    """One run of the target draws any number of images."""
+    """One run of the target is enough for any number of images."""
     workspace, group = lit()
     halves = [
         replace(group, id=name, faults=faults)
@@ -116,15 +116,14 @@ def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -
 
 
 def test_a_picture_in_an_attribute(lit: Lit) -> None:
-    """Each value is applied to the target's original image, not to the previous result."""
+    """Each value is applied to the target's original image, not to the result for another value."""
     workspace, group = lit(values="[10, 20, 30]", target="self.picture", place="self.picture")
     assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
 
 
 def test_what_is_more_severe() -> None:
-    """The more severe amount is the one that changes the image more, larger or smaller; with amounts on both
-    sides of zero, too.
-    """
+    """The more severe of two amounts changes the image more, whether it is larger or smaller. This holds
+    for amounts on both sides of zero."""
     assert pictures._by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
     assert pictures._by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
     assert pictures._by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
@@ -132,7 +131,7 @@ def test_what_is_more_severe() -> None:
 
 
 def test_chance_does_not_turn_neighbours_round() -> None:
-    """Nine blobs are less severe than ten, even if they happen to cover more."""
+    """Nine blobs are less severe than ten, even if they cover a larger area."""
     assert pictures._by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
     assert pictures._by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
     assert pictures._by_severity([2.0, 2.0]) == [0, 1]
@@ -146,13 +145,13 @@ def test_chance_does_not_turn_neighbours_round() -> None:
     ],
 )
 def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None:
-    """An array of bytes is an image; the target's error is reported in its own words."""
+    """An array of bytes is an image. An error of the target is reported with the target's own text."""
     with pytest.raises(MutatorError, match=said):
         drawn(*lit(picture=picture))
 
 
 def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
-    """A run that ends before the place is reported, without waiting."""
+    """A run that ends before the injected place is reported immediately."""
     workspace, _ = lit()
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
@@ -163,7 +162,7 @@ def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
 
 @pytest.mark.slow
 def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_path: Path) -> None:
-    """Each effect changes an image at every level."""
+    """Each effect changes the image at every level."""
     manifest = clone.manifest("openpilot")
     wanted = [g for g in of_library(clone, manifest, specs=["vision_*/*"]) if pictures.has_pictures(g)]
     found = pictures.of_groups(clone, manifest, wanted)

@@ -1,6 +1,5 @@
-"""The review file merges under version control, reports a mistake at its line, and old versions can
-be read.
-"""
+"""The review file can be merged under version control, reports mistakes with their line, and can be read
+in old versions."""
 
 import shutil
 import subprocess
@@ -42,7 +41,7 @@ def written(path: Path, *names: str) -> Path:
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """All content of blocks and head is read back; writing it again gives the same text."""
+    """All content of the blocks and the head is read back. Written again, it gives the same text."""
     path = written(tmp_path / "toycar.yaml", "b", "a")
     found = review_file.load(path, "toycar")
     assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
@@ -52,7 +51,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 
 
 def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
-    """Decisions of two people about different groups merge under version control."""
+    """Decisions by two people about different groups merge under version control."""
     files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
     merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
     (path := tmp_path / "toycar.yaml").write_bytes(merged)
@@ -82,7 +81,7 @@ def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
     ],
 )
 def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, words: str) -> None:
-    """A mistake is reported with the file, its line and the offending value."""
+    """A mistake is reported with the file, its line, and the invalid value."""
     path = written(tmp_path / "toycar.yaml", "a", "b")
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
@@ -94,12 +93,13 @@ def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, w
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """A file of `review/1`: three changes, each under two kinds of triggers, and the probe; all approved."""
+    """A file with schema `review/1`: three changes, each under two kinds of triggers, and the probe. All
+    are approved."""
     return shutil.copy(OLD, tmp_path / "toycar.yaml")
 
 
 def edited(path: Path, group: str, old: str, new: str) -> dict[str, Entry]:
-    """The entries by `what`, after an edit of that group's block."""
+    """The entries by `what`, after an edit in the block of that group."""
     head, block, rest = path.read_text().partition(f'group: "{group}"')
     assert old in rest
     path.write_text(head + block + rest.replace(old, new, 1))
@@ -114,9 +114,8 @@ PROBE = "the probe, observing at toycar/go.py Drive.step after_assign now"
 
 
 def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
-    """A change is approved if it was approved under each kind of trigger; data that was not stored is not
-    bound.
-    """
+    """A change is approved if it was approved under each kind of trigger. It does not depend on data that
+    was not stored."""
     found = {one.what: one for one in review_file.load(old, "toycar").entries.values()}
     assert set(found) == {GAP, OFFSET, SILENCE, PROBE}
     decision = found[OFFSET].decision
@@ -130,23 +129,23 @@ def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
 
 
 def test_an_old_rejection_counts(old: Path) -> None:
-    """A change is rejected if it was rejected under one kind of trigger, with that reviewer."""
+    """If a change was rejected under one kind of trigger, it is rejected, by the same reviewer."""
     edited(old, "d32713d465f1", "approved", "rejected")
     found = edited(old, "d32713d465f1", "Jane Doe", "Joe")[OFFSET].decision
     assert found is not None and (found.verdict, found.by) == (Verdict.REJECTED, "Joe")
 
 
 def test_old_decisions_about_different_things_do_not_hold(old: Path) -> None:
-    """If two kinds of triggers were approved with different diffs, the approval no longer holds."""
+    """If a change was approved with different diffs under two kinds of triggers, the approval is no longer
+    valid."""
     found = edited(old, "50d62901775b", "119123172159a027", "9" * 16)[OFFSET].decision
     assert found is not None
     assert found.bound == Bound(diff="0" * 16, function="3eff22e1db4eaddf", template="3307b2f6026230e8")
 
 
 def test_old_remarks_are_kept(old: Path) -> None:
-    """A decision's remark becomes a remark, for all kinds of triggers; a reviewer of one kind counts as a
-    reviewer.
-    """
+    """The remark of a decision becomes a remark for all kinds of triggers. A reviewer under one kind
+    counts as a reviewer."""
     edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
     edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
     entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]
@@ -167,7 +166,7 @@ def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
 
 
 def test_writing_upgrades_the_file(old: Path) -> None:
-    """Writing converts an old file to the new schema with the same content."""
+    """Writing an old file converts it to the new schema with the same content."""
     found = review_file.load(old, "toycar")
     review_file.write(old, "toycar", found)
     assert f"schema: {review_file.SCHEMA}\n" in old.read_text()

@@ -1,4 +1,4 @@
-"""A changed line invalidates exactly the approvals that it affects."""
+"""A changed line makes exactly those approvals stale that depend on it."""
 
 import shutil
 from collections.abc import Callable
@@ -100,7 +100,7 @@ IN_SENSE = {VEIL, GLARE, HELPER, GAP, LOW, LANE, SILENCE}
 
 @pytest.fixture(scope="module")
 def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Path:
-    """A toy with two image effects and a fault model that calls a helper; everything is approved."""
+    """A toy with two image effects and a fault model that calls a helper. Everything is approved."""
     toycar = copy_toycar(tmp_path_factory.mktemp("approved"))
     car = toycar.library.parent / "tree" / "toycar"
     (car / "effects.py").write_text(EFFECTS)
@@ -123,7 +123,7 @@ def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
 
 @pytest.fixture
 def approved(original: Path, tmp_path: Path) -> Workspace:
-    """A copy of it to change."""
+    """A copy of that toy, which a test may change."""
     root = shutil.copytree(original, tmp_path / "toy")
     return Workspace(library=root / "fault_library", templates=root / "templates")
 
@@ -155,9 +155,8 @@ def groups(toy: Workspace) -> tuple[Group, ...]:
 def test_exactly_what_is_affected_is_stale(
     approved: Workspace, file: str, old: str, new: str, stale: set[str], why: str
 ) -> None:
-    """A change in an effect, its base, a called helper or constant, a template, a function or a range makes
-    exactly the related approvals stale, with the reason.
-    """
+    """A change in an effect, its base, a called helper or constant, a template, a function or a range
+    makes exactly the related approvals stale. The reason is given."""
     path = approved.library.parent / file
     text = path.read_text()
     assert old in text
@@ -171,7 +170,7 @@ def test_exactly_what_is_affected_is_stale(
 
 @pytest.mark.slow
 def test_a_line_of_an_effect_of_openpilots(clone: Workspace, tmp_path: Path) -> None:
-    """Of its groups exactly those with a changed effect, base or helper are stale."""
+    """Exactly those groups of the shipped library are stale whose effect, base or helper changed."""
     target = tmp_path / "target"
     shutil.copytree(clone.library.parent / "target", target, ignore=shutil.ignore_patterns("__pycache__"))
     library = tmp_path / "fault_library"
@@ -203,7 +202,7 @@ def test_a_line_of_an_effect_of_openpilots(clone: Workspace, tmp_path: Path) -> 
         return {g.id for g in before.values() if f"-- selfdrive/sim/effects/{place}\n" in g.seen}
 
     assert stale("air.py", "class Fog(Effect):\n", "class Fog(Effect):\n    # another line\n") == uses("Fog,")
-    assert len(uses("Fog,")) == 2  # alone, and with rain
+    assert len(uses("Fog,")) == 2  # the effect alone, and together with rain
     base = stale("effect.py", "    MOVING: ClassVar", "    # another line\n    MOVING: ClassVar")
     assert base == {g.id for g in before.values() if "image_effect" in g.models}
     assert uses("AveragingBlur", "MedianBlur") <= (helper := calls("canvas.py filtered")) < base

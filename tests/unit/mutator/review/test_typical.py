@@ -27,9 +27,8 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
 def test_counts_a_typical_and_the_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """The counts cover the group only; the examples are the median of the most frequent ending, and the worst
-    of all.
-    """
+    """Only the group's experiments are counted. The examples are the median of the most frequent ending
+    and the worst of all."""
     plan = make_plan(toycar, "toy", Choices())
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
@@ -48,7 +47,7 @@ def test_counts_a_typical_and_the_worst_experiment(
 
 
 def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """A group that the campaign left out has no verdict, nor has the probe, which all mutants share."""
+    """A group that the campaign left out has no verdict. The probe has none, because all mutants share it."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -57,7 +56,7 @@ def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: W
 
 
 def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """The results of a resumed run are read again."""
+    """If a run was resumed, its results are read again."""
     group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):
@@ -72,7 +71,8 @@ def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_
 def test_many_who_ask_at_once_read_the_table_once(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The table of a large run takes seconds, and too much memory to read it for each group on a page."""
+    """The results are not read for each group of a page, because reading a large table takes seconds and
+    much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -120,5 +120,5 @@ def row(**given: Any) -> Row:
     ],
 )
 def test_a_verdict_in_words(given: dict[str, Any], words: str) -> None:
-    """The verdict says what happened, when, and whether there was a warning."""
+    """The verdict says what happened, when, and whether an alert came first."""
     assert verdict_of(row(**given), {"H1": "a crash"}) == words

@@ -1,4 +1,4 @@
-"""The possible values of a group follow from its specs, not from a seed's draws."""
+"""The possible values of a group follow from its specs and not from the values that a seed draws."""
 
 from dataclasses import replace
 
@@ -15,9 +15,8 @@ def faults(toy: Workspace, spec: str, seed: int = 0) -> list[Fault]:
 
 
 def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
-    """The range goes from the least to the greatest end of all ranges, in the variable's unit, for
-    any seed.
-    """
+    """For any seed, the range goes from the smallest to the largest end of all ranges, in the variable's
+    unit."""
     specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
     for seed in (0, 1):
         longer, nearer = (
@@ -30,7 +29,7 @@ def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
 
 
 def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
-    """Without its spec, a fault has only its own values."""
+    """If its spec is missing, a fault has only its own values."""
     fault = faults(toycar, "sensor/distance")[0]
     assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
 
@@ -41,13 +40,13 @@ def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
         ([3.0, -1.0], (-1.0, 3.0)),
         ([float("nan"), 3.0], (3.0, 3.0, "nan")),
         ([float("inf"), float("-inf")], ("-inf", "inf")),
-        ([True, "word", None], None),  # the group's name gives these
+        ([True, "word", None], None),  # the group's name has these
     ],
 )
 def test_what_is_no_number_is_a_word(
     toycar: Workspace, values: list[Value], found: tuple[object, ...] | None
 ) -> None:
-    """Values without an order are listed next to the range."""
+    """Values that cannot be ordered are listed next to the range."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = [replace(fault, injections=(replace(injection, params=(("by", one),)),)) for one in values]
@@ -55,7 +54,7 @@ def test_what_is_no_number_is_a_word(
 
 
 def test_several_injections_are_numbered_and_limits_are_values(toycar: Workspace) -> None:
-    """The chosen execution and instance are values, too; a seed is drawn and is no value."""
+    """The selected execution and instance count as values. A seed is drawn and does not."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))

@@ -1,4 +1,4 @@
-"""The tables of a run in its report and as files."""
+"""The tables of a run, in its report and as files."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ HEADER = (
 
 @pytest.fixture
 def run(tmp_path: Path) -> RunFolder:
-    """A run folder with a guided chaff run, its random partner, and the golden run of 30 s."""
+    """A run folder with a guided chaff run, its random partner, and a golden run of 30 s."""
     head = {"schema": "run/1", "target": "openpilot", "goldens": [["S1", []]]}
     (tmp_path / "run.json").write_text(json.dumps(head))
     plan_file.write(tmp_path, [], [])
@@ -38,7 +38,7 @@ def names(run: RunFolder, suffix: str) -> set[str]:
 
 
 def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
-    """Each table is a file in CSV and in Markdown, with the report's title."""
+    """Each table is written in CSV and in Markdown, with the title that it has in the report."""
     markdown = tables_panel(ReportedRun.open(run, HERE)).markdown
     assert "alert_to_hazard" in names(run, "md") == names(run, "csv")
     for file in (run.path / "report" / "tables").glob("*.md"):
@@ -46,14 +46,14 @@ def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
 
 
 def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
-    """Without the target's manifest, nothing can read when a run ends."""
+    """Without the target's manifest, the ends of runs are unknown, so there is no table of censored times."""
     tables_panel(ReportedRun.open(run, None))
     assert "propagation" in names(run, "csv")
     assert "alert_to_hazard" not in names(run, "csv")
 
 
 def test_files_are_the_same_each_time(run: RunFolder) -> None:
-    """CSV and Markdown of each table have the same bytes when written again."""
+    """Each table has the same bytes when it is written again, in CSV and in Markdown."""
     contents = []
     for _ in range(2):
         tables_panel(ReportedRun.open(run, HERE))
@@ -63,7 +63,7 @@ def test_files_are_the_same_each_time(run: RunFolder) -> None:
 
 
 def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
-    """Wherever alerts are counted, those of the fault-free run are named with its conditions."""
+    """A table that counts alerts is followed by the alerts of the fault-free runs, with their conditions."""
     golden = run.path / "golden" / "S1"
     drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
@@ -80,7 +80,7 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
 def test_alerts_are_told_only_of_a_target_that_has_some(run: RunFolder, alerts: list[str]) -> None:
-    """The report of a target without alerts explains no alert columns."""
+    """If the target has no alerts, the report does not explain columns of alerts."""
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
     markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
