@@ -1,1 +1,2 @@
-"""Compares two runs of the same faults by experiment. Runs no experiment and writes to no run folder."""
+"""Compares two runs of the same faults, experiment by experiment. It runs no experiments and does not write
+to run folders."""

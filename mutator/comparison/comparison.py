@@ -1,4 +1,4 @@
-"""A comparison of two runs: its tables and remarks, and the findings of gates."""
+"""A comparison of two runs: tables, remarks and gate findings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -33,27 +33,28 @@ from mutator.statistics.sheet import Sheet
 
 
 class Gate(StrEnum):
-    """Reasons for a gate to fail: changes for the worse, and unmatched experiments."""
+    """What a gate fails on: a change for the worse, or an unmatched experiment."""
 
-    NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard where there was none
-    #: a hazard that did not occur before, in addition to one that did
+    NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard, although the first run has none
+    #: another hazard, although the first run already has one
     OTHER_HAZARD = Change.OTHER_HAZARD.value
-    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or where there was none
-    EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: the first hazard comes sooner after the activation
-    LOST_ALERT = Change.LOST_ALERT.value  #: an alert is missing
+    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or a first contact
+    EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
+    LOST_ALERT = Change.LOST_ALERT.value  #: an alert of the first run is missing
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard
     NEW_CRASH = Change.NEW_CRASH.value  #: the controller crashes or does not finish
-    HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, the first has one
+    HARNESS_ERROR = Change.HARNESS_ERROR.value  #: the second run has no result, although the first has one
     UNMATCHED = "unmatched"  #: an experiment that only one of the runs has
-    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, where it was milder or none before
-    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, where it was milder or none before
-    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, where it was milder or none before
-    SEVERITY_S3 = "severity:S3"  #: a contact of class S3, where it was milder or none before
+    SEVERITY_S0 = "severity:S0"  #: a contact of class S0 or worse, with a milder one or none in the first run
+    SEVERITY_S1 = "severity:S1"  #: a contact of class S1 or worse, with a milder one or none in the first run
+    SEVERITY_S2 = "severity:S2"  #: a contact of class S2 or worse, with a milder one or none in the first run
+    SEVERITY_S3 = "severity:S3"  #: a contact of class S3, with a milder one or none in the first run
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """An experiment that a gate fails on: its id (in the second run, if it is there) and the problem."""
+    """An experiment on which a gate fails, and the problem. The id is that of the second run if the
+    experiment is in both runs."""
 
     gate: Gate
     experiment_id: str
@@ -62,7 +63,8 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two matched runs. `alerts_notes` say which alerts their fault-free runs also raise; empty for none."""
+    """Two matched runs. `alerts_notes` name the alerts that each run's fault-free runs raise; '' if there are
+    none."""
 
     a: Side
     b: Side
@@ -71,7 +73,7 @@ class Comparison:
 
     @cached_property
     def names(self) -> Names:
-        """The runs' display names: their folder names, made distinct if they are equal."""
+        """The display names of the runs: the folder names, made distinct if they are equal."""
         a, b = self.a.name, self.b.name
         return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
 
@@ -154,10 +156,10 @@ def compare(
 ) -> Comparison:
     """Compare two run folders; `only` filters experiments by plan columns.
 
-    MutatorError if no experiment has a partner; CheckFailed if a run's equivalence check failed.
+    Raise MutatorError if no experiment has a partner, and CheckFailed if a run's equivalence check failed.
     """
     a, b = read_side(run_a, only), read_side(run_b, only)
-    scale = b.folder.scale if a.folder.scale else None  # both by one scale, or neither
+    scale = b.folder.scale if a.folder.scale else None  # classify both runs by the same scale, or neither
     a, b = a.classed(scale), b.classed(scale)
     matching = match(a, b)
     if not matching.pairs:
@@ -190,7 +192,7 @@ def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ..
 
 
 def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
-    """The pairs with at least this severity class only in the second run."""
+    """The pairs that reach the severity class `least` in the second run but not in the first."""
     for side in (comparison.a, comparison.b):
         if side.folder.scale is None:
             raise MutatorError(
@@ -204,7 +206,7 @@ def _reaching(comparison: Comparison, least: str) -> tuple[Pair, ...]:
 
 
 def ending_change(pair: Pair) -> str:
-    """A pair's results: `sdc -> hazard (NEAR 7.10 s after activation)`."""
+    """How a pair's outcome changed, for example `sdc -> hazard (NEAR 7.10 s after activation)`."""
     return f"{_ending(pair.row_a)} -> {_ending(pair.row_b)}"
 
 

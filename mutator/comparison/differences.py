@@ -1,4 +1,4 @@
-"""Differences between two runs other than results: sources, choices and versions."""
+"""Differences between the inputs of two runs: sources, choices and versions."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -11,9 +11,9 @@ from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
 from mutator.verification.seal import not_verifiable
 
-_SHORT = 12  # digits of a digest shown
+_SHORT = 12  # digits that are shown of a digest
 _HEAD = ("campaign", "target", "seed", "reading")
-_PARTS = ("limit", "shard", "only", "exclude")  # choices that leave experiments out
+_PARTS = ("limit", "shard", "only", "exclude")  # choices that select some of the experiments
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +39,7 @@ class Files:
 
 
 def facts(a: Side, b: Side) -> tuple[Fact, ...]:
-    """The runs' inputs: all that results depend on, then packages that differ."""
+    """The inputs of both runs: everything that results depend on, then the packages that differ."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
     if not all("stretches" in side.folder.head for side in (a, b)):  # older runs list all installed packages
@@ -81,7 +81,8 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
-    """Runs that cannot be verified, and differences within pairs of equal name, with the number of pairs."""
+    """Remarks on runs that cannot be verified, and on pairs that have the same key but differ, with their
+    number."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
         ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
         ("wait for another condition", lambda p: p.a.trigger.condition != p.b.trigger.condition),
@@ -102,8 +103,8 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
 
 
 def parts_remark(a: Side, b: Side) -> str:
-    """A remark that the runs are different parts of a campaign, so the tables cover only their overlap; empty
-    if they are the same part."""
+    """A remark that the runs are different parts of a campaign. The tables then cover only their overlap.
+    Empty if both runs are the same part."""
     of_a, of_b = (
         {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
         for side in (a, b)
@@ -118,7 +119,7 @@ def parts_remark(a: Side, b: Side) -> str:
 
 
 def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
-    """Remarks on severity classes: both runs use those of the second."""
+    """Remarks on severity classes. Both runs are classified by the second run's scale."""
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
         (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]

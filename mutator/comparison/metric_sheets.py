@@ -1,4 +1,4 @@
-"""Tables of how bad both runs were: medians of metrics in pairs, and severity classes."""
+"""Tables of metrics and severity classes in both runs."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -18,8 +18,8 @@ NO_CONTACT = "no contact"
 
 
 def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
-    """For each metric that both runs have: medians, their difference and Wilcoxon's test over pairs with a
-    value on both sides, for all pairs and by fault type."""
+    """A table for each metric that both runs have: medians, their difference and Wilcoxon's test, for all
+    pairs and by fault type. Only pairs with a value in both runs count."""
     whole: list[tuple[Cell, ...]] = []
     parts: list[tuple[Cell, ...]] = []
     units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
@@ -41,7 +41,8 @@ def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tup
 
 
 def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
-    """The pairs with a value of a metric on both sides: `kind`, `fault`, `first`, `second`."""
+    """The pairs in which both runs have a value of the metric. Columns: `kind`, `fault`, `first`,
+    `second`."""
     rows = [
         (by_fault_type(p.row_a), p.row_a.fault, a.metrics[p.a.id].get(name), b.metrics[p.b.id].get(name))
         for p in pairs
@@ -58,8 +59,8 @@ def _medians(frame: pd.DataFrame) -> tuple[Cell, ...]:
 
 
 def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """Pairs by severity class in the first run (lines) and the second (columns); no lines without
-    contacts."""
+    """Pairs by severity class in the first run (lines) and the second (columns). Without contacts, the table
+    is empty."""
     order = [*CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.usable)
     seen = [name for name in order if any(name in pair for pair in counts)]

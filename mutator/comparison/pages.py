@@ -17,8 +17,8 @@ from mutator.comparison.pairs import Change, Pair, time_to_hazard
 from mutator.outcomes.rows import Row
 from mutator.web import asset
 
-LISTED = 50  # experiments that the Markdown names for each kind of change; page and CSV have all
-SHOWN = 500  # table rows that the page shows at once: browsers need seconds to lay out thousands
+LISTED = 50  # experiments that the Markdown lists for each kind of change; the page and the CSV list all
+SHOWN = 500  # table rows that the page shows at once; browsers need seconds to lay out thousands
 _BAD = frozenset(gate.value for gate in Gate)
 
 
@@ -32,7 +32,8 @@ class Written:
 
 
 def write(comparison: Comparison, out: Path) -> Written:
-    """Write all forms of the comparison into `out`, which is created if missing; deterministic."""
+    """Write all forms of the comparison into `out`, which is created if missing. Equal inputs give equal
+    bytes."""
     make_folder(out / "tables")
     text, hypertext, pairs = out / "COMPARISON.md", out / "index.html", out / "pairs.csv"
     for sheet in comparison.sheets:
@@ -134,7 +135,7 @@ def _reasons(comparison: Comparison) -> Table:
 
 
 def page(comparison: Comparison) -> str:
-    """The comparison as one HTML page; all text from runs is escaped."""
+    """The comparison as one HTML page. All text from runs is escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -211,7 +212,7 @@ def _hazard_time(row: Row) -> str:
 
 
 def pair_line(pair: Pair) -> dict[str, object]:
-    """A pair's line of pairs.csv; times are simulated seconds."""
+    """A pair's line in pairs.csv. Times are in simulated seconds."""
     row = pair.row_b
     line: dict[str, object] = {
         "experiment_a": pair.a.id,

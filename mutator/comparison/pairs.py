@@ -11,28 +11,28 @@ from mutator.model import Experiment, Outcome, Status
 from mutator.outcomes.rows import Row
 
 _HARM = {Outcome.NOT_ACTIVATED: 0, Outcome.MASKED: 0, Outcome.SDC: 1, Outcome.HAZARD: 2}
-_TIME_DIGITS = 6  # of a time from activation: absorbs rounding errors
+_TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors
 
 
 class Change(StrEnum):
     """A change in the second run of a pair, relative to the first."""
 
     NEW_HAZARD = "new-hazard"  # a hazard instead of none
-    OTHER_HAZARD = "other-hazard"  # a hazard not in the first run, which had another
+    OTHER_HAZARD = "other-hazard"  # another hazard, although the first run already has one
     HIGHER_SEVERITY = "higher-severity"  # a contact of a higher class, or a contact instead of none
     HAZARD_GONE = "hazard-gone"
     LOWER_SEVERITY = "lower-severity"
-    EARLIER_HAZARD = "earlier-hazard"  # the first hazard comes sooner after activation
+    EARLIER_HAZARD = "earlier-hazard"  # less time from activation to the first hazard
     LATER_HAZARD = "later-hazard"
     LOST_ALERT = "lost-alert"
     NEW_ALERT = "new-alert"
-    WORSE = "worse"  # outcome: no effect, sdc, hazard; includes new hazards
+    WORSE = "worse"  # a worse outcome, in the order no effect, sdc, hazard; includes new hazards
     BETTER = "better"
     NEW_CRASH = "new-crash"  # the controller crashed or did not finish
     CRASH_GONE = "crash-gone"
     HARNESS_ERROR = "harness-error"  # no result, although the first run has one
     MENDED = "mended"  # a result, although the first run has none
-    OTHERWISE = "otherwise"  # a different outcome that is neither better nor worse: masked, not activated
+    OTHERWISE = "otherwise"  # another outcome that is neither better nor worse: masked or not activated
 
 
 @dataclass(frozen=True)
@@ -62,15 +62,15 @@ class Matching:
     pairs: tuple[Pair, ...]
     only_a: tuple[Experiment, ...]  # not in the other run's plan
     only_b: tuple[Experiment, ...]
-    no_result_a: tuple[Experiment, ...]  # planned in both, not (yet) run in this one
+    no_result_a: tuple[Experiment, ...]  # planned in both runs, but this run has no result (yet)
     no_result_b: tuple[Experiment, ...]
-    ambiguous: tuple[Experiment, ...]  # in either run, with the same key as another experiment of that run
+    ambiguous: tuple[Experiment, ...]  # in either run; another experiment of that run has the same key
 
 
 def match(a: Side, b: Side) -> Matching:
-    """Match the experiments first by id, then by key.
+    """Match experiments by id, then the remaining ones by key.
 
-    A key shared by several remaining experiments of a run matches none of them.
+    If several remaining experiments of a run share a key, none of them is matched.
     """
     by_id = {e.id: e for e in b.experiments}
     same = {e.id for e in a.experiments if e.id in by_id}

@@ -16,15 +16,15 @@ from mutator.statistics.shares import share
 from mutator.statistics.sheet import Cell, P, Sheet
 
 FLAGS = {"activated": "t_activation", "manifested": "t_manifest", "alert": "t_alert", "hazard": "t_hazard"}
-# measured from activation; the last from the first alert
+# the last time begins at the first alert, the others at activation
 TIMES = ("activation to manifest", "activation to alert", "activation to hazard", "alert to hazard")
 
 
 def frame_of(pairs: Sequence[Pair]) -> pd.DataFrame:
-    """A row for each pair with valid results in both runs.
+    """A frame with a row for each pair that has valid results in both runs.
 
     Columns: `kind` (`sensor/bias`), `fault` (the resampling unit: variant and value), flags `activated_a`,
-    `activated_b` etc., times `activation to hazard_a` etc. in s (NaN: one of the events is missing).
+    `activated_b` etc., times `activation to hazard_a` etc. in s (NaN if either event is missing).
     """
     rows = [
         {
@@ -117,7 +117,8 @@ def _times(frame: pd.DataFrame, name: str) -> tuple[Cell, ...]:
 
 
 def adjusted(name: str, found: Mapping[str, tuple[Cell, ...]]) -> list[tuple[Cell, ...]]:
-    """The lines of one measure by fault type; Holm's adjusted p follows p, the last cell."""
+    """The lines of one measure by fault type, with Holm's adjusted p added after the last cell, which is
+    p."""
     p_values = {kind: cells[-1] for kind, cells in found.items()}
     known = {kind: p for kind, p in p_values.items() if isinstance(p, P) and not math.isnan(p)}
     holm_values = dict(zip(known, map(P, holm(list(known.values()))), strict=True))
@@ -132,8 +133,8 @@ def whole_and_parts(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
-    """A table of all pairs and one by fault type. `heads`: the heading of the first column, then the
-    others."""
+    """A table of all pairs and one by fault type. `heads` has the heading of the first column, then those of
+    the others."""
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),
@@ -148,7 +149,7 @@ def whole_and_parts(
 
 
 def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
-    """The number of pairs with each change by fault type; only changes that occur."""
+    """The number of pairs with each change, by fault type. Changes that do not occur have no column."""
     seen = [change for change in Change if any(change in p.changes for p in pairs)]
     kinds = sorted({by_fault_type(p.row_a) for p in pairs})
     parts = {kind: [p for p in pairs if by_fault_type(p.row_a) == kind] for kind in kinds}

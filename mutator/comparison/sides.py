@@ -1,4 +1,4 @@
-"""The two sides of a comparison: a run's experiments and their results."""
+"""One side of a comparison: a run's experiments and their results."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,23 +16,23 @@ from mutator.verification import equivalence
 
 
 class Key(NamedTuple):
-    """An experiment's identity across runs, independent of target, reading, setting and seed.
+    """Identifies an experiment across runs, independently of target, reading, setting and seed.
 
-    Ids are not suitable: they include drawn times, reading, setting and the scenario's text.
+    Ids are unsuitable because they depend on drawn times, reading, setting and the scenario's text.
     """
 
-    spec: str  # with its variant: sensor/bias/distance
+    spec: str  # with the variant: sensor/bias/distance
     value: Value
     scenario: str
     method: str
-    trigger: str  # its name: C1, random/C1
+    trigger: str  # the trigger's name: C1, random/C1
 
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
     """One run: its folder, its planned experiments, and their rows.
 
-    Rows and metrics are by experiment id. Metrics without a value are left out.
+    `rows` and `metrics` are by experiment id. Metrics without a value are left out.
     """
 
     folder: RunFolder
@@ -45,7 +45,7 @@ class Side:
         return self.folder.path.name
 
     def classed(self, scale: Scale | None) -> "Side":
-        """The run with its contacts classified by a scale; unclassified without one."""
+        """This side with contacts classified by `scale`, or unclassified if it is None."""
         rows = {}
         for name, row in self.rows.items():
             severity = ""
@@ -56,7 +56,7 @@ class Side:
 
 
 def read_side(run: Path, only: str | None = None) -> Side:
-    """Read the run folder `run`, with the experiments that match `only` (a filter over plan columns).
+    """Read the run folder `run` and its experiments that match `only`, a filter over plan columns.
 
     Uses plan and records, and writes nothing. MutatorError if it is not a run folder; CheckFailed if its
     equivalence check failed.
@@ -81,6 +81,6 @@ def _metrics(record: Record) -> dict[str, float]:
 
 
 def key_of(experiment: Experiment) -> Key:
-    """The key that an experiment is matched by."""
+    """The key by which an experiment is matched."""
     fault = experiment.fault
     return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)

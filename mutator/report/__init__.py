@@ -1,1 +1,2 @@
-"""The report of a run: its pages, panels, plots, series and films. Numbers come from `statistics`."""
+"""The report of a run: pages, panels, plots, series and films. The package `statistics` computes the
+numbers."""

@@ -9,7 +9,7 @@ import pandas as pd
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """A text that links to a place on the page; `to` is the fragment after #."""
+    """A text that links to a place on the page. `to` is the URL fragment, without #."""
 
     text: str
     to: str
@@ -17,7 +17,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class Part:
-    """`part` of `of`, drawn as a bar."""
+    """A bar that shows `part` as a share of `of`."""
 
     part: float
     of: float
@@ -37,46 +37,46 @@ class Listing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """The answer to a question: a sentence or two, tables, and links to its experiments. `wide`: the tables
-    have many columns."""
+    """The answer to a question: one or two sentences, tables, and links to the experiments. `wide` is set if
+    the tables have many columns."""
 
     name: str
     title: str
     says: str
-    listings: tuple[Listing, ...] = ()  # a listing without lines is not shown
+    listings: tuple[Listing, ...] = ()  # listings without lines are not shown
     links: tuple[Link, ...] = ()
     wide: bool = False
 
 
 def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
-    """The URL fragment that shows the list with these filters."""
+    """The URL fragment that shows the list of experiments with these filters."""
     parts = [f"{name}={','.join(quote(v, safe='') for v in values)}" for name, values in facets.items()]
     return "&".join((*parts, *([f"sort={sort}"] if sort else ())))
 
 
 def share(part: int, of: int, what: str) -> str:
-    """`20 of 96 activated faults (21 %)`; singular for one."""
+    """A share as text, for example `20 of 96 activated faults (21 %)`. If `of` is 1, the noun is singular."""
     noun = what.removesuffix("s") if of == 1 else what
     return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
 
 
 def were(count: int) -> str:
-    """The verb for a count: was or were."""
+    """The verb that fits a count: was or were."""
     return "was" if count == 1 else "were"
 
 
 def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
-    """Fault type, its number in `part`, its number in `of`; largest first."""
+    """Each fault type with its number of rows in `part` and in `of`, largest first."""
     parts = part["kind"].value_counts()
     counts = [(str(k), int(parts.get(k, 0)), int(n)) for k, n in of["kind"].value_counts().items()]
     return sorted(counts, key=lambda c: (-c[1], -c[2], c[0]))
 
 
 def kind_link(kind: str, **facets: Sequence[str]) -> Link:
-    """A fault type, linked to its experiments with these values."""
+    """A fault type, linked to its experiments that match `facets`."""
     return Link(kind, to_list({"kind": [kind], **facets}))
 
 
 def bar(part: int, of: int) -> Part:
-    """`2 of 3`."""
+    """A bar labelled, for example, `2 of 3`."""
     return Part(part, of, f"{part:,} of {of:,}")

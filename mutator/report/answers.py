@@ -1,4 +1,4 @@
-"""Answers to a reader's first questions, each with a few numbers and their denominators.
+"""Answers to the first questions of a reader, each with a few numbers and their denominators.
 
 Each answer links to its experiments in the list.
 """
@@ -27,11 +27,11 @@ from mutator.report.seen import COURSE, PLACE
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import FIRST, LATE, NO_ALERT, SILENT, warnings_of
 
-TYPES = 6  # fault types listed in an answer
+TYPES = 6  # maximum of fault types that an answer lists
 
 
 def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
-    """All answers that a run's results support."""
+    """All answers for which the run has the data."""
     frame = _told(run)
     has_alerts = run.folder.has_alerts
     made = [dangerous(frame, run.folder.head.get("metrics", ()), has_alerts=has_alerts)]
@@ -46,8 +46,8 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with rank, course and warning. Fault and hazard names are filled in only for
-    experiments that may be listed."""
+    """The usable experiments with rank, course and warning. Only experiments that may be listed get names of
+    faults and hazards."""
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)
@@ -61,15 +61,15 @@ def _told(run: ReportedRun) -> pd.DataFrame:
 
 
 def _warned(row: Row) -> str:
-    """`fcw, 1.2 s`."""
+    """The first alert and the reaction time, for example `fcw, 1.2 s`; or `too late`, or `none`."""
     if row.reaction_time is None:
         return "too late" if row.alerts else "none"
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
 
 
 def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
-    """Hazards without an earlier alert: no alert at all, or an alert only afterwards. `note` says which
-    alerts were not observed."""
+    """Answer which hazards had no earlier alert, only a later one or none. `note` is a caveat on alerts that
+    were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
@@ -109,12 +109,12 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
 
 
 def _more(count: int, what: str) -> str:
-    """A note that a list is cut; empty if it is complete."""
+    """A note that a list is cut, or '' if it is complete."""
     return f" The table has the first {TYPES} of {count:,} {what}." if count > TYPES else ""
 
 
 def survived(frame: pd.DataFrame) -> Answer:
-    """Activated faults without a hazard, and fault types that never led to one."""
+    """Answer how many activated faults led to no hazard, and which fault types never led to one."""
     active = frame[frame["is_activated"]]
     fine = active[active["outcome"].isin(["masked", "sdc"])]
     moved = int(fine["is_manifested"].sum())
@@ -147,7 +147,7 @@ def survived(frame: pd.DataFrame) -> Answer:
 
 
 def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
-    """CPU time of the experiments in total and by fault type, and why some took none."""
+    """Answer how much CPU time the experiments took, in total and by fault type, and why some took none."""
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
@@ -171,7 +171,7 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
 
 
 def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
-    """Why the other experiments needed no separate run, with counts."""
+    """Why the other experiments needed no run, with counts."""
     rest = frame["experiment_id"][~(cpu > 0)]
     golden = timings[timings["engine"] == RunMode.GOLDEN.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())

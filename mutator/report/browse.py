@@ -1,6 +1,7 @@
-"""The per-experiment data in the report's page: results as columns, fault, trigger, diff.
+"""The data of each experiment in the report's page: results as columns, fault, trigger and diff.
 
-Text columns are stored as dictionaries with codes. A diff is stored as a shape plus values for its holes.
+A text column is stored as its distinct values and a code for each row. A diff is stored as a shape and the
+values of its holes.
 """
 
 import base64
@@ -41,15 +42,15 @@ if TYPE_CHECKING:
 
 SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
-_OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns
-STILLS_BYTES = 1_000_000  # of stills embedded in the page; others become links
-LISTED = 50_000  # experiments listed in the page; more would make it slow to open
+_OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
+STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
+LISTED = 50_000  # maximum of experiments that the page lists; with more it would open slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
     """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
-    experiments are listed and how to see the others; it is empty if all are listed."""
+    experiments the page lists and how to see the others. It is '' if the page lists all."""
 
     facts: Markup
     scripts: tuple[Markup, ...]
@@ -57,7 +58,7 @@ class Browse:
 
 
 def browse_data(run: ReportedRun) -> Browse:
-    """The page data of a run. The page is assumed to be in the report's folder."""
+    """The page data of a run. Paths in it are relative to the report's folder."""
     folder, workspace = run.folder, run.workspace
     if workspace:
         sample_kept_traces(folder, workspace)
@@ -82,7 +83,7 @@ def browse_data(run: ReportedRun) -> Browse:
 
 
 def _which(run: ReportedRun) -> str:
-    """Which experiments are listed, and how to see the others; empty if all are."""
+    """Which experiments the page lists, and how to see the others; '' if it lists all."""
     count, path = len(run.texts), run.folder.path.name
     if count <= LISTED:
         return ""
@@ -94,8 +95,8 @@ def _which(run: ReportedRun) -> str:
 
 
 def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
-    """Target facts that the page needs, from its current manifest: whether films can be made (true if there
-    is no manifest), and the scene seen from above."""
+    """What the page needs to know of the target, from its current manifest: whether films can be made (true
+    without a manifest), and the scene seen from above."""
     try:
         manifest = workspace.manifest(folder.head["target"]) if workspace else None
     except MutatorError:
@@ -105,7 +106,8 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
 
 
 def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
-    """The rows that the page lists, in reading order, and their cells. A large run lists only the worst."""
+    """The rows that the page lists, in reading order, and their cells. For a large run the page lists only
+    the worst."""
     lines = lines_of(run.texts[run.seen.places < LISTED])
     rows = [row_from(line) for line in lines]
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
@@ -115,7 +117,7 @@ def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
 def _tables(
     run: ReportedRun, rows: Sequence[Row], lines: Sequence[Mapping[str, str]]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The table and the details."""
+    """The data of the table and of the experiments' details."""
     planned = [run.experiments.get(row.experiment_id) for row in rows]
     paths = run.paths
     if paths:
@@ -167,7 +169,8 @@ def table(
 
 
 def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
-    """`line` and `lasting` of each fault. For an operator's fault, the change replaces the value."""
+    """The columns `value`, `variant`, `line` and `lasting`. For an operator's fault, `value` is the change
+    that it makes."""
     changes = [source.changes.get(line["fault_id"], "") for line in lines]
     both = list(zip(lines, changes, strict=True))
     return {
@@ -179,14 +182,14 @@ def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> di
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """Numbers as they are (None: empty), ids as texts, everything else as codes of distinct values in order.
-    Names are never parsed as numbers: a variant may be called `nan`."""
+    """A column's data: numbers unchanged (None: empty), ids as texts, everything else as codes of the
+    distinct values in order. Names are never parsed as numbers, because a variant may be called `nan`."""
     if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
         except ValueError:
             pass
-    if name == "experiment_id":  # values are distinct, so codes would save nothing
+    if name == "experiment_id":  # all values are distinct, so codes would save nothing
         return {"texts": list(values)}
     words = sorted(set(values))
     code = {word: i for i, word in enumerate(words)}
@@ -194,7 +197,7 @@ def column(name: str, values: Sequence[str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> float | int | str | None:
-    """The value as JavaScript reads it; infinities become strings."""
+    """The value as JavaScript reads it. Infinities become strings."""
     if not text:
         return None
     value = float(text)
@@ -208,8 +211,9 @@ def _number(text: str) -> float | int | str | None:
 def details(
     experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
 ) -> dict[str, Any]:
-    """For each row: codes of its spec and trigger setting (-1: not in the plan), and the shape of its diff
-    (-1: none). Members of a shape follow row order; each hole has a list of values."""
+    """For each row, the codes of its spec and trigger setting (-1: not in the plan), and the index of its
+    diff's shape (-1: no diff). The members of a shape are in row order. Each hole has a list with the value
+    of each member."""
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
@@ -264,7 +268,7 @@ def _setting(experiment: Experiment) -> str:
 
 
 def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, str]]:
-    """(experiment, empty grouping key, patch without the probe)."""
+    """Yield each experiment's id, an empty grouping key, and the patch without the probe."""
     for row in rows:
         data = run.folder.read_patch(row.experiment_id, run.records.get(row.experiment_id))
         if data is not None:
@@ -272,10 +276,10 @@ def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, 
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
-    """Stills, films and exact plots that plots/ has, by experiment.
+    """The stills, films and exact plots in plots/, by experiment.
 
-    Stills are embedded until `budget` bytes are used up. Later stills, films and plots are links from
-    `seen_from`.
+    A still is embedded if it fits into what is left of `budget` bytes. Other stills, films and plots become
+    links relative to `seen_from`.
     """
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):

@@ -1,4 +1,4 @@
-"""Builds a run's report: REPORT.md and one self-contained HTML page.
+"""Builds the report of a run: REPORT.md and one self-contained HTML page.
 
 Its only inputs are results.csv and the run folder, so rebuilding gives the same bytes.
 """
@@ -26,8 +26,8 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """Where a report is, and how many experiments it has. `summaries` are its terminal tables, present only
-    if it was just written."""
+    """The files of a report, and its number of experiments. `summaries` are tables for the terminal; they are
+    present only if the report was just written."""
 
     markdown: Path
     page: Path
@@ -35,11 +35,11 @@ class Report:
     summaries: tuple[Table, ...] = ()
 
 
-STUDY_FILES = ("STUDY.md", "study.html")  # written only if the study has something to say
+STUDY_FILES = ("STUDY.md", "study.html")  # written only if the study has panels for this run
 
 
 def ensure(run: Path, workspace: Workspace | None) -> Report:
-    """Write the report of a run folder, unless the report and its inputs are unchanged."""
+    """Write the report of a run folder unless it is up to date."""
     folder, out = RunFolder.open(run), run / FOLDER
     if is_current(out, made_from(folder, workspace)):
         text, hypertext = _files(out)
@@ -50,7 +50,7 @@ def ensure(run: Path, workspace: Workspace | None) -> Report:
 def write(run: Path, workspace: Workspace | None) -> Report:
     """Write the report of a run folder whose results.csv is up to date.
 
-    Without a workspace no experiment is rerun, and no published numbers are shown.
+    Without a workspace, no experiments are rerun and no published numbers are shown.
     """
     folder = RunFolder.open(run)
     out = run / FOLDER
@@ -71,7 +71,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
 
 
 def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
-    """Write the study's page, and remove one that an earlier report left."""
+    """Write the study's page, or remove the page of an earlier report if there is nothing to show."""
     text, hypertext = (out / name for name in STUDY_FILES)
     if not panels:
         text.unlink(missing_ok=True)

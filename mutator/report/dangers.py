@@ -1,4 +1,5 @@
-"""The most dangerous results: the worst experiments with and without contact, and fault types by hazards."""
+"""The most dangerous results: the worst experiments with and without contact, and the fault types with most
+hazards."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -7,12 +8,12 @@ import pandas as pd
 
 from mutator.report.answer_parts import Answer, Link, Listing, bar, by_kind, kind_link, share, to_list
 
-WORST = 10  # experiments listed as most dangerous
-CONTACTS = 6  # of these with contact, if both kinds exist
-TYPES = 6  # fault types listed
+WORST = 10  # maximum of experiments listed as most dangerous
+CONTACTS = 6  # how many of them have contact, if there are also hazards without contact
+TYPES = 6  # maximum of fault types listed
 MARGIN = "margin_"  # prefix of the columns of hazard margins
-SEVERITY = "severity"  # column: S0 to S3, empty without contact
-HAZARD = {"outcome": ["hazard"]}  # a filter of the list
+SEVERITY = "severity"  # column with S0 to S3, or '' without contact
+HAZARD = {"outcome": ["hazard"]}  # filter for the list of experiments
 NO_CONTACT = "no contact"  # the page filter's name for an empty severity
 
 
@@ -126,7 +127,8 @@ def _worst(
 
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
-    """`delta-v 6.70 m/s` for a contact, else the least margin to its hazards; '-': not known."""
+    """The severity as text: for a contact its speed, for example `delta-v 6.70 m/s`; else the least margin to
+    the hazards that occurred, or `-` if none is known."""
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"
         return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"

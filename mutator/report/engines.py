@@ -16,7 +16,7 @@ from mutator.verification import equivalence
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-LISTED = 20  # reasons for the reference engine that a report lists, most frequent first
+LISTED = 20  # maximum of reasons for using the reference engine that a report lists, most frequent first
 _WORDS = {
     RunMode.FORK: "a fork of the golden run, just before the fault is first active",
     RunMode.GOLDEN: "no run: the trigger never holds, so the golden run's result is used",
@@ -42,8 +42,8 @@ class EngineSummary:
 def engine_summary(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
-    """Summarize the `timings` (as in `Seen`) and `proof/` of a run folder with these records; None if neither
-    names an engine."""
+    """Summarize the `timings` (as in `Seen`) and `proof/` of a run folder with these records. None if no
+    timing names an engine and there is no `proof/`."""
     ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
@@ -53,8 +53,8 @@ def engine_summary(
 
 
 def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
-    """Experiments by mode, and by reason for not using the requested mode."""
-    told = timings[timings["engine"].astype(object) != ""]  # empty if there was only one engine
+    """The number of experiments by mode and by the reason for not using the requested mode."""
+    told = timings[timings["engine"].astype(object) != ""]  # older runs have no engine names
     engines = (None if name is None or name != name else str(name) for name in told["engine"])
     return Counter(zip(engines, map(str, told["why"]), strict=True))
 
@@ -72,7 +72,7 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
 
 
 def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
-    """The equivalence check as a sentence and in brief, and whether it failed."""
+    """The result of the equivalence check as a sentence and in a few words, and whether it failed."""
     try:
         found = equivalence.judge(folder, records)
     except CheckFailed as err:

@@ -1,4 +1,5 @@
-"""Films an experiment: reruns both of its runs with a film, and renders it with the target's own command."""
+"""Films an experiment: reruns its golden and faulty run with recording, and renders the film with the
+target's command."""
 
 import json
 import os
@@ -25,10 +26,10 @@ EVENTS_SCHEMA = "film-events/1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """A file to write: a still at time `t` (s), or a video. The suffix is the format."""
+    """A still at time `t` (s) or a video to write. The file's suffix selects the format."""
 
-    out: Path  #: file to write; its suffix is the format
-    t: float | None = None  #: time of a still in s; None: a video
+    out: Path  #: the file to write; its suffix selects the format
+    t: float | None = None  #: the time of a still in s; None for a video
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,17 +39,17 @@ class Filming:
     workspace: Workspace
     folder: RunFolder
     target: TargetManifest
-    filmed: TargetManifest  # the same target, with runs that leave a film
+    filmed: TargetManifest  # the same target, with film recording switched on
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
-        """The films of a run folder; MutatorError if the target cannot be filmed or has changed since the
-        run."""
+        """Prepare to film experiments of a run folder. Raise MutatorError if the target cannot be filmed or
+        has changed since the run."""
         manifest = manifest_of(workspace, folder)
         return cls(workspace, folder, manifest, manifest.filming())
 
     def golden(self, experiment: Experiment, out: Path) -> Path:
-        """Run the golden run of an experiment into the folder `out`, for several films."""
+        """Rerun an experiment's golden run into the folder `out`, so that several films can use it."""
         return run_golden(self.workspace, self.filmed, experiment, out, limits=self.folder.limits)
 
     def take(
@@ -59,10 +60,10 @@ class Filming:
         *,
         golden: Path | None = None,
     ) -> bool:
-        """Rerun an experiment's golden (unless given) and faulty run and write `shots` of them.
+        """Rerun an experiment's faulty run, and the golden run unless it is given, and write `shots`.
 
-        Returns whether the new record equals `known` (true if there is none yet). MutatorError if the faulty
-        run left no film, and for errors of the target's command.
+        Returns whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
+        faulty run left no film or the target's command fails.
         """
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
@@ -93,7 +94,8 @@ class Filming:
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
-    """A short text for each hazard: the manifest's, or else the hazard analysis's up to the first bracket."""
+    """A short text for each hazard, from the manifest, or else from the hazard analysis up to its first
+    bracket."""
     known = workspace.hazards()
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
@@ -119,9 +121,9 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
 
 
 def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], shot: Shot) -> None:
-    """Write one file with the target's command; `folder` is for scratch."""
+    """Write one file with the target's command. `folder` is for temporary files."""
     film = manifest.film
-    assert film is not None  # already taken
+    assert film is not None  # callers checked this
     tree = manifest.root
     if manifest.overlay is not None:
         tree = folder / "tree"
@@ -142,5 +144,5 @@ def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], sho
         said = done.stderr.strip().splitlines() or ["no message"]
         complaint = said[-1].removeprefix("error: ").replace(str(made), str(out))
         raise MutatorError(complaint, where=f"{film.module}")
-    with half_written(out) as temporary:  # a film takes a while and may be interrupted
+    with half_written(out) as temporary:  # copying may be interrupted
         shutil.copyfile(made, temporary)

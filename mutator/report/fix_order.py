@@ -1,8 +1,9 @@
-"""What to fix first: fault types ordered by a simple rule, with the component that lets them through.
+"""Which fault types to fix first, by a simple rule, and the component that lets them through.
 
-Fault types with the most silent hazards (no alert before) of the highest severity class come first. Ties go
-to the next class, down to hazards without contact, then to the shortest time from fault to hazard.
-Without alerts all hazards count; without severity all are in one class.
+Fault types are ordered by their silent hazards (no alert before) in the highest severity class, most first.
+Ties are broken by the next class, down to hazards without contact, then by the shortest time from activation
+to hazard. If the target has no alerts, all hazards count. If it has no severity classes, all hazards are in
+one class.
 """
 
 from collections import Counter
@@ -16,14 +17,14 @@ from mutator.report.dangers import NO_CONTACT, SEVERITY
 from mutator.report.paths import FoundPaths, link_text
 from mutator.report.warnings import FIRST, SILENT
 
-LISTED = 5  # fault types
+LISTED = 5  # maximum of fault types listed
 
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
-    """The fault types in order, with their numbers; `frame` has at least one hazard."""
+    """Answer which fault types to fix first, with their numbers. `frame` must have at least one hazard."""
     hazards = frame[frame["outcome"] == "hazard"]
     counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
-    if counted.empty:  # every hazard had an alert before it
+    if counted.empty:  # all hazards came after an alert, so count all
         counted, has_alerts = hazards, False
     classes = _classes(counted)
     order = _order(counted, classes)
@@ -45,7 +46,7 @@ def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: b
 
 
 def _classes(hazards: pd.DataFrame) -> list[str]:
-    """The severity classes found, highest first, no contact ('') last."""
+    """The severity classes that occur, highest first; no contact ('') is last."""
     return sorted(hazards[SEVERITY].unique(), reverse=True) if SEVERITY in hazards else [""]
 
 
@@ -59,7 +60,7 @@ def _after(hazards: pd.DataFrame) -> pd.Series:
 
 
 def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
-    """The fault types in order."""
+    """The fault types, in the order in which to fix them."""
     groups = {str(kind): group for kind, group in hazards.groupby("kind")}
     key = {
         kind: (*(-len(_of_class(group, name)) for name in classes), float(_after(group).min()), kind)
@@ -69,7 +70,7 @@ def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
 
 
 def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], what: str) -> str:
-    """The answer in a sentence, then the rule."""
+    """The answer in one sentence, followed by the rule."""
     mine = counted["kind"] == order[0]
     says = f"Start with {order[0]}: {share(int(mine.sum()), len(counted), what)}"
     if classes[0]:
@@ -133,15 +134,14 @@ def _let_through(
 
 
 def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, int]]:
-    """The courses of a frame's faults, with counts."""
+    """Yield each course that the frame's experiments took, and how many took it."""
     for code, count in frame["course"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
             yield paths.courses[place], int(count)
 
 
 def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
-    """The components that stopped faults of the type, most frequent first: candidates for stopping the
-    rest."""
+    """The component that stopped most faults of this type. It is a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for course, count in _courses(active, paths):
         for name in course.stopped_at:

@@ -1,4 +1,4 @@
-"""The history of a folder of runs: results of each run, and changes from one to the next.
+"""The history of a folder of runs: the results of each run, and the changes from each run to the next.
 
 Writes HISTORY.md and history.html into that folder, and nothing into the run folders.
 """
@@ -38,8 +38,8 @@ _HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run of the folder. `date` is the file time of its last record; `commit` is the target's; `rows` are
-    by experiment."""
+    """One run of the folder. `date` is the file time of the last record, `commit` the commit of the target.
+    `rows` are by experiment id."""
 
     folder: RunFolder
     date: datetime
@@ -62,12 +62,12 @@ class PastRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class History:
-    """Where the history is, how many runs it has, and why some run folders were left out."""
+    """The files of a history, its number of runs, and the reasons why run folders were left out."""
 
     markdown: Path  #: HISTORY.md
     page: Path  #: history.html
-    runs: int  #: number of runs in it
-    left_out: tuple[str, ...]  #: why other folders with a run.json are not in it
+    runs: int  #: number of runs in the history
+    left_out: tuple[str, ...]  #: for each run folder that is not in the history, the reason
 
 
 def _run_folders(folder: Path) -> list[Path]:
@@ -75,7 +75,7 @@ def _run_folders(folder: Path) -> list[Path]:
 
 
 def write_history(folder: Path) -> History:
-    """Write the history of the runs in a folder; MutatorError if none has results."""
+    """Write the history of the runs in a folder. Raise MutatorError if none has results."""
     runs, left_out = [], []
     for path in _run_folders(folder):
         try:
@@ -110,7 +110,7 @@ def _past_run(path: Path) -> PastRun:
 
 
 def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
-    """The runs by campaign and plan, the plan of the last run first."""
+    """The runs by campaign and plan. The plan of the latest run comes first."""
     found: dict[str, list[PastRun]] = {}
     for run in runs:
         found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
@@ -135,7 +135,7 @@ def _cells(run: PastRun) -> list[str]:
 
 
 def _changes(before: PastRun, after: PastRun) -> str:
-    """How the shared experiments' results changed."""
+    """How the results of the experiments in both runs changed, as text."""
     shared = before.rows.keys() & after.rows.keys()
     pairs = [(before.rows[name], after.rows[name]) for name in shared]
     new = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
@@ -147,7 +147,7 @@ def _changes(before: PastRun, after: PastRun) -> str:
 
 
 def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
-    """Consecutive runs of one plan, newest first."""
+    """Pairs of consecutive runs, newest first. `runs` are those of one plan, oldest first."""
     return zip(runs[-2::-1], runs[:0:-1], strict=True)
 
 
@@ -187,7 +187,7 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
 
 
 def _linked(group: Sequence[PastRun]) -> Table:
-    """The runs, newest first, each with a link to its report and a bar for its hazards."""
+    """The table of runs, newest first. Each has a link to its report and a bar for its hazards."""
     from markupsafe import Markup
 
     link = Markup('<a href="{}">{}</a>').format
@@ -203,6 +203,6 @@ def _linked(group: Sequence[PastRun]) -> Table:
 
 
 def _comparison(folder: Path, before: PastRun, after: PastRun) -> str:
-    """The path from the folder to an existing comparison page; '' if there is none."""
+    """The path of an existing comparison page, relative to the folder; '' if there is none."""
     page = Path(after.name) / FOLDER / f"compare-{before.name}" / "index.html"
     return quote(page.as_posix()) if (folder / page).exists() else ""

@@ -12,7 +12,7 @@ from mutator.report.words import Words
 from mutator.web import asset, plainly_embedded
 
 STYLES = ("base.css", "report.css", "replay.css", "path.css")
-SCRIPTS = (  # in load order: each uses earlier ones
+SCRIPTS = (  # in load order, because scripts use earlier ones
     "packed.js",
     "dom.js",
     "diff.js",
@@ -46,10 +46,10 @@ SCRIPTS = (  # in load order: each uses earlier ones
 class Content:
     """The content of both forms of a report.
 
-    `alarm` comes first; it is empty if there is none. `outcomes` counts outcomes and statuses, `planned`
-    gives the number of experiments in words, `words` explains the page's terms.
-    `study` cites the study that has its own page; empty if there is none.
-    `answers` come before the list of experiments, the other `panels` after it.
+    `alarm` is shown first; it is '' if there is none. `outcomes` counts outcomes and statuses. `planned` is a
+    text on the number of experiments. `words` explains the terms of the page. `study` cites the study that
+    has its own page, or is '' if there is none. `answers` come before the list of experiments, the other
+    `panels` after it.
     """
 
     name: str
@@ -60,7 +60,7 @@ class Content:
     study: str
     answers: Panel
     panels: Sequence[Panel]
-    browse: Browse  # the experiments; only the page has them
+    browse: Browse  # the list of experiments, which only the page has
 
 
 def markdown(content: Content) -> str:
@@ -83,7 +83,7 @@ def markdown(content: Content) -> str:
 
 
 def page_html(content: Content) -> str:
-    """The report as one self-contained HTML page; all text is escaped."""
+    """The report as one self-contained HTML page. All text is escaped."""
     from markupsafe import Markup
 
     html = rendered(

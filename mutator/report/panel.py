@@ -9,15 +9,15 @@ from mutator._common.tables import Table
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-FOLDER = "report"  # of a run folder
+FOLDER = "report"  # the report's folder in a run folder
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
     """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
 
-    `anchor` is its id on the page, `link` its name in the page's bar, `summary` what the command line shows
-    of it, `style` a CSS file that it needs.
+    `anchor` is the panel's id on the page, `link` its name in the navigation bar, `summary` the table that
+    the command line shows, and `style` a CSS file that the panel needs.
     """
 
     anchor: str
@@ -29,7 +29,8 @@ class Panel:
 
 
 def rendered(template: str, **values: Any) -> "Markup":
-    """HTML of a Jinja template. Values that are not Markup are escaped; the `marked` filter renders notes."""
+    """Render a Jinja template as HTML. Values that are not Markup are escaped. The filter `marked` renders
+    notes."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 
@@ -41,7 +42,7 @@ def rendered(template: str, **values: Any) -> "Markup":
 
 
 def marked(text: str) -> "Markup":
-    """HTML of a note in Markdown with `code` and *emphasis*."""
+    """Render a Markdown note as HTML; only `code` and *emphasis* are supported."""
     from markupsafe import Markup, escape
 
     html = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)))

@@ -1,4 +1,5 @@
-"""The control structure of a run as a drawing that shows how many faults passed each link and box.
+"""Draws the control structure of a run, with the number of faults that passed each link or stopped in each
+box.
 
 It uses the page's light or dark colours. ways.js updates the numbers when another fault type is chosen.
 """
@@ -12,12 +13,12 @@ from mutator.stpa.analysis import LinkModel, StructureModel
 from mutator.stpa.layout import Arrow, Box, lay_out
 
 _LINE = 15  # px, line spacing of a count
-_WIDEST = 7.0  # px, width of a link that all faults passed
+_WIDEST = 7.0  # px, width of a link that passed all its faults
 _THIN = 1.8
 
 
 def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[str]) -> str:
-    """The SVG of a control structure; `links` are those that a fault may take."""
+    """The control structure as SVG. `links` are those that a fault can take."""
     plain = {n: c.model_copy(update={"process_model": {}}) for n, c in structure.components.items()}
     layout = lay_out(structure.model_copy(update={"components": plain}), lines=2)
     size = f"{layout.width:.0f} {layout.height:.0f}"
@@ -41,7 +42,7 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
 
 
 def share_text(through: int, came: int) -> str:
-    """`12 of 40, 30 %`: how many that came got through; empty if none came."""
+    """The share of faults that got through a link, for example `12 of 40, 30 %`; '' if none came to it."""
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
@@ -58,19 +59,19 @@ def _line(arrow: Arrow) -> str:
 
 
 def _place(arrow: Arrow, line: int = 0) -> str:
-    """The position of a line of an arrow's label."""
+    """The SVG attributes that place a line of an arrow's label."""
     x, y = arrow.label.at
     y += (0, arrow.label.apart, arrow.label.apart + _LINE)[line]
     return f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.label.anchor}"'
 
 
 def _is_short(arrow: Arrow) -> bool:
-    """Whether the count needs two lines: the boxes are side by side."""
+    """Whether the boxes are side by side, so that the count needs two lines."""
     return arrow.points[0][1] == arrow.points[-1][1]
 
 
 def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
-    """A link that is on no path."""
+    """The SVG of a link that is on no path."""
     yield (
         f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#ways-quiet)"/>'
         f'<text class="label" {_place(arrow)}>{escape(link.label)}</text></g>'
@@ -96,7 +97,7 @@ def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterat
 
 
 def box_lines(injected: int, stopped: int, masked: int) -> tuple[str, str]:
-    """The lines in a box below its name."""
+    """The two lines below the name in a box."""
     told = ((injected, "injected"), (stopped, "stopped"))
     return ", ".join(f"{n} {what}" for n, what in told if n), f"{masked} masked" if masked else ""
 

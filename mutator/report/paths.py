@@ -1,4 +1,5 @@
-"""Fault paths in a report: by experiment for the page, counted by fault type for the figure."""
+"""The fault paths of a report: one for each experiment on the page, and counts by fault type for the
+figure."""
 
 import math
 from collections import Counter, defaultdict
@@ -24,7 +25,7 @@ class _PathsById(Mapping[str, Path]):
 
     def __init__(self, ways: Ways, planned: Mapping[str, Experiment], records: Mapping[str, Record]) -> None:
         self._ways, self._planned, self._records = ways, planned, records
-        self._last: tuple[str, Path | None] | None = None  # most recently computed
+        self._last: tuple[str, Path | None] | None = None  # the path that was computed last
 
     def __getitem__(self, name: str) -> Path:
         last = self._last
@@ -44,15 +45,15 @@ class _PathsById(Mapping[str, Path]):
 
 @dataclass(frozen=True, kw_only=True)
 class FoundPaths:
-    """The known paths of a run by experiment. `records` list the channels that left the golden run. `courses`
-    are those that occur."""
+    """The known paths of a run. `records` list the channels that left the golden run. `courses` are the
+    distinct courses of the experiments."""
 
     ways: Ways
     channels: Sequence[Sequence[str]]  # as in run.json
     by_id: Mapping[str, Path]
     records: Mapping[str, Record]
     courses: Sequence[Course] = ()
-    course_of: Mapping[str, int] = field(default_factory=dict)  # index into it; not for all experiments
+    course_of: Mapping[str, int] = field(default_factory=dict)  # by experiment id; not for all
 
     @classmethod
     def of(
@@ -68,7 +69,7 @@ class FoundPaths:
         return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
 
     def through(self, experiment_id: str) -> str:
-        """The links that a fault got through, joined by `;`; the page filters by them."""
+        """The links that a fault got through, joined by `;`. The page filters by them."""
         if experiment_id in self.course_of:
             crossings = self.courses[self.course_of[experiment_id]].crossings
         else:
@@ -78,8 +79,8 @@ class FoundPaths:
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
         """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each channel
-        a column of first times and one of largest deviations. `by` has, by row, components that changed
-        before their channels show it, and the latest time of that change."""
+        a column of first times and a column of largest deviations. For each row, `by` lists the components
+        that changed before their own channels show it, with the latest possible time of the change."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes, by, names = [], {}, [name for name, *_ in self.channels]
@@ -137,7 +138,7 @@ def _short(value: float) -> float | str:
 
 
 def _placed(path: Path) -> Iterator[tuple[Any, int]]:
-    """The stages with their columns in a strip: one to the right of the last component that feeds each."""
+    """Yield each stage and its column in the strip, which is to the right of all components that feed it."""
     columns: dict[str, int] = {}
     for stage in path.stages:
         feeders = (c.tail for c in path.crossings if c.tip == stage.component)
@@ -147,9 +148,10 @@ def _placed(path: Path) -> Iterator[tuple[Any, int]]:
 
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
-    """Counts over the paths of some faults. By link: faults that `came` to its start (if its end is recorded)
-    and got `through`. By component: faults `injected` there, `stopped` there, and `masked` there (stopped,
-    with no actuator changed). `ends` counts masked faults by the set of components that stopped them."""
+    """Counts over the paths of some faults. By link: how many faults `came` to the start of the link and got
+    `through`; links whose end is not recorded are left out. By component: how many faults were `injected`,
+    `stopped`, and `masked` (stopped with no actuator changed) there. `ends` counts masked faults by the set
+    of components that stopped them."""
 
     active: int = 0
     came: Counter[str] = field(default_factory=Counter)
@@ -177,7 +179,7 @@ class PathCounts:
             self.ends[path.stopped_at] += count
 
     def plain(self) -> dict[str, Any]:
-        """The counts for the page."""
+        """The counts as plain data for the page."""
         links = {name: [self.through[name], came] for name, came in self.came.items()}
         names = dict.fromkeys((*self.injected, *sorted(self.stopped)))
         components = {n: [self.injected[n], self.stopped[n], self.masked[n]] for n in names}
@@ -187,7 +189,7 @@ class PathCounts:
 def counts_by_fault_type(
     kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
 ) -> Mapping[str, PathCounts]:
-    """The counts of all faults, then those by fault type; `codes` has the index of each row's course (-1:
+    """The counts of all faults, then those by fault type. `codes` has the index of each row's course (-1:
     none)."""
     import pandas as pd
 

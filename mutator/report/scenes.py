@@ -1,4 +1,4 @@
-"""A target's scene for the page: sizes, and formulas as trees over the channels of a series."""
+"""The scene of a target, as data for the page: sizes, and formulas as trees over the channels of a series."""
 
 from dataclasses import asdict
 from typing import Any
@@ -8,7 +8,7 @@ from mutator.triggers.trees import Tree, tree
 
 
 def scene_facts(manifest: TargetManifest) -> dict[str, Any] | None:
-    """What replay_scene.js draws; None if the target's manifest has no scene."""
+    """The data that replay_scene.js draws; None if the target's manifest has no scene."""
     scene = manifest.scene
     if scene is None:
         return None

@@ -1,4 +1,5 @@
-"""What a report needs from all experiments in addition to results: read once, kept in columns."""
+"""The data that a report needs from all experiments in addition to the results. It is read once and kept in
+columns."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,14 +20,15 @@ if TYPE_CHECKING:
 
 _PIECE = 5_000  # experiments read at once
 PLACE, COURSE = "#place", "#course"  # extra columns of a frame of results; no metric has such a name
-_Alerts = tuple[tuple[str, float], ...]  # of one experiment
+_Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """`places` (rank, from 0) and `courses_of` (index into `courses`, -1: none) have a number for each row of
-    the results. `alerts` are those of experiments with a hazard. `timings` has a row for each timed
-    experiment: id, CPU time, worker, engine ('' if not recorded), reason."""
+    """Data of a run in addition to its results. `places` (the rank, from 0) and `courses_of` (an index into
+    `courses`, -1: none) have a number for each row of the results. `alerts` are those of experiments with a
+    hazard. `timings` has a row for each timed experiment: id, CPU time, worker, engine ('' if not recorded)
+    and reason."""
 
     places: np.ndarray
     courses_of: np.ndarray
@@ -39,7 +41,7 @@ class Seen:
         cls, folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
     ) -> "Seen":
         """Read a run folder with these results."""
-        codes: dict[int, int] = {}  # by identity: equal courses are one object
+        codes: dict[int, int] = {}  # compared by identity, because equal courses are one object
         courses: list[Course] = []
         courses_of = np.full(len(texts), -1, dtype=np.int32)
         alerts: dict[str, _Alerts] = {}
@@ -63,7 +65,7 @@ class Seen:
 def _looks(
     folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
 ) -> Iterator[tuple[list[Sight | None], dict[str, _Alerts]]]:
-    """The course of each experiment, and the alerts of those with a hazard, in pieces."""
+    """For each piece, the sights of its experiments, and the alerts of those with a hazard."""
     faults, pairs = plan_file.read_faults(folder.path), texts[["experiment_id", "fault_id"]]
 
     def looked_at(piece: "DataFrame") -> tuple[list[Sight | None], dict[str, _Alerts]]:
@@ -84,7 +86,7 @@ def _looks(
 
 
 def timings_of(folder: RunFolder) -> "DataFrame":
-    """`Seen.timings` of a run folder."""
+    """The `timings` of a `Seen`, read from a run folder."""
     import pandas as pd
 
     newest = folder.timings()

@@ -1,4 +1,4 @@
-"""Which series exist next to the report's page."""
+"""Finds the series next to the report's page, and writes missing ones."""
 
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 
 def series_facts(folder: RunFolder) -> dict[str, Any]:
-    """Whether series are packed, and which experiments have their own file. A page must not request a missing
-    file: that would be an error in the browser's console."""
+    """Whether series are packed, and which experiments have their own file. The page must not request a
+    missing file, because the browser's console would show an error."""
     series = SeriesFolder(folder.path)
     return {"packed": series.is_packed, "kept": series.kept_ids()}
 
@@ -24,6 +24,6 @@ def sample_kept_traces(folder: RunFolder, workspace: "Workspace") -> None:
     """Write the missing or damaged series of experiments whose traces are kept."""
     traces, series = Traces(workspace, folder), SeriesFolder(folder.path)
     for name in sorted(path.name for path in (folder.path / "traces").glob("*")):
-        with suppress(MutatorError, KeyError):  # e.g. the sources changed, or the trace is from another state
+        with suppress(MutatorError, KeyError):  # e.g. the sources changed, or the trace is from other sources
             if not series.is_readable(name) and traces.is_kept(name):
                 keep_series(folder.path, traces.manifest, *traces.of(name), traces.record(name))

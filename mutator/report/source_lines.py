@@ -1,6 +1,6 @@
-"""The source of a run's target by line, with the outcomes of the faults injected there.
+"""The source of a run's target, with the outcomes of the faults injected in each line.
 
-Line numbers are those of the tree that was run. If the target has changed since, nothing is shown.
+Line numbers refer to the tree that ran. If the target has changed since, no source is shown.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -21,7 +21,7 @@ from mutator.workspace import Workspace
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-# Worst first; harness errors and invalid mutants are not included.
+# Worst first, without harness errors and invalid mutants.
 ENDINGS = (
     Outcome.HAZARD.value,
     Status.CRASHED.value,
@@ -31,25 +31,26 @@ ENDINGS = (
     Outcome.NOT_ACTIVATED.value,
 )
 LASTING = (PERMANENT, TRANSIENT)
-_AROUND = 2  # lines shown before and after one outside functions
-_JOINED = 3  # a gap of up to so many lines is shown, too
+_AROUND = 2  # lines shown before and after a marked line outside functions
+_JOINED = 3  # gaps up to this many lines are shown, too
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """The outcome of a line's `mutants`: `worst` of them ended in `ending`, the others less badly."""
+    """The outcomes of a line's mutants. `mutants` is their number, `ending` the worst outcome, and `worst`
+    the number of mutants with that outcome."""
 
     ending: str
     worst: int
     mutants: int
 
 
-Marks = Mapping[int, Mapping[str, Mark]]  # line, from 1 -> permanent or transient -> its mark
+Marks = Mapping[int, Mapping[str, Mark]]  # line (from 1) -> permanent or transient -> mark
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MarkedFile:
-    """A file with faults: its lines, the ranges `shown` (functions with faults, from 1), and the marks."""
+    """A file with faults. `shown` are the line ranges to show (from 1): functions with faults."""
 
     path: str
     data: bytes
@@ -58,15 +59,16 @@ class MarkedFile:
     marks: Marks
 
     def worst_lines(self) -> dict[str, int]:
-        """How many lines have each ending as their worst."""
+        """For each ending, the number of lines of which it is the worst."""
         worst = [min((m.ending for m in here.values()), key=ENDINGS.index) for here in self.marks.values()]
         return {ending: worst.count(ending) for ending in ENDINGS if ending in worst}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, worst first. `places` has the line of each fault, `pkg/plan.py:42`; `changes` has
-    what operators change, `a + b -> a - b`. `why` explains missing files."""
+    """The files of a run, worst first. `places` has the line of each fault, such as `pkg/plan.py:42`.
+    `changes` has the change that each operator's fault makes, such as `a + b -> a - b`. If there are no
+    files, `why` is the reason."""
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
@@ -75,7 +77,7 @@ class SourceLines:
 
     @classmethod
     def of(cls, folder: RunFolder, workspace: Workspace | None, texts: "DataFrame") -> "SourceLines | None":
-        """The source of a run with these results; None if it has no operators."""
+        """The source of a run with the results `texts`; None if the run has no operators."""
         if not (texts["module"] == OPERATORS).any():
             return None
         faults = plan_file.read_faults(folder.path)
@@ -116,7 +118,7 @@ class SourceLines:
 
 
 def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
-    """File and line (from 1) of a fault's first location."""
+    """The file and line (from 1) of a fault's first location."""
     location = fault.injections[0].location
     return location.path, parsed(manifest.tree, location.path).span(location)[0] + 1
 
@@ -124,8 +126,8 @@ def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
 def _marks(
     at: Mapping[str, tuple[str, int]], texts: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
-    """The marks of each line for permanent and transient faults; each fault counts by its worst
-    experiment."""
+    """Yield the marks of each line, separately for permanent and transient faults. Each fault counts once,
+    with its worst experiment."""
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
         if name in at and ending in ENDINGS:
@@ -148,7 +150,7 @@ def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
 
 
 def _around(file: ParsedFile, line: int) -> range:
-    """The lines of the outermost function around a line, or a few lines around one outside functions."""
+    """The lines of the outermost function around `line`. Outside functions, a few lines around it."""
     function = file.outer_function(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
@@ -156,7 +158,7 @@ def _around(file: ParsedFile, line: int) -> range:
 
 
 def _joined(parts: Iterable[range]) -> tuple[range, ...]:
-    """The ranges in order, with (almost) touching ones joined."""
+    """The ranges in order. Ranges that touch, or almost touch, are joined."""
     found: list[range] = []
     for part in sorted(parts, key=lambda part: (part.start, part.stop)):
         if found and part.start <= found[-1].stop + _JOINED:
@@ -167,6 +169,6 @@ def _joined(parts: Iterable[range]) -> tuple[range, ...]:
 
 
 def _badness(file: MarkedFile) -> tuple[object, ...]:
-    """Sort key: the most lines with the worst ending first."""
+    """A sort key that puts files with the most lines of the worst ending first."""
     counts = file.worst_lines()
     return (*(-counts.get(ending, 0) for ending in ENDINGS), file.path)

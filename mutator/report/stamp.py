@@ -1,4 +1,4 @@
-"""A digest of a report's inputs, so that resuming a complete run does not redraw it."""
+"""Digests of a report's inputs and files, so that resuming a complete run does not write the report again."""
 
 from pathlib import Path
 
@@ -21,8 +21,8 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """Digest of a report's inputs: results, run.json, records, timings, proof, reviews, series and pictures,
-    the library's citations, and mutator's own sources."""
+    """The digest of a report's inputs: results, run.json, records, timings, proof, reviews, series, the files
+    in plots/, the library's citations, and the sources of mutator."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     series = [series_facts(folder), _files(run, f"{series_store.FOLDER}/{series_store.INDEX}.js")]
@@ -30,28 +30,28 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
     sources = Path(__file__).parents[1]
     own = [VERSION, _files(sources, "**/*.py"), _files(sources / "web", "*.*")]
     results = [digests.sha256(run / HEAD), digests.sha256(Results.of_run(run).path)]
-    # Records are included because the equivalence check compares more than the results have.
+    # Records are inputs because the equivalence check compares more than the results contain.
     engine = [_files(run / name, "*.jsonl") for name in ("records", "timings", equivalence.FOLDER)]
     sealed = [_files(run, name) for name in (gate.FILE, digests.FILE)]
     return digest([SCHEMA, own, results, engine, plots, series, references, *sealed])
 
 
 def is_current(out: Path, made_from: str) -> bool:
-    """Whether the report in `out` was made from `made_from` and its files are unchanged."""
+    """Whether the report in `out` was made from inputs with the digest `made_from` and is unchanged since."""
     try:
         stamp = read_json(out / FILE, SCHEMA)
-    except MutatorError:  # unreadable: rewrite the report
+    except MutatorError:  # unreadable, so the report is written again
         return False
     return (stamp.get("made_from"), stamp.get("files")) == (made_from, _written(out))
 
 
 def write_stamp(out: Path, made_from: str) -> None:
-    """Record the digests of a report's inputs and files; written last."""
+    """Record the digests of a report's inputs and files. Call this last."""
     write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "files": _written(out)})
 
 
 def _written(out: Path) -> dict[str, str]:
-    """Digest of each file of a report, without comparisons."""
+    """The digest of each file of a report, without comparisons."""
     paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
     return {
         name.as_posix(): digest(path.read_bytes())
@@ -61,7 +61,7 @@ def _written(out: Path) -> dict[str, str]:
 
 
 def remove_stamp(out: Path) -> None:
-    """Remove the stamp before writing, so that an interrupted report is not taken for a complete one."""
+    """Remove the stamp before writing a report, so that an interrupted report does not pass as complete."""
     (out / FILE).unlink(missing_ok=True)
 
 

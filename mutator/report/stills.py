@@ -1,4 +1,4 @@
-"""Stills of a finished run: of the worst few experiments whose controller sees pictures."""
+"""Takes stills of a finished run, of the few worst experiments whose controller sees pictures."""
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -17,16 +17,16 @@ from mutator.store.progress import Pace, Progress
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.workspace import Workspace
 
-MOST, ONE_IN = 10, 20  # maximum of experiments, absolute and as a share of the plan
-BUDGET_S = 120.0  # no experiment starts after this
+MOST, ONE_IN = 10, 20  # at most 10 experiments, and at most one in 20 of the plan
+BUDGET_S = 120.0  # no further experiment starts after this time
 
 Notify = Callable[[Progress], None]
 
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
-    """Take the run's missing stills, `workers` experiments at a time; none starts after `BUDGET_S`.
+    """Take the run's missing stills, `workers` experiments at a time. None starts after `BUDGET_S`.
 
-    Returns why the first experiment without stills has none; empty if there is none.
+    Returns the reason why the first experiment without stills has none, or ''.
     """
     manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
@@ -55,7 +55,7 @@ def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify
     with ScratchFolder("mutator-stills-") as scratch:
         try:
             driven = {_golden_key(experiments[name]): experiments[name] for name in due}
-            # submitted first, so that no film waits for a golden run that no thread runs
+            # golden runs are submitted first, or all threads could wait for one that none runs
             goldens = {key: pool.submit(filming.golden, one, scratch / key) for key, one in driven.items()}
             found = [pool.submit(wrong, name, goldens[_golden_key(experiments[name])]) for name in due]
             pace = Pace("pictures", len(found))
@@ -97,7 +97,7 @@ def _missing(folder: RunFolder, experiment_id: str, record: Record) -> list[Shot
 
 
 def _times(record: Record) -> Iterable[float]:
-    """Times of the activation, the first alert and the first hazard."""
+    """Yield the times of the activation, the first alert and the first hazard."""
     if record.activation:
         yield record.activation.first
     for events in (record.alerts, record.hazards):

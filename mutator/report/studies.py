@@ -1,4 +1,4 @@
-"""The data that a report is made from, and what a study adds to it."""
+"""The data from which a report is made, and what a study adds to the report."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -33,10 +33,11 @@ if TYPE_CHECKING:
 class ReportedRun:
     """The data that a report is made from.
 
-    `texts` are all experiments of results.csv, `frame` the usable ones. Plan and records are read on access,
-    by experiment id; `seen` has what a report needs from all of them.
-    Without a workspace nothing can be rerun and studies are not available. `study` is None if the campaign
-    asks for none or if it is not installed. `compared`: the study has its own page on these results.
+    `texts` are all experiments of results.csv, `frame` the usable ones. `experiments` (the plan) and
+    `records` are read on access, by experiment id. `seen` has the data that a report needs from all of them.
+    Without a workspace, no experiment can be rerun, and studies are not available. `study` is None if the
+    campaign asks for none or if the study is not installed. `compared` is set if the study has its own page
+    on these results.
     """
 
     folder: RunFolder
@@ -49,7 +50,7 @@ class ReportedRun:
     compared: bool = False
     paths: FoundPaths | None = None
     source: SourceLines | None = None
-    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all planned ones
+    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all planned experiments
     records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
@@ -74,7 +75,7 @@ class ReportedRun:
 
     @property
     def rows(self) -> tuple[Row, ...]:
-        """All rows of results.csv; prefer `frame` for large runs."""
+        """All rows of results.csv. For large runs use `frame`."""
         return Results.of_run(self.folder.path).rows()
 
     @property
@@ -84,11 +85,11 @@ class ReportedRun:
 
     @property
     def done(self) -> int:
-        """Number of planned experiments that ran."""
+        """The number of planned experiments that ran."""
         return int((self.texts["status"] != Status.HARNESS_ERROR.value).sum())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
-        """The golden runs' alerts, hazards and ranges; empty if they cannot be read."""
+        """The alerts, hazards and ranges of the golden runs; empty if these cannot be read."""
         if self.workspace is None:
             return ()
         try:
@@ -97,7 +98,7 @@ class ReportedRun:
             return ()
 
     def ends(self) -> dict[str, float] | None:
-        """The end of the golden runs by scenario, s of simulation; None if they cannot be read."""
+        """The latest end of each scenario's golden runs, in simulated seconds; None if one cannot be read."""
         if self.workspace is None:
             return None
         ends: dict[str, float] = {}
@@ -114,11 +115,13 @@ class ReportedRun:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
-    """Published work, provided by its entry point in `mutator.studies`; `about` cites it.
+    """Published work with which runs are compared, provided by an entry point in `mutator.studies`. `about`
+    cites it.
 
-    `check` finds problems of its data in a fault library. `published` returns the counts to show next to a
-    run's, or None if they do not fit the run. Each of `panels` may return a panel of the study's page and
-    write files next to it; without any there is no page. `drawings` are figures of that page.
+    `check` finds problems in the study's data in a fault library. `published` returns the counts to show next
+    to those of a run, or None if they do not apply to the run. Each function in `panels` may return a panel
+    of the study's page and write files next to the page. If none does, there is no page. `drawings` returns
+    the figures of that page.
     """
 
     about: str
@@ -129,8 +132,8 @@ class Study:
 
 
 def _study(folder: RunFolder) -> Study | None:
-    """The study that a run's campaign asks for; None if it is not installed."""
-    name = folder.head.get("study")  # older runs lack the key
+    """The study that a run's campaign asks for; None if there is none or it is not installed."""
+    name = folder.head.get("study")  # older runs do not have this key
     try:
         return cast(Study, find_study(name)) if name else None
     except MutatorError:

@@ -1,4 +1,4 @@
-"""Whether a hazard came with a warning: the single definition of *silent* in reports."""
+"""Defines which hazards came with a warning, and which are *silent* in reports."""
 
 from typing import TYPE_CHECKING
 
@@ -11,11 +11,11 @@ if TYPE_CHECKING:
 
 FIRST = "alert before the hazard"
 NO_ALERT, LATE = "no alert at all", "alert only after the hazard"
-SILENT = (NO_ALERT, LATE)  # no alert before the hazard
+SILENT = (NO_ALERT, LATE)  # silent hazards: no alert before the hazard
 
 
 def warning(row: Row) -> str:
-    """Value of the page's filter `warning`; '' without a hazard."""
+    """The value of the page's filter `warning`; '' without a hazard."""
     if not row.hazards:
         return ""
     if not row.alerts:
@@ -24,7 +24,7 @@ def warning(row: Row) -> str:
 
 
 def warnings_of(frame: "pd.DataFrame") -> "np.ndarray":
-    """`warning` for each row of a frame of results from `statistics.frame`."""
+    """The value of `warning` for each row of a frame from `statistics.frame`."""
     late = np.where(frame["reaction_time"] == "", LATE, FIRST)
     hazard = np.where(frame["alerts"] == "", NO_ALERT, late)
     return np.where(frame["is_hazard"], hazard, "")

@@ -1,6 +1,6 @@
-"""The map of fault type and scenario over all experiments, for pages that list only the worst.
+"""The map of fault type and scenario over all experiments, for pages that list only the worst experiments.
 
-Measure names match heat.js.
+The measures have the same names as in heat.js.
 """
 
 from collections.abc import Iterator, Mapping
@@ -13,11 +13,11 @@ from mutator.report.studies import ReportedRun
 from mutator.statistics.frame import hazard_names
 from mutator.targets.severity import CLASSES
 
-Cells = list[list[Any]]  # by row; each cell has a count or value, and its base
+Cells = list[list[Any]]  # by row; each cell has a count or value, and its base (the number of runs)
 
 
 def map_of(run: ReportedRun) -> dict[str, Any]:
-    """Fault types, scenarios, and cells by measure; the last row and column are totals."""
+    """The fault types, scenarios, and cells by measure. The last row and column are totals."""
     frame = run.frame
     kinds, scenarios = (sorted(map(str, frame[name].unique())) for name in ("kind", "scenario"))
     named = (("kind", kinds), ("scenario", scenarios))
@@ -35,7 +35,7 @@ def map_of(run: ReportedRun) -> dict[str, Any]:
 
 
 def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """For each share: its name, the rows counted, and the rows in the base."""
+    """Yield the name of each share, the rows that it counts, and the rows in its base."""
 
     def flag(name: str) -> np.ndarray:
         return frame[name].to_numpy(dtype=bool)
@@ -60,7 +60,7 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndar
 
 
 def _counted(y: np.ndarray, x: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """How many of the rows are in each cell."""
+    """The number of the `rows` in each cell."""
     inner = (shape[0] - 1) * (shape[1] - 1)
     found = np.zeros(shape, dtype=np.int64)
     counts = np.bincount((y * (shape[1] - 1) + x)[rows], minlength=inner)
@@ -77,7 +77,7 @@ def _pairs(part: np.ndarray, of: np.ndarray) -> Cells:
 def _summaries(
     name: str, worse: str, values: np.ndarray, y: np.ndarray, x: np.ndarray, shape: tuple[int, int]
 ) -> Mapping[str, Cells]:
-    """Median and worst value of a metric."""
+    """The cells of a metric's median and worst value."""
     medians: Cells = []
     worsts: Cells = []
     for row in range(shape[0]):

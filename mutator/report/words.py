@@ -1,4 +1,4 @@
-"""Explains the terms of a report's page: outcomes, hazards, severity, scenarios, triggers."""
+"""Explains the terms of a report's page: outcomes, hazards, severity, scenarios and triggers."""
 
 from collections.abc import Mapping
 
@@ -40,7 +40,7 @@ _METHODS = {
 
 
 def words_of(run: ReportedRun) -> Words:
-    """The terms that the page explains, without those that the run does not use."""
+    """The terms that the page explains. Terms that the run does not use are left out."""
     head = run.folder.head
     found = {
         "How an experiment ends": _ENDINGS,
@@ -55,7 +55,7 @@ def words_of(run: ReportedRun) -> Words:
 
 
 def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
-    """The classes with their lower delta-v limits."""
+    """The severity classes with their lower limits of delta-v."""
     if not scale:
         return {}
     classes = scale["classes"]
@@ -65,13 +65,13 @@ def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
 
 
 def _scenarios(run: ReportedRun) -> dict[str, str]:
-    """The scenarios' own descriptions, if they have one."""
+    """The descriptions in the scenarios' files, where there are any."""
     names = sorted(run.texts["scenario"].unique())
     return {name: about for name in names if (about := _title(run, name))}
 
 
 def _title(run: ReportedRun, name: str) -> str:
-    """The `title` or `about` of a scenario's file, whose format is not known."""
+    """The `title` or `about` in a scenario's file. The file may have any format."""
     if run.workspace is None:
         return ""
     try:
@@ -83,7 +83,7 @@ def _title(run: ReportedRun, name: str) -> str:
 
 
 def _triggers(run: ReportedRun) -> dict[str, str]:
-    """The methods, then the condition of each guided trigger."""
+    """The trigger methods, then the condition of each guided trigger."""
     methods = set(run.texts["method"].unique())
     told = {name: about for name, about in _METHODS.items() if name in methods}
     abouts = _contexts(run)
@@ -98,7 +98,7 @@ def _triggers(run: ReportedRun) -> dict[str, str]:
 
 
 def _contexts(run: ReportedRun) -> dict[str, str]:
-    """The contexts of the campaign's context table, if it is found."""
+    """The contexts in the campaign's context table, if the table is found."""
     try:
         campaign = yaml.safe_load((run.folder.path / "campaign.yaml").read_text(encoding="utf-8"))
         table = campaign["triggers"]["table"]

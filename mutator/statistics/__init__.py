@@ -1,1 +1,1 @@
-"""Statistics of a campaign: pure functions from a frame of results to tables with intervals."""
+"""Statistics of a campaign: pure functions that turn a frame of results into tables with intervals."""

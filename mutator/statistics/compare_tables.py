@@ -12,7 +12,8 @@ from mutator.statistics.tallies import by_kind
 
 
 def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """Rates, stratified odds ratio and resampled difference, per activated and per injected fault."""
+    """The table of rates, stratified odds ratio and resampled difference, per activated and per injected
+    fault."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -43,14 +44,14 @@ def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ...]:
-    if source != OURS:  # needs single runs, which are not published
+    if source != OURS:  # this needs single runs, which are not published
         return (None,) * 4
     found = contrasts.resampled(frame, whole)
     return (found.difference, found.low, found.high, found.clusters)
 
 
 def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """Fisher's exact test for each fault type, adjusted over all types."""
+    """The table of Fisher's exact test for each fault type, adjusted over all types."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -71,7 +72,8 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def pairs_sheet(frame: pd.DataFrame) -> Sheet:
-    """Exact McNemar test on matched pairs, for all and by fault type, adjusted over the types."""
+    """The table of McNemar's exact test on matched pairs, for all pairs and by fault type, adjusted over the
+    types."""
     paired = contrasts.pairs(frame)
     lines: list[tuple[Cell, ...]] = []
     for which, some in (

@@ -1,7 +1,7 @@
-"""Guided against random triggers: stratified by fault type, on matched pairs, and resampled by fault.
+"""Compares guided with random triggers: stratified by fault type, on matched pairs, and resampled by fault.
 
-Runs are nested in faults (the same value at the same location is tried in each context and scenario), so
-plain tests overestimate independence; `resampled` draws whole faults instead.
+Each fault (a value at a location) is tried in every context and scenario. Plain tests wrongly treat these
+runs as independent, so `resampled` draws whole faults instead.
 """
 
 import math
@@ -25,7 +25,7 @@ _PAIR = ["fault_id", "scenario", "row", "seed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stratum:
-    """One fault type: hazards and faults by method."""
+    """The numbers of hazards and faults of one fault type, by method."""
 
     kind: str
     guided_hazards: int
@@ -35,7 +35,7 @@ class Stratum:
 
     @property
     def table(self) -> list[list[int]]:
-        """[hazard, none] for guided, then random."""
+        """The counts [hazard, no hazard], first of guided and then of random faults."""
         return [
             [self.guided_hazards, self.guided - self.guided_hazards],
             [self.random_hazards, self.random - self.random_hazards],
@@ -44,9 +44,10 @@ class Stratum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """Mantel-Haenszel estimate over fault types. Above 1: guided faults are more hazardous; NaN: not defined.
+    """The Mantel-Haenszel estimate over fault types. Above 1, guided faults are more hazardous. NaN: not
+    defined.
 
-    `p` tests that the common odds ratio is 1, `p_equal` that it is the same in all types.
+    `p` tests that the common odds ratio is 1, and `p_equal` that the odds ratio is the same in all types.
     """
 
     odds_ratio: float
@@ -55,12 +56,13 @@ class Pooled:
     risk_ratio: float
     p: float
     p_equal: float
-    strata: int  # with runs of both methods
+    strata: int  # fault types with runs of both methods
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """Hazard rate of guided minus random, with its bootstrap interval over `clusters` faults."""
+    """The hazard rate of guided runs minus that of random runs, with its bootstrap interval over `clusters`
+    faults."""
 
     difference: float
     low: float
@@ -69,7 +71,7 @@ class Difference:
 
 
 def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Stratum, ...]:
-    """The fault types with faults of both methods, from counts by (method, fault type)."""
+    """The fault types that have faults of both methods. `counts` are by (method, fault type)."""
     made = []
     for kind in dict.fromkeys(kind for _, kind in counts):
         guided, random = counts.get((GUIDED, kind)), counts.get((RANDOM, kind))
@@ -87,11 +89,11 @@ def strata(counts: Mapping[tuple[str, str], Tally], whole: Whole) -> tuple[Strat
 
 
 def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
-    """The odds of a hazard, guided against random, stratified by fault type (statsmodels)."""
+    """Compare the odds of a hazard in guided and random runs, stratified by fault type (statsmodels)."""
     from statsmodels.stats.contingency_tables import StratifiedTable  # type: ignore[import-untyped]
 
     telling = [s for s in parts if 0 < s.guided_hazards + s.random_hazards < s.guided + s.random]
-    if not telling:  # all or none were hazards in each type: no odds to compare
+    if not telling:  # in each type all or none were hazards, so there are no odds to compare
         nan = math.nan
         return Pooled(
             odds_ratio=nan, low=nan, high=nan, risk_ratio=nan, p=nan, p_equal=nan, strata=len(parts)
@@ -111,15 +113,15 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
 
 
 def fisher(stratum: Stratum) -> float:
-    """p of Fisher's exact test for one fault type (scipy)."""
+    """The p-value of Fisher's exact test for one fault type (scipy)."""
     from scipy.stats import fisher_exact  # type: ignore[import-untyped]
 
     return float(fisher_exact(stratum.table).pvalue)
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """p-values adjusted by Holm's method (Scandinavian Journal of Statistics 6, 1979): the k-th smallest of n
-    times n - k + 1, monotone, at most 1; nan stays nan."""
+    """Adjust p-values by Holm's method (Scandinavian Journal of Statistics 6, 1979). The k-th smallest of n
+    is multiplied by n - k + 1; results are monotone and at most 1. NaN stays NaN."""
     known = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
     adjusted, largest = [math.nan] * len(p_values), 0.0
     for k, (p, place) in enumerate(known):
@@ -128,7 +130,8 @@ def holm(p_values: Sequence[float]) -> tuple[float, ...]:
 
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
-    """Each guided run with its random partner: same fault, scenario, context row and seed.
+    """A frame of guided runs with their random partners, which have the same fault, scenario, context row and
+    seed.
 
     Columns end in `_guided` and `_random`. Runs without a partner (unfinished or failed) are left out.
     """
@@ -140,13 +143,13 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def mcnemar(paired: pd.DataFrame) -> Matched:
-    """Hazards in the guided (first) and random (second) run of each pair."""
+    """Compare hazards in the guided (first) and the random (second) run of each pair."""
     return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    """The difference of hazard rates, guided minus random, with the `resampled_interval` over faults
-    (location, value), each with all its runs."""
+    """The hazard rate of guided runs minus that of random runs, with its `resampled_interval` over faults
+    (location and value). A fault is drawn with all its runs."""
     data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
     seen = float(_rate_difference(*data))
     low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)
@@ -154,7 +157,7 @@ def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
 
 
 def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
-    """For each fault: hazards when guided, when random, runs when guided, when random."""
+    """Four numbers for each fault: guided hazards, random hazards, guided runs, random runs."""
     faults = sorted(frame["fault_id"].unique())
     guided, random = frame["method"] == GUIDED, frame["method"] == RANDOM
     hazard = frame["is_hazard"]
@@ -168,7 +171,7 @@ def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
 def _rate_difference(
     guided_hazards: Any, random_hazards: Any, guided: Any, random: Any, axis: int = -1
 ) -> Any:
-    """The difference of hazards per run, summed over faults along `axis`; NaN if a method has no run."""
+    """The difference of hazards per run, from sums over faults along `axis`; NaN if a method has no run."""
     totals = [np.sum(x, axis=axis) for x in (guided_hazards, guided, random_hazards, random)]
     with np.errstate(invalid="ignore"):
         return totals[0] / totals[1] - totals[2] / totals[3]

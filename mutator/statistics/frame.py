@@ -1,8 +1,8 @@
-"""The results of a run as a pandas frame, a row per usable experiment.
+"""The results of a run as a pandas frame with a row for each usable experiment.
 
 In addition to the columns of results.csv it has `kind` (`sensor/bias`), `row` (the context row of the trigger
 or of its random partner), `t_hazard` (first hazard, s) and the flags `is_activated, is_manifested, is_hazard,
-is_alert`. Times are simulated seconds, NaN: did not happen.
+is_alert`. Times are in simulated seconds; NaN means that the event did not happen.
 """
 
 from pathlib import Path
@@ -14,19 +14,19 @@ from mutator.outcomes.reader import Results
 from mutator.outcomes.rows import UNUSABLE
 
 _TIMES = ("t_activation", "t_manifest", "t_alert")
-_RANDOM = "random/"  # prefix of a random partner's trigger: random/C1
+_RANDOM = "random/"  # prefix of the trigger of a random partner: random/C1
 
 
 def load(results: Path) -> pd.DataFrame:
-    """The usable experiments of a results.csv, in order; MutatorError if it is invalid.
+    """Load the usable experiments of a results.csv, in order. Raise MutatorError if the file is invalid.
 
-    Harness errors and invalid mutants are left out; crashes and timeouts count as injected.
+    Harness errors and invalid mutants are left out. Crashes and timeouts count as injected.
     """
     return prepare(Results(results).texts())
 
 
 def prepare(frame: pd.DataFrame) -> pd.DataFrame:
-    """Text rows from results.csv, typed and with derived columns."""
+    """Convert a frame of text cells from results.csv to types, and add the derived columns."""
     unusable = frame["status"].isin([str(status) for status in UNUSABLE])
     if unusable.any():
         frame = frame[~unusable]
@@ -62,13 +62,13 @@ _SHARED = (
 
 
 def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """The frame with only the columns that most statistics need (times, flags, names) and the columns `more`:
-    selecting rows with all columns takes seconds for a million."""
+    """Keep only the columns that most statistics need (times, flags, names) and those in `more`. With all
+    columns, selecting rows from a million takes seconds."""
     flags = [hazard.lower() for hazard in hazard_names(frame)]
     wanted = {*_SHARED, *flags, *more}
     return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
-    """Hazards with a flag and a time in the table, sorted: `NEAR`, with columns `near` and `t_near`."""
+    """The hazards in the table, sorted. NEAR, for example, has a flag `near` and a time `t_near`."""
     return tuple(sorted(hazards_in(frame.columns)))

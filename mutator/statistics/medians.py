@@ -1,7 +1,7 @@
 """Medians with bootstrap intervals that resample whole faults with all their runs.
 
-Each draw takes as many faults as there are, with repetition; the interval has the middle 95 % of the draws'
-medians. Seeded, so it is deterministic.
+Each draw takes as many faults as there are, with replacement. The interval covers the middle 95 % of the
+medians of the draws. The seed is fixed, so results are deterministic.
 """
 
 import math
@@ -15,22 +15,22 @@ from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 999
 _SEED = 1
-_CELLS = 500_000  # of one batch of draws: limits memory
-_BLOCK = 256  # values, at least
+_CELLS = 500_000  # maximum of cells in one batch of draws, to limit memory
+_BLOCK = 256  # minimum of values in a block
 
 
 def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of `values` (without NaN); `cluster` has the cluster of each.
+    """The interval of the median of `values`, which must not have NaN. `cluster` has the cluster of each
+    value.
 
-    NaN for fewer than two clusters, and if all values are equal: other values may exist that were not
-    observed.
+    NaN if there are fewer than two clusters or if all values are equal, because unobserved values may differ.
     """
     return _interval([values.to_numpy(dtype=float)], cluster)
 
 
 def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The median of the second values minus that of the first; draws keep pairs together. NaN without pairs,
-    and intervals as in `median_interval`."""
+    """The median of the second values minus that of the first, with its interval. Draws keep pairs together.
+    NaN without pairs. The interval is NaN in the same cases as in `median_interval`."""
     before, after = first.to_numpy(dtype=float), second.to_numpy(dtype=float)
     if not before.size:
         return Difference(difference=math.nan, low=math.nan, high=math.nan)
@@ -39,7 +39,8 @@ def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -
 
 
 def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the first sample's median, minus the second's if there is one."""
+    """The interval of the median of the first sample. If there is a second sample, its median is
+    subtracted."""
     codes, names = pd.factorize(cluster)
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
@@ -56,13 +57,15 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 
 
 def _block_of(clusters: int, runs: int) -> int:
-    """The values per block: grows with runs and clusters, because a product for each block and cluster takes
-    about a fiftieth of the work on one value in the block with the median."""
+    """The number of values per block. It grows with runs and clusters. It balances two costs: a product for
+    each block and cluster, and the work on each value in the block that has the median, about 50 times as
+    much."""
     return max(_BLOCK, math.isqrt(clusters * runs // 50))
 
 
 def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
-    """How often each cluster is drawn: (draws, clusters), in batches; each draw takes `others` more cells."""
+    """Yield batches of shape (draws, clusters) that say how often each cluster is drawn. In memory, each draw
+    also needs `others` cells."""
     rng = np.random.default_rng(_SEED)
     batch = max(1, _CELLS // max(clusters, others))
     for begin in range(0, RESAMPLES, batch):
@@ -71,8 +74,8 @@ def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
 
 
 class _Sorted:
-    """Sorted values, with the number of each cluster's values in every block: a draw's median is searched by
-    block, then within a block."""
+    """Sorted values in blocks, with the number of values that each cluster has in each block. The median of a
+    draw is located first by block, then within the block."""
 
     def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int, block: int) -> None:
         self._block = block
@@ -83,15 +86,16 @@ class _Sorted:
         self._of = np.bincount(cells, minlength=blocks * clusters).reshape(blocks, clusters).astype(float)
 
     def medians(self, counts: np.ndarray) -> np.ndarray:
-        """The median of each draw; `counts` has how often it has each cluster: (draws, clusters)."""
-        until = np.cumsum(counts @ self._of.T, axis=1)  # integers, exact in floats
+        """The median of each draw. `counts`, of shape (draws, clusters), says how often each cluster is
+        drawn."""
+        until = np.cumsum(counts @ self._of.T, axis=1)  # integers, which floats represent exactly
         whole = until[:, -1:].astype(np.int64)
         lower, upper = (self._at(place, until, counts) for place in ((whole - 1) // 2, whole // 2))
         medians: np.ndarray = (lower + upper) / 2
         return medians
 
     def _at(self, place: np.ndarray, until: np.ndarray, counts: np.ndarray) -> np.ndarray:
-        """The value at an index of each draw's values."""
+        """For each draw, the value with the index `place` among its sorted values."""
         block = (until <= place).sum(axis=1)
         before = np.take_along_axis(until, np.maximum(block - 1, 0)[:, None], axis=1)[:, 0]
         at = np.minimum(block[:, None] * self._block + np.arange(self._block), self._values.size - 1)

@@ -1,4 +1,4 @@
-"""Tables of how bad and how fast runs were: metrics, severity classes and times to hazard."""
+"""Tables of metrics, severity classes and times to hazard."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -17,8 +17,8 @@ _INTERVAL = "Medians have 95 % intervals, resampled by fault (location and value
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
-    """For each metric (name, unit, meaning, worse direction), its spread over activated faults by fault type;
-    no lines without values."""
+    """The table of the spread of each metric (name, unit, meaning, worse direction) over activated faults, by
+    fault type. Without values, the table has no lines."""
     lines: list[tuple[Cell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
@@ -41,7 +41,8 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
 
 
 def severity_sheet(frame: pd.DataFrame) -> Sheet:
-    """Activated faults by type and severity class of the contact; no lines if results have no classes."""
+    """The table of activated faults by fault type and severity class of the contact. If the results have no
+    classes, it has no lines."""
     lines: list[tuple[Cell, ...]] = []
     known = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], known]
@@ -60,7 +61,7 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """Times to the first hazard by fault type; `alerts` if the target has some."""
+    """The table of times to the first hazard by fault type. `alerts` says whether the target has alerts."""
     came = slim(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
     starts |= {"alert": "t_alert"} if alerts else {}
@@ -86,14 +87,15 @@ def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 
 def _groups(frame: pd.DataFrame, values: pd.Series) -> Iterator[tuple[str, pd.Series, pd.Series]]:
-    """Fault type, values and their faults, for runs with a value."""
+    """Yield each fault type with the values of its runs and the faults that they belong to. Runs without a
+    value are left out."""
     known = values.dropna()
     for kind, group in _by_kind(frame.loc[known.index, ["kind", "fault_id"]]):
         yield kind, known[group.index], group["fault_id"]
 
 
 def _by_kind(frame: pd.DataFrame) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Groups by fault type, and all together if there are several."""
+    """Yield the runs of each fault type and, if there are several types, all runs."""
     kinds = [(str(kind), group) for kind, group in frame.groupby("kind")]
     yield from kinds
     if len(kinds) > 1:

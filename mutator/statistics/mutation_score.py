@@ -1,7 +1,8 @@
-"""The mutation score of a closed loop: what operators' mutants change in the drives.
+"""The mutation score of a closed loop: the share of operator mutants that change the drives.
 
-A mutant counts once: it changes something if any of its drives does. Shares are of activated mutants; others
-are listed separately. Harness errors and invalid mutants are not counted (`frame.load` removes them).
+Each mutant counts once, and it has an effect if any of its drives has that effect. Shares are of activated
+mutants; others are listed separately. Harness errors and invalid mutants are not counted (`frame.load`
+removes them).
 """
 
 import math
@@ -18,7 +19,7 @@ from mutator.statistics.shares import Share, share
 from mutator.statistics.sheet import Cell, Sheet, text_of
 from mutator.triggers.kinds import ALWAYS
 
-GoldenAlerts = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed, '' for any) -> names
+GoldenAlerts = Mapping[tuple[str, str], frozenset[str]]  # (scenario, seed or "") -> names of alerts
 
 PERMANENT, TRANSIENT, EITHER = "permanent", "transient", "either"
 ALL, MUTANTS, DRIVES = "all", "mutants", "drives"
@@ -41,11 +42,11 @@ _UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compar
 def drives_of(
     frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
 ) -> pd.DataFrame:
-    """A row for each usable experiment of an operator's mutant, with what the score counts.
+    """A frame with what the score counts: a row for each usable experiment of an operator mutant.
 
-    `mutant` (its fault's id), `operator`, `function` (`path::name`), `fault` (permanent or transient), then
-    flags for `active` and each effect. A crashed or timed-out drive was active. Without `golden_alerts` there
-    is no alert flag.
+    Columns: `mutant` (the fault's id), `operator`, `function` (`path::name`), `fault` (permanent or
+    transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive counts as active.
+    Without `golden_alerts`, there is no flag for alerts.
     """
     found = frame[frame["module"] == OPERATORS]
     broken = found["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
@@ -70,7 +71,7 @@ def drives_of(
 
 
 def function_of(fault: Fault) -> str:
-    """A fault's first place of injection: `path::function`."""
+    """The function of a fault's first injection, as `path::function`."""
     place = fault.injections[0].location
     return f"{place.path}::{place.function}"
 
@@ -91,9 +92,9 @@ def score_sheet(
     golden_alerts: GoldenAlerts | None,
     told: Sequence[str] = (),
 ) -> Sheet:
-    """The score in total, by operator and by function, for permanent and transient faults; no lines if no
-    operator's mutant has a result. `faults` are those of the plan, `golden_alerts` the alerts that golden
-    runs raise (None: not known), `told` the available mutants and exclusions."""
+    """The score in total, by operator and by function, for permanent and transient faults. If no operator
+    mutant has a result, the sheet has no lines. `faults` are those of the plan. `golden_alerts` are the
+    alerts that golden runs raise (None: not known). `told` describes the available mutants and exclusions."""
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
@@ -110,7 +111,7 @@ def score_sheet(
 
 
 def totals(sheet: Sheet) -> Table:
-    """The lines over all mutants, in few columns."""
+    """The lines over all mutants, with fewer columns."""
     rows = [
         (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
         for name, counted, lasting, *cells in sheet.lines
@@ -145,13 +146,13 @@ def _of_mutants(name: str, drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
 
 
 def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
-    """The flags of each mutant."""
+    """The flags of each mutant: set if they are set for any of its drives."""
     flags = [name for name in (_ACTIVE, *_EFFECTS) if name in drives]
     return drives.groupby("mutant")[flags].any()
 
 
 def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[Cell, ...]:
-    """A line of the sheet; `flags` has a row for each counted item, by mutant."""
+    """A line of the sheet. `flags` has a row for each counted item and is indexed by mutant."""
     active = flags[flags[_ACTIVE]]
     known = [effect for effect in _EFFECTS if effect in active]
     cells = [_share(active[effect]) if effect in active else None for effect in _EFFECTS]
@@ -160,7 +161,7 @@ def _line(name: str, counted: str, lasting: str, flags: pd.DataFrame) -> tuple[C
 
 
 def _share(flag: "pd.Series[bool]") -> Share:
-    """The share of a flag; its interval resamples mutants if some have several rows."""
+    """The share of a flag. If a mutant has several rows, the interval resamples whole mutants."""
     count, of = int(flag.sum()), len(flag)
     if flag.index.is_unique:
         return share(count, of)

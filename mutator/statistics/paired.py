@@ -1,7 +1,7 @@
-"""Statistics of pairs: the same thing under a first and a second condition.
+"""Statistics of pairs, each observed under a first and a second condition.
 
-Runs of one fault are similar, so tests that treat pairs as independent find too much; `rate_difference`
-resamples whole faults instead. All formulas are from scipy and statsmodels.
+Runs of one fault are similar, so tests that treat pairs as independent overstate significance.
+`rate_difference` resamples whole faults instead. All formulas come from scipy and statsmodels.
 """
 
 import math
@@ -16,14 +16,14 @@ import pandas as pd
 from mutator.statistics.shares import CONFIDENCE
 
 RESAMPLES = 9999
-_SEED = 1  # of resampling, which is deterministic
-_DIGITS = 9  # of a time difference: absorbs rounding errors
+_SEED = 1  # fixed, so that resampling is deterministic
+_DIGITS = 9  # decimals of a time difference; absorbs rounding errors
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Matched:
-    """Pairs with the event both times, only first, only second, or neither, and the exact McNemar p that
-    first and second are equally likely."""
+    """The numbers of pairs with the event under both conditions, only the first, only the second, or neither.
+    `p` is from McNemar's exact test that the event is equally likely under both."""
 
     both: int
     first_only: int
@@ -38,7 +38,7 @@ class Matched:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """A rate or time, second minus first, with its interval. NaN: not defined."""
+    """The difference of a rate or time, second minus first, with its interval. NaN: not defined."""
 
     difference: float
     low: float
@@ -47,8 +47,8 @@ class Difference:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Times:
-    """Times of `n` complete pairs, s: medians, and the median difference (second minus first) with its exact
-    interval; `p` is Wilcoxon's, that differences are symmetric about 0."""
+    """The times of `n` complete pairs in s: both medians, and the median difference (second minus first) with
+    its exact interval. `p` is from Wilcoxon's test that the differences are symmetric about 0."""
 
     n: int
     first: float
@@ -58,7 +58,7 @@ class Times:
 
 
 def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
-    """Compare two flags of each pair (statsmodels, exact)."""
+    """Compare two flags of each pair with McNemar's exact test (statsmodels)."""
     from statsmodels.stats.contingency_tables import (  # type: ignore[import-untyped]
         mcnemar as exact_mcnemar,
     )
@@ -76,7 +76,7 @@ def mcnemar(first: pd.Series, second: pd.Series) -> Matched:
 
 
 def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The rate of a flag, second minus first, with the `resampled_interval` over clusters."""
+    """The difference of a flag's rates, second minus first, with its `resampled_interval` over clusters."""
     change = second.astype(int) - first.astype(int)
     sums = change.groupby(cluster.to_numpy()).agg(["sum", "count"])
     low, high = resampled_interval((sums["sum"].to_numpy(), sums["count"].to_numpy()), _mean)
@@ -85,17 +85,17 @@ def rate_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> 
 
 
 def resampled_interval(clusters: Sequence[np.ndarray], statistic: Callable[..., Any]) -> tuple[float, float]:
-    """The percentile bootstrap (scipy) of a statistic over resampled clusters.
+    """The interval of a statistic from a percentile bootstrap over whole clusters (scipy).
 
     Each array has a number for each cluster. NaN if there are fewer than two clusters, if the statistic is
-    undefined for some draws, or if it is the same for all: other clusters may exist that were not observed.
+    undefined for some draws, or if it is equal for all draws, because unobserved clusters may differ.
     """
     from scipy.stats import DegenerateDataWarning, bootstrap  # type: ignore[import-untyped]
 
     if len(clusters[0]) < 2:
         return math.nan, math.nan
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DegenerateDataWarning)  # undefined for some draws: the result is NaN
+        warnings.simplefilter("ignore", DegenerateDataWarning)  # then the result is NaN
         interval = bootstrap(
             clusters,
             statistic,
@@ -116,8 +116,8 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 
 
 def times(first: pd.Series, second: pd.Series) -> Times:
-    """Times of complete pairs compared: medians, their difference (scipy: exact interval from order
-    statistics), Wilcoxon's signed-rank test (scipy; NaN if no time differs)."""
+    """Compare the times of complete pairs: medians, the median difference with an exact interval from order
+    statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs). All are from scipy."""
     from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()
@@ -139,7 +139,7 @@ def times(first: pd.Series, second: pd.Series) -> Times:
 
 
 def wilcoxon(first: pd.Series, second: pd.Series) -> float:
-    """p of Wilcoxon's signed-rank test (scipy) on pairs without NaN; NaN if no pair differs."""
+    """The p-value of Wilcoxon's signed-rank test (scipy) on pairs without NaN; NaN if no pair differs."""
     from scipy.stats import wilcoxon as signed_rank
 
     change = (second - first).round(_DIGITS)

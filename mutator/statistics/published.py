@@ -1,20 +1,20 @@
-"""Published counts of similar experiments, shown next to those of a run."""
+"""Published counts of similar experiments, which tables show next to those of a run."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mutator.statistics.tallies import Tally
 
-OURS = "here"  # label of a run's rows next to published ones
+OURS = "here"  # label of a run's rows next to published rows
 Counts = Mapping[tuple[str, str], Tally]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Published:
-    """Counts by (method, scenario) and by (method, fault type), and text for their tables.
+    """Published counts by (method, scenario) and by (method, fault type), and texts for their tables.
 
-    `source` labels their rows. Titles and notes are added to those of the tables. `driver_s` is the driver's
-    reaction time in s that the publication assumes.
+    `source` labels the rows. Titles and notes are added to those of the tables. `driver_s` is the reaction
+    time of the driver, in s, that the publication assumes.
     """
 
     source: str
@@ -29,5 +29,5 @@ class Published:
 
 
 def by_source(published: Published | None, ours: Counts) -> dict[str, Counts]:
-    """Counts by fault type: published ones if there are any, then ours."""
+    """The counts by fault type: first the published ones, if there are any, then those of the run."""
     return ({published.source: published.by_kind} if published else {}) | {OURS: ours}

@@ -1,7 +1,7 @@
-"""The variation between a campaign's seeds: each is the whole campaign with different draws.
+"""The variation between a campaign's seeds. Each seed is the whole campaign with other draws.
 
-An interval over runs assumes independence and ignores the draws. Here whole seeds are resampled, as many as
-there are, which shows how much another campaign of as many seeds may differ.
+An interval over runs assumes independence and ignores the variation of draws. This module resamples whole
+seeds instead, which shows how much another campaign with as many seeds may differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,13 +30,13 @@ _BY_KIND = ((_ACTIVATED, _INJECTED), (_HAZARDS, _ACTIVATED), (_HAZARDS, _INJECTE
 
 
 def seeds_of(frame: pd.DataFrame) -> list[str]:
-    """The seeds of a frame in numeric order, without rows that have none ('')."""
+    """The seeds of a frame in numeric order. Rows without a seed ('') are ignored."""
     return sorted(filter(None, map(str, frame["seed"].unique())), key=int)
 
 
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """Each share over all faults and by method; `alerts` if the target has some. A single seed has no
-    lines."""
+    """The table of each share over all faults and by method. `alerts` says whether the target has alerts.
+    With a single seed, the table has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL: np.ones(len(frame), dtype=bool)}
     if len(methods) > 1:
@@ -51,7 +51,7 @@ def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 
 def kinds_sheet(frame: pd.DataFrame) -> Sheet:
-    """Fewer shares, by fault type."""
+    """The table of fewer shares, by fault type."""
     kinds = sorted(map(str, frame["kind"].unique()))
     groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
     return Sheet(
@@ -64,7 +64,7 @@ def kinds_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
-    """(what is counted, the base)."""
+    """The shares to compute, each as (what is counted, the base)."""
     made = [(_ACTIVATED, _INJECTED), ("manifested", _ACTIVATED), *_BY_KIND[1:]]
     made += [(name, whole) for name in hazard_names(frame) for whole in (_ACTIVATED, _INJECTED)]
     if alerts:
@@ -75,7 +75,7 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
 
 
 def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
-    """Whether each run counts, by share."""
+    """For each quantity, whether each run counts."""
     hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
     return {
         _INJECTED: np.ones(len(frame), dtype=bool),
@@ -106,7 +106,7 @@ def _lines(
 
 
 def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[Cell, ...]:
-    """The cells of a share, from its counts and bases in each seed."""
+    """The cells of a share, from its count and base in each seed."""
     low, high = resampled_interval((counts, wholes), _rate)
     known = [(count / of, int(seed)) for seed, count, of in zip(seeds, counts, wholes, strict=True) if of]
     least, largest = min(known, default=None), min(known, key=lambda k: (-k[0], k[1]), default=None)
@@ -120,5 +120,5 @@ def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tup
 
 
 def _rate(counts: Any, wholes: Any, axis: int = -1) -> Any:
-    with np.errstate(invalid="ignore"):  # nothing to count in a draw: NaN
+    with np.errstate(invalid="ignore"):  # if a draw has nothing to count, the result is NaN
         return np.sum(counts, axis=axis) / np.sum(wholes, axis=axis)

@@ -9,7 +9,8 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """`count` of `of`, with the interval of the rate (NaN if there is none, for example without data)."""
+    """A share: `count` of `of`, with the interval of the rate. The interval is NaN if there is none, for
+    example without data."""
 
     count: int
     of: int
@@ -21,7 +22,7 @@ class Share:
         return self.count / self.of if self.of else math.nan
 
     def __str__(self) -> str:
-        """`35.8 % (1316/3678; 34.2 to 37.3)`; `- (0/0)` if empty."""
+        """The share as text, such as `35.8 % (1316/3678; 34.2 to 37.3)`, or `- (0/0)` without data."""
         if not self.of:
             return "- (0/0)"
         if math.isnan(self.low):
@@ -31,11 +32,11 @@ class Share:
 
 
 def share(count: int, of: int) -> Share:
-    """`count` of `of` with its 95 % Wilson interval (statsmodels)."""
+    """The share of `count` in `of`, with its 95 % Wilson interval (statsmodels)."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     if not of:
         return Share(count=count, of=of, low=math.nan, high=math.nan)
     low, high = proportion_confint(count, of, alpha=1 - CONFIDENCE, method="wilson")
-    # rounded: last bits differ between machines, and 0 of n must begin at 0, not 2e-18
+    # rounded, because last bits differ between machines, and because 0 of n must begin at 0, not 2e-18
     return Share(count=count, of=of, low=round(float(low), _DIGITS), high=round(float(high), _DIGITS))

@@ -1,4 +1,4 @@
-"""A table that can be written as CSV, with a column for each number, and as Markdown."""
+"""A table that can be written as Markdown, and as CSV with a column for each number."""
 
 import csv
 import io
@@ -17,7 +17,7 @@ _SHARE_COLUMNS = ("count", "of", "rate", "low", "high")
 
 
 class P(float):
-    """A p-value, displayed no smaller than its approximation supports."""
+    """A p-value. Very small ones are displayed as a bound, because the approximation is no more precise."""
 
     def __str__(self) -> str:
         return "< 0.0001" if self < 0.0001 else f"{float(self):.4f}"
@@ -35,7 +35,7 @@ Cell = Share | float | int | str | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """One table. `name` is the file name, `note` says what is counted; each line has a cell for each
+    """One table. `name` is the file name, and `note` says what is counted. Each line has a cell for each
     heading."""
 
     name: str
@@ -53,7 +53,7 @@ class Sheet:
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
     def csv(self) -> str:
-        """The table as CSV; a share becomes five columns: count, of, rate and both ends of its interval
+        """The table as CSV. A share becomes five columns: count, of, rate, and both ends of its interval
         (fractions)."""
         columns, lines = self._unfolded(_number)
         out = io.StringIO()
@@ -63,14 +63,14 @@ class Sheet:
         return out.getvalue()
 
     def frame(self) -> "pd.DataFrame":
-        """The same columns as a pandas frame, with full precision."""
+        """The columns of the CSV as a pandas frame, with full precision."""
         import pandas as pd
 
         columns, lines = self._unfolded(float)
         return pd.DataFrame(lines, columns=columns)
 
     def _unfolded(self, number: Callable[[float], object]) -> tuple[list[str], list[list[object]]]:
-        """Columns and lines with each share split into five."""
+        """The headings and lines, with each share split into five cells."""
         wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
         columns = [
             name
@@ -96,7 +96,7 @@ def _number(value: float) -> str:
 
 
 def text_of(cell: Cell) -> str:
-    """A cell's display text."""
+    """The text that shows a cell."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
     return str(cell) if isinstance(cell, P | Rate) or not isinstance(cell, float) else f"{cell:.3g}"

@@ -1,4 +1,4 @@
-"""The statistical tables of a run, chosen by its results."""
+"""Selects the statistical tables of a run that fit its results."""
 
 from collections.abc import Mapping
 
@@ -12,7 +12,7 @@ from mutator.statistics.sheet import Sheet
 from mutator.statistics.tallies import by_kind, by_scenario
 from mutator.statistics.times import Alerts
 
-_DRIVER_S = 1.8  # a driver's reaction to a visible warning, if no publication gives one
+_DRIVER_S = 1.8  # a driver's reaction time to a visible warning; used if no publication states one
 
 
 def run_sheets(
@@ -21,11 +21,12 @@ def run_sheets(
     alerts: Alerts | None,
     ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
-    """The tables of a frame; none if they would only repeat counts: one method, nothing published.
+    """The tables of a frame. Empty if they would only repeat counts, that is for one method without published
+    counts.
 
-    `alerts` of each run with a hazard (None: the target has none) decide which came first; `ends` (end of a
-    run of each scenario, simulated s) are needed for censored times. Tables without their inputs are left
-    out.
+    `alerts` are those of each run with a hazard (None: the target has no alerts); they decide which event
+    came first. `ends` is the end of a run of each scenario in simulated seconds; censored times need it.
+    Tables without their inputs are left out.
     """
     frame = slim(frame)
     if not published and not {GUIDED, RANDOM} <= set(frame["method"]):

@@ -1,4 +1,5 @@
-"""Summaries by scenario and by fault type: published numbers above ours, with an interval in each cell."""
+"""Summary tables by scenario and by fault type, with published numbers above those of the run and an interval
+in each cell."""
 
 from collections.abc import Iterable
 
@@ -23,8 +24,8 @@ _NOTE = "95 % Wilson intervals; in brackets count/whole."
 
 
 def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """By scenario, for one method: a column for each of our scenarios and a total; `alerts` if the target has
-    some."""
+    """The table by scenario for one method: a column for each scenario of the run, and a total. `alerts` says
+    whether the target has alerts."""
     scenarios = sorted({scenario for how, scenario in ours if how == method})
     theirs = published.by_scenario if published else {}
     sources = _sources(method, ours, published, theirs, scenarios)
@@ -46,10 +47,10 @@ def summary_sheet(method: str, ours: Counts, published: Published | None, *, ale
 
 
 def coverage_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
-    """By fault type, for one method: a line for each of our fault types and a total."""
+    """The table by fault type for one method: a line for each fault type of the run, and a total."""
     kinds = sorted({kind for how, kind in ours if how == method})
     theirs = published.by_kind if published else {}
-    # In the publication's order, then the rest.
+    # fault types in the order of the publication, then the rest
     kinds = list(dict.fromkeys([kind for _, kind in theirs if kind in kinds] + kinds))
     sources = _sources(method, ours, published, theirs, kinds)
     lines: list[tuple[Cell, ...]] = []
@@ -75,7 +76,8 @@ def _title(title: str, published: str) -> str:
 def _sources(
     method: str, ours: Counts, published: Published | None, theirs: Counts, names: Iterable[str]
 ) -> dict[str, dict[str, Tally | None]]:
-    """Published counts (if there are any for these groups) and ours, by group; None: not published."""
+    """The published counts, if there are any for these groups, and those of the run, by group. None: not
+    published."""
     groups = list(names)
     known = {name: theirs.get((method, name)) for name in groups}
     sources: dict[str, dict[str, Tally | None]] = {}

@@ -1,4 +1,4 @@
-"""Counts of one group of experiments, from a run or a publication."""
+"""The counts of one group of experiments, from a run or a publication."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
@@ -9,9 +9,9 @@ import pandas as pd
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
-    """How many of a group's faults were injected, activated and so on; None: not known.
+    """The numbers of a group's faults that were injected, activated and so on. None: not known.
 
-    Alerts and hazards count from activation. `hazards_no_alerts`: no alert in the whole run.
+    Alerts and hazards count from activation on. `hazards_no_alerts` counts hazards in runs without any alert.
     """
 
     injected: int
@@ -38,7 +38,7 @@ def tally(frame: pd.DataFrame) -> Tally:
 
 
 def total(tallies: Iterable[Tally]) -> Tally:
-    """The sum of groups; a count is unknown if one group lacks it."""
+    """The sum over groups. A count is None if it is None in any group."""
     all_of_them = list(tallies)
     sums: dict[str, Any] = {}
     for field in fields(Tally):
@@ -48,10 +48,10 @@ def total(tallies: Iterable[Tally]) -> Tally:
 
 
 def by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    """Counts by (method, scenario)."""
+    """The counts by (method, scenario)."""
     return {(str(m), str(s)): tally(group) for (m, s), group in frame.groupby(["method", "scenario"])}
 
 
 def by_kind(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    """Counts by (method, module/fault type)."""
+    """The counts by (method, module/fault type)."""
     return {(str(m), str(k)): tally(group) for (m, k), group in frame.groupby(["method", "kind"])}

@@ -16,7 +16,8 @@ _ALERT_NOTE = (
 
 
 def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """How fast faults propagate, by method and scenario; `alerts` if the target has some."""
+    """The table of how fast faults propagate, by method and scenario. `alerts` says whether the target has
+    alerts."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
@@ -44,7 +45,7 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
 
 
 def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
-    """Kaplan-Meier estimates of alert to hazard, by method and scenario."""
+    """The table of Kaplan-Meier estimates of the time from alert to hazard, by method and scenario."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         found = times.reaction(group, ends, driver_s)
@@ -71,7 +72,7 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
 
 
 def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
-    """Which alerts came before which hazard."""
+    """The table of the alerts that came before each hazard."""
     lines: list[tuple[Cell, ...]] = []
     for method, group in frame.groupby("method"):
         shares = times.alerts_before(group, alerts)
@@ -87,7 +88,7 @@ def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
 
 
 def orders_sheet(frame: pd.DataFrame) -> Sheet:
-    """The hazards of each run, in order."""
+    """The table of the orders in which hazards occurred."""
     lines: list[tuple[Cell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [(str(method), str(module), order, n) for order, n in times.hazard_orders(group).items()]
@@ -101,7 +102,7 @@ def orders_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def _groups(frame: pd.DataFrame) -> Iterator[tuple[str, str, pd.DataFrame]]:
-    """Groups by method and scenario, each method's total after its scenarios."""
+    """Yield the groups by method and scenario. After the scenarios of a method comes its total."""
     for method, of_method in frame.groupby("method"):
         for scenario, group in of_method.groupby("scenario"):
             yield str(method), str(scenario), group

@@ -1,7 +1,7 @@
 """Propagation times: from activation to effects, and from the first alert to the first hazard.
 
-Alert-to-hazard times are censored: a hazard might have followed after the end of the run. Kaplan-Meier uses
-these runs up to their end; a mean over the others would be too short.
+Times from alert to hazard are censored, because a hazard might have followed after the end of the run. The
+Kaplan-Meier estimate uses such runs up to their end. A mean over the other runs would be too short.
 """
 
 import math
@@ -18,12 +18,12 @@ from mutator.statistics.frame import hazard_names
 from mutator.statistics.shares import CONFIDENCE, Share, share
 
 Alerts = Mapping[str, tuple[tuple[str, float], ...]]
-_EQUAL = 1e-9  # shares closer than this are equal: a curve is a product of fractions
+_EQUAL = 1e-9  # shares closer than this are equal, because a curve is a product of rounded fractions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Mean and quartiles of `n` times in s (NaN if there are none)."""
+    """The mean and quartiles of `n` times in s. NaN if there are none."""
 
     n: int
     mean: float
@@ -34,17 +34,16 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reaction:
-    """The drive after the first alert. Times in s; NaN: not reached or not defined.
+    """The times and shares from the first alert to a hazard. Times are in s. NaN: not reached or not defined.
 
-    `at_risk` runs had an alert before any hazard; `events` of them then had a hazard, the others are censored
-    at their end.
-    `median` is where the Kaplan-Meier curve crosses one half. If the curve is flat at one half, it is the
-    middle of that section, as in R's `survfit` and SAS: without censoring, this is the ordinary median. If
-    the section reaches the end, it is its beginning.
-    `median_low` to `median_high` are the times at which the curve's interval (log-log transformed) contains
-    one half (Brookmeyer and Crowley 1982); an infinite end is not reached.
+    `at_risk` is the number of runs with an alert before any hazard. Of these, `events` then had a hazard; the
+    others are censored at their end. `median` is the time at which the Kaplan-Meier curve crosses one half.
+    If the curve is flat at one half, `median` is the middle of the flat section, as in R's `survfit` and SAS.
+    Without censoring, this is the ordinary median. If the flat section reaches the end of the curve, `median`
+    is the section's beginning. From `median_low` to `median_high`, the curve's log-log transformed interval
+    contains one half (Brookmeyer and Crowley 1982). An infinite end is not reached within the runs.
     `survival` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
-    `in_time` is the share of hazards after an alert that came later than that.
+    `in_time` is the share of the hazards after an alert that came later than this reaction time.
     """
 
     at_risk: int
@@ -54,11 +53,11 @@ class Reaction:
     median_high: float
     survival: float
     in_time: Share
-    too_late: int  # alerts after the first hazard, in no other number
+    too_late: int  # runs with the first alert after the first hazard; no other number includes them
 
 
 def spread(times: pd.Series) -> Spread:
-    """Mean and quartiles of the times, without missing ones."""
+    """The mean and quartiles of the times. Missing times are ignored."""
     known = times.dropna()
     if known.empty:
         return Spread(n=0, mean=math.nan, lower=math.nan, median=math.nan, upper=math.nan)
@@ -67,8 +66,8 @@ def spread(times: pd.Series) -> Spread:
 
 
 def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
-    """Times from activation to the first actuator difference, alert and hazard; and from the first alert to
-    the first hazard if the alert came first."""
+    """The times from activation to the first actuator difference, alert and hazard, and from the first alert
+    to the first hazard if the alert came first."""
     start = frame["t_activation"]
     reaction = frame["t_hazard"] - frame["t_alert"]
     return {
@@ -80,10 +79,10 @@ def propagation(frame: pd.DataFrame) -> dict[str, Spread]:
 
 
 def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Reaction:
-    """Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
+    """The Kaplan-Meier estimate (statsmodels) over the runs with an alert before any hazard.
 
-    `ends`: the end of a run of each scenario, simulated s. Crashed and timed-out runs are left out, because
-    their ends are unknown.
+    `ends` is the end of a run of each scenario, in simulated seconds. Crashed and timed-out runs are left
+    out, because their ends are unknown.
     """
     from statsmodels.duration.survfunc import SurvfuncRight  # type: ignore[import-untyped]
 
@@ -91,7 +90,7 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
     first = alerted[~alerted["is_hazard"] | _warned(alerted)]
     status = first["is_hazard"].astype(int)
     times = first["t_hazard"].fillna(first["scenario"].map(ends)) - first["t_alert"]
-    # apart from rounding, a hazard exactly at the driver's time is not later
+    # a hazard exactly at the driver's reaction time is not later, despite rounding errors
     late = times.round(6) > driver_s
     events = int(status.sum())
     found = {
@@ -120,7 +119,8 @@ def reaction(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) ->
 
 
 def _median(curve: Any) -> float:
-    """Where a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN: nowhere."""
+    """The time at which a Kaplan-Meier curve crosses one half, as defined in `Reaction`; NaN if it does
+    not."""
     (reached,) = np.nonzero(curve.surv_prob < 0.5 + _EQUAL)
     if not reached.size:
         return math.nan
@@ -130,20 +130,19 @@ def _median(curve: Any) -> float:
 
 
 def _median_interval(curve: Any) -> tuple[float, float]:
-    """The interval of the median time; infinite or NaN: not reached."""
-    with np.errstate(all="ignore"):  # the curve's last point may be 0, whose log is undefined
+    """The interval of the median time. Infinite or NaN: not reached."""
+    with np.errstate(all="ignore"):  # the last point of the curve may be 0, which has no log
         low, high = curve.quantile_ci(0.5, alpha=1 - CONFIDENCE)
-    # a curve that ends at 0 has no interval there, so it cannot end the median's
+    # a curve that ends at 0 has no interval there, so the median's interval cannot end there
     is_open = high == curve.surv_times[-1] and curve.surv_prob[-1] < _EQUAL
     return float(low), math.inf if is_open else float(high)
 
 
 def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
-    """By (hazard, alert): the share of runs with this hazard in which the alert came first; `any` and `none`
-    cover all alerts.
+    """By (hazard, alert), the share of the runs with this hazard in which the alert came first. The names
+    `any` and `none` stand for any alert and no alert.
 
-    `alerts`: by experiment id, name and first time of each alert of a run with a hazard, s. A run may have
-    several.
+    `alerts` has, by experiment id, the name and first time (s) of each alert of a run with a hazard.
     """
     shares: dict[tuple[str, str], Share] = {}
     for hazard in hazard_names(frame):
@@ -159,7 +158,7 @@ def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], 
 
 
 def hazard_orders(frame: pd.DataFrame) -> dict[str, int]:
-    """The number of runs by hazards in order of occurrence: `A`, `A then B`, `A with B`."""
+    """The number of runs with each order of hazards: `A`, `A then B`, `A with B`."""
     names = hazard_names(frame)
     rows = frame[frame["is_hazard"]]
     times = zip(*(rows[f"t_{name.lower()}"].tolist() for name in names), strict=True)
@@ -176,5 +175,5 @@ def _order(times: Mapping[str, float]) -> str:
 
 
 def _warned(frame: pd.DataFrame) -> pd.Series:
-    """Where an alert came before the first hazard; a simultaneous alert is no warning."""
+    """Whether an alert came before the first hazard. A simultaneous alert is no warning."""
     return frame["t_alert"] < frame["t_hazard"]

@@ -1,4 +1,4 @@
-"""The panels of every report, one module each. To add one, add a module and its line in `PANELS`.
+"""The panels of every report, one module each. To add a panel, add a module and a line in `PANELS`.
 
 A panel function maps `ReportedRun` to `Panel`, or to None if it has nothing to show.
 """
@@ -22,9 +22,10 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
 
 
 def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
-    """The panels of the study's page: its own, then tables and figures next to the published ones.
+    """The panels of the study's page: the study's own panels, then the run's tables and figures next to the
+    published ones.
 
-    Empty if the study has nothing to say: too few experiments, or none of its faults.
+    Empty if the study does not apply: too few experiments, or none of the study's faults.
     """
     said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
     if not said:

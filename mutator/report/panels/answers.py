@@ -1,4 +1,4 @@
-"""The first panel of a report: answers to a reader's first questions."""
+"""The first panel of a report, which answers the first questions of a reader."""
 
 import re
 
@@ -34,7 +34,7 @@ _BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</
 
 
 def answers_panel(run: ReportedRun) -> Panel:
-    """The answers in one panel; answers with wide tables get their own column."""
+    """The panel of all answers. Answers with wide tables get their own column."""
     made = answers_of(run)
     parts = []
     for answer in made:
@@ -51,7 +51,8 @@ def _table(listing: Listing) -> Table:
 
 
 def _html(listing: Listing) -> Markup:
-    """The table with links and bars. On narrow screens, cells carry their column's heading."""
+    """The table as HTML, with links and bars. On narrow screens, each cell shows the heading of its
+    column."""
     rows = [
         [
             _labelled(head, cell) if i else _cell(cell)
@@ -63,14 +64,14 @@ def _html(listing: Listing) -> Markup:
 
 
 def _labelled(head: str, cell: Cell) -> str:
-    if isinstance(cell, str) and cell.startswith(f"{head} "):  # severity S2
+    if isinstance(cell, str) and cell.startswith(f"{head} "):  # e.g. "severity S2"
         return cell
     return Markup('<span class="label">{} </span>{}').format(head, _cell(cell))
 
 
 def _cell(cell: Cell) -> str:
     if isinstance(cell, Link):
-        text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # a long name may break here
+        text = Markup("<wbr>").join(re.split(r"(?<=[/_])", cell.text))  # long names may break here
         return Markup('<a href="#{}">{}</a>').format(cell.to, text)
     if isinstance(cell, Part):
         return Markup(_BAR).format(cell.part / cell.of if cell.of else 0.0, cell.text)

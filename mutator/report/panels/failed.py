@@ -1,4 +1,4 @@
-"""Runs that did not finish normally, harness errors first."""
+"""The panel of runs that did not finish normally, harness errors first."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
 
 _HEADS = ("status", "experiment", "fault", "scenario", "message")
-LISTED, PAGE_LISTED = 30, 200  # runs listed in Markdown and on the page; the page can find all
+LISTED, PAGE_LISTED = 30, 200  # maximum of runs listed; the page's search finds all
 _HTML = """\
 <h2>Runs that did not finish normally</h2>
 <p>A harness error says nothing about its fault, so no count includes it.</p>
@@ -23,7 +23,7 @@ _HTML = """\
 
 
 def failed_panel(run: ReportedRun) -> Panel | None:
-    """The failed runs with their messages; None if there are none."""
+    """The panel of failed runs with their messages; None if no run failed."""
     texts = run.texts[run.texts["status"] != Status.OK.value]
     if texts.empty:
         return None
@@ -47,7 +47,7 @@ def _markdown(failed: Sequence[Row], count: int) -> str:
 
 
 def _linked(failed: Sequence[Row]) -> Table:
-    """The page's table; each experiment links to its details."""
+    """The table for the page. Each experiment links to its details."""
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format

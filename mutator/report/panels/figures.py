@@ -1,4 +1,4 @@
-"""The figures of a run, written as files that both forms of the report show."""
+"""The panel of a run's figures. They are written as files, and both forms of the report show them."""
 
 import base64
 from pathlib import Path
@@ -24,12 +24,12 @@ _HTML = """\
 
 
 def figures_panel(run: ReportedRun) -> Panel | None:
-    """Figures of all results; None if there are none."""
+    """The panel of figures over all results; None if there are none."""
     return _panel(drawings(run.frame), run)
 
 
 def study_figures(run: ReportedRun) -> Panel | None:
-    """The figures that the run's study adds; None if there are none."""
+    """The panel of figures that the run's study adds; None if there are none."""
     return _panel(run.study.drawings(run), run) if run.study else None
 
 
@@ -48,6 +48,6 @@ def _panel(made: tuple[Drawing, ...], run: ReportedRun) -> Panel | None:
 
 
 def _embedded(path: Path) -> str:
-    """The figure as a data URL, which keeps the page self-contained."""
+    """The figure as a data URL, so that the page stays self-contained."""
     svg = themed(path.read_text(encoding="utf-8"))
     return f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"

@@ -1,5 +1,5 @@
-"""The mutation score: the share of operator mutants that change the closed loop. Empty for runs without
-operators."""
+"""The panel of the mutation score: the share of operator mutants that change the closed loop. Runs without
+operators have none."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The shares in total and by operator, with those by function folded; writes
+    """The panel with the shares in total and by operator; the shares by function are folded. Writes
     tables/mutation_score.csv."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
@@ -43,5 +43,5 @@ def score_panel(run: ReportedRun) -> Panel | None:
 
 
 def _part(score: Sheet, of_functions: bool) -> Sheet:
-    """The lines of functions, or all other lines."""
+    """The lines of functions if `of_functions`, else all other lines."""
     return replace(score, lines=tuple(line for line in score.lines if ("::" in str(line[0])) == of_functions))

@@ -1,4 +1,4 @@
-"""Provenance: how the experiments were executed, and what is needed to reproduce them."""
+"""The panel of provenance: how the experiments were executed, and what reproduces them."""
 
 from mutator._common.tables import Table
 from mutator.campaigns.studies import study_problems
@@ -8,7 +8,7 @@ from mutator.review import gate
 from mutator.store.stretches import package_versions, told
 from mutator.verification.seal import seal_or_why_not
 
-PACKAGES = ("jinja2", "libcst", "numpy")  # they build mutants and compare runs; run.json lists all packages
+PACKAGES = ("jinja2", "libcst", "numpy")  # packages that build mutants and compare runs; run.json lists all
 _HTML = """\
 {% if engines %}
 <h2>How the experiments were run</h2>
@@ -21,7 +21,7 @@ _HTML = """\
 
 
 def origin_panel(run: ReportedRun) -> Panel:
-    """Engines and equivalence check, plan, choices, sources, versions."""
+    """The panel with engines, equivalence check, plan, choices, sources and versions."""
     engines, facts = run.engines, _facts(run)
     parts = []
     if engines:
@@ -57,7 +57,7 @@ def _facts(run: ReportedRun) -> list[tuple[str, str]]:
 
 
 def _study(run: ReportedRun) -> dict[str, str]:
-    """The study that the campaign asks for, and why this report may lack it."""
+    """The study that the campaign asks for, and the reason if this report does not show it."""
     name = run.folder.head.get("study")
     if not name:
         return {}

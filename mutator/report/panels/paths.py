@@ -1,5 +1,5 @@
-"""How far faults got: the control structure with the share that passed each link, and where faults
-stopped."""
+"""The panel of fault paths: the control structure with the share of faults that passed each link, and where
+faults stopped."""
 
 from collections.abc import Mapping, Sequence
 
@@ -56,7 +56,7 @@ there.</p>
 
 
 def paths_panel(run: ReportedRun) -> Panel | None:
-    """Links and components with their counts; None if no path is known."""
+    """The panel with the counts of links and components; None if no path is known."""
     paths = run.paths
     counts = counts_by_fault_type(kinds(run.texts), run.seen.courses_of, paths) if paths else {}
     if paths is None or not counts:
@@ -83,11 +83,11 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     return Panel(anchor="propagation", link="Paths", markdown="\n\n".join(parts), html=html)
 
 
-Links = Mapping[str, tuple[str, str, str]]  # tail, tip, what it carries
+Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries
 
 
 def _links(paths: FoundPaths) -> Links:
-    """The links that occur in some path, in the structure's order."""
+    """The links that occur in any path, in the order of the control structure."""
     crossings = {c.link: c for course in paths.courses for c in course.crossings}
     structure = paths.ways.structure
     known = structure.links if structure else {}
@@ -111,8 +111,8 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
-    """One line for each fault type, the total last, and one column for each set of components that stopped
-    masked faults. None if no fault was masked."""
+    """The table of masked faults: a line for each fault type, then the total, and a column for each set of
+    components that stopped them. None if no fault was masked."""
     ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
     if not ends:
         return None

@@ -1,4 +1,4 @@
-"""How much results vary between a campaign's seeds. Empty for runs with one seed."""
+"""The panel of how much results vary between a campaign's seeds. Runs with one seed have none."""
 
 from mutator._common.tables import Table
 from mutator.report.panel import Panel, rendered
@@ -21,7 +21,8 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The spread of each share between seeds; writes tables/seeds.csv and seeds_by_fault_type.csv."""
+    """The panel with the spread of each share between seeds. Writes tables/seeds.csv and
+    tables/seeds_by_fault_type.csv."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None
@@ -34,7 +35,7 @@ def seeds_panel(run: ReportedRun) -> Panel | None:
 
 
 def _summary(sheet: Sheet) -> Table:
-    """The shares over all faults, in fewer columns."""
+    """The lines over all faults, with fewer columns."""
     rows = []
     for faults, part, whole, share, *cells, _ in sheet.lines:
         if faults == ALL:

@@ -1,4 +1,5 @@
-"""The source by line, coloured by the worst outcome of its mutants. Only for runs with operators."""
+"""The panel of the source: each line coloured by the worst outcome of its mutants. Only runs with operators
+have it."""
 
 import io
 import keyword
@@ -14,7 +15,7 @@ from mutator.report.panel import Panel, rendered
 from mutator.report.source_lines import ENDINGS, LASTING, Mark, MarkedFile
 from mutator.report.studies import ReportedRun
 
-_SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # shown next to a mark's colour
+_SIGNS = dict(zip(ENDINGS, "HCTAMN", strict=True))  # sign shown with a mark's colour
 _MEANINGS = dict(
     zip(
         ENDINGS,
@@ -22,7 +23,7 @@ _MEANINGS = dict(
         strict=True,
     )
 )
-_LISTED = 20  # lines listed in Markdown
+_LISTED = 20  # maximum of lines listed in Markdown
 _ABOUT = (
     "Functions with injected faults. Each line shows the worst outcome of its permanent mutants and, next to "
     "it, of its transient ones, with the number of mutants that reached it. A mutant counts by its worst "
@@ -61,7 +62,7 @@ _CLASSES = {tokenize.COMMENT: "comment", tokenize.NUMBER: "number", tokenize.STR
 
 
 def source_panel(run: ReportedRun) -> Panel | None:
-    """Each file with faults; the worst one is open."""
+    """The panel with each file that has faults. The worst file is unfolded."""
     source = run.source
     if source is None:
         return None
@@ -87,7 +88,7 @@ def _told(file: MarkedFile) -> str:
 
 
 def _worst(files: Sequence[MarkedFile]) -> Table:
-    """The lines with the worst outcomes, for Markdown."""
+    """The table of the lines with the worst outcomes, for Markdown."""
     found = [
         (min(ENDINGS.index(mark.ending) for mark in here.values()), number, line, here)
         for number, file in enumerate(files)
@@ -152,7 +153,7 @@ def _coloured(file: MarkedFile) -> list[Markup]:
 
 
 def _parts(file: MarkedFile) -> Iterator[tuple[int, int, int, str]]:
-    """The coloured parts in source order: line (from 0), first and last column."""
+    """Yield the coloured parts in source order: line (from 0), first and last column, and CSS class."""
     for token in tokenize.tokenize(io.BytesIO(file.data).readline):
         name = _CLASSES.get(token.type, "")
         if token.type == tokenize.NAME and keyword.iskeyword(token.string):

@@ -1,4 +1,4 @@
-"""Counts and statistics of a run as tables. Statistics are also written as files."""
+"""The panels of counts and statistics. The statistics are also written as files."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,7 +18,7 @@ from mutator.statistics.sheet import Sheet
 from mutator.statistics.sheets import run_sheets
 from mutator.store.run_folder import RunFolder
 
-FOLDER = "tables"  # of the report
+FOLDER = "tables"  # a folder of the report
 NOTES = (
     "*Injected*: experiments with a valid result. Harness errors and invalid mutants are counted "
     "separately. *Activated*: an injected statement ran while triggered. "
@@ -66,8 +66,8 @@ def notes(folder: RunFolder) -> str:
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """Counts by fault type, scenario and method, then statistics. Statistics with published counterparts are
-    on the study's page."""
+    """The panel of counts by fault type, scenario and method, then statistics. Statistics with published
+    counterparts are on the study's page instead."""
     runs = run.fault_free()
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)
@@ -93,7 +93,7 @@ def tables_panel(run: ReportedRun) -> Panel:
 
 
 def published_panel(run: ReportedRun) -> Panel | None:
-    """The run's statistics next to those that its study published; None if there are none."""
+    """The panel of the run's statistics next to the published ones of its study; None if there are none."""
     note = own_alerts(run.fault_free())
     published = run.study.published(run) if run.study else None
     sheets = [_noted(sheet, note) for sheet in _statistics(run, published)]
@@ -117,13 +117,13 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
 
 
 def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
-    """Statistics by method and scenario, next to published counts if there are any."""
+    """The tables by method and scenario, next to published counts if there are any."""
     alerts = run.seen.alerts if run.folder.has_alerts else None
     return run_sheets(run.frame, published, alerts, run.ends())
 
 
 def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
-    """How bad the runs were: severity, times to hazard, metrics."""
+    """The tables of severity, times to hazard, and metrics."""
     made = (
         severity_sheet(run.frame),
         tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
@@ -133,7 +133,7 @@ def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:
-    """The sheet; if it counts alerts, with a note on those of fault-free runs."""
+    """The sheet. If it counts alerts, the note on alerts of fault-free runs is added."""
     words = (sheet.title, *sheet.heads, *(line[0] for line in sheet.lines))
     if not note or not any("alert" in str(word).lower() for word in words):
         return sheet
