@@ -38,7 +38,7 @@ class Gate(StrEnum):
     NEW_HAZARD = Change.NEW_HAZARD.value  #: a hazard, although the first run has none
     #: another hazard, although the first run already has one
     OTHER_HAZARD = Change.OTHER_HAZARD.value
-    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or a first contact
+    HIGHER_SEVERITY = Change.HIGHER_SEVERITY.value  #: a contact of a higher class, or instead of none
     EARLIER_HAZARD = Change.EARLIER_HAZARD.value  #: less time from activation to the first hazard
     LOST_ALERT = Change.LOST_ALERT.value  #: an alert of the first run is missing
     WORSE = Change.WORSE.value  #: a worse outcome, in the order no effect, sdc, hazard; includes a new hazard

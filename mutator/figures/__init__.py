@@ -1,2 +1,2 @@
-"""Figures of results and runs, drawn from frames or traces. Nothing here counts, tests, or reads a run
-folder."""
+"""Figures of results and runs, drawn from frames or traces. This package does not compute statistics or read
+run folders."""

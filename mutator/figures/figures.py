@@ -1,4 +1,4 @@
-"""The figures of a run, chosen by what can be compared, written as SVG and PNG."""
+"""Selects the figures of a run by what can be compared, and writes them as SVG and PNG."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,9 @@ FOLDER = "figures"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """One figure. `name` is the file name, `note` says what is shown or why there is no figure.
+    """One figure. `name` is the file name. `note` says what the figure shows, or why there is none.
 
-    `codes` are lines to copy, each with a description.
+    `codes` are lines of code to copy, each with a description.
     """
 
     name: str
@@ -31,12 +31,12 @@ class Drawing:
     codes: tuple[tuple[str, str], ...] = ()
 
     def link(self, suffix: str) -> str:
-        """The path from the report; `suffix` is svg or png."""
+        """The path of the file, relative to the report. `suffix` is svg or png."""
         return f"{FOLDER}/{self.name}.{suffix}"
 
 
 def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
-    """The figures of a frame of results that have something to compare."""
+    """The figures of a frame of results, without those that have nothing to compare."""
     frame = slim(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
@@ -55,7 +55,7 @@ def write_drawings(made: Sequence[Drawing], out: Path) -> None:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:
             save(drawing.figure, paths)
-        else:  # drawn by an earlier report from other results
+        else:  # left by an earlier report with other results
             for path in paths:
                 path.unlink(missing_ok=True)
 

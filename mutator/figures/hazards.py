@@ -1,4 +1,4 @@
-"""Hazards by fault type: counts by hazard, and shares of activated faults."""
+"""The figure of hazards by fault type: counts by hazard, and shares of activated faults."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ SEVERAL = "several"
 
 
 def hazard_sets(frame: pd.DataFrame) -> pd.Series:
-    """The hazard of each run with exactly one, `several` for more, empty for none."""
+    """For each run, the name of its hazard, `several` if it has more than one, or '' if it has none."""
     names = hazard_names(frame)
     had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
     count = had.sum(axis=1)
@@ -30,7 +30,8 @@ def hazard_sets(frame: pd.DataFrame) -> pd.Series:
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """A panel of counts for each method, and one of hazards per activated fault with 95 % intervals."""
+    """Draw a panel of counts for each method, and a panel of hazards per activated fault with 95 %
+    intervals."""
     tallies = by_kind(frame)
     methods = sorted({method for method, _ in tallies})
     hazards = frame.groupby("kind")["is_hazard"].sum()
@@ -52,7 +53,8 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
-    """Bars of hazards, divided by hazard, with the count and the number injected at the end."""
+    """Draw bars of hazards, divided by hazard. At the end of each bar are the count and the number of
+    injected faults."""
     names = hazard_names(frame)
     counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
     injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)

@@ -1,4 +1,4 @@
-"""Fault type x scenario: where hazards occur."""
+"""The figure of fault type by scenario, which shows where hazards occur."""
 
 from typing import TYPE_CHECKING
 
@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.image import AxesImage
 
-COLOURS = "cividis"  # perceptually uniform, also for colour-blind readers
-DARK_BELOW = 50.0  # %: text is white on cells below this value, else black
+COLOURS = "cividis"  # perceptually uniform, also for colour-blind people
+DARK_BELOW = 50.0  # %; text is white on cells below this rate, else black
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """A panel for each method: hazards per activated fault as colour, both counts as text."""
+    """Draw a panel for each method. Colour shows hazards per activated fault, and text shows both counts."""
     kinds, scenarios = sorted(frame["kind"].unique()), sorted(frame["scenario"].unique())
     methods = sorted(frame["method"].unique())
     figure, axes = style.blank(1.3 + 0.36 * len(kinds), 1, len(methods), sharey=True)
@@ -32,7 +32,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[str]) -> "AxesImage":
-    """Cells without activated faults have only text."""
+    """Draw one method's cells. Cells without activated faults have text but no colour."""
     import numpy as np
 
     groups = {(str(k), str(s)): tally(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
@@ -56,7 +56,8 @@ def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[
 
 
 def _text_colour(rate: float) -> str:
-    """The text colour for a cell of this rate (NaN: no colour, normal text)."""
+    """The text colour for a cell with this rate. If the rate is NaN, the cell has no colour and normal
+    text."""
     if rate != rate:
         return "black"
-    return "white" if rate < DARK_BELOW else "#010101"  # not black, which follows the page's theme
+    return "white" if rate < DARK_BELOW else "#010101"  # not pure black, which follows the theme

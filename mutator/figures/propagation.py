@@ -1,4 +1,4 @@
-"""Propagation times by scenario: the time between a fault's events."""
+"""The figure of propagation times by scenario, that is the times between the events of a fault."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """A panel for each step of propagation: quartiles, median, mean and number of runs."""
+    """Draw a panel for each step of propagation, with quartiles, median, mean and number of runs."""
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
     spreads = {(m, s): propagation(group) for (m, s), group in frame.groupby(["method", "scenario"])}
     steps = list(next(iter(spreads.values())))
@@ -38,7 +38,8 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
-    """A bar between quartiles, a line at the median, a marker at the mean, the number above."""
+    """Draw a bar between the quartiles, a line at the median, a marker at the mean, and the number of runs
+    above."""
     colour, marker = style.method_look(method)
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]

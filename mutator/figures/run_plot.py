@@ -1,6 +1,7 @@
-"""Golden and faulty run on one time axis, with marks for trigger, manifestation, alerts and hazards.
+"""Draws the golden and the faulty run on one time axis, with marks for trigger, manifestation, alerts and
+hazards.
 
-Uses matplotlib without pyplot: no display, no global state, deterministic.
+It uses matplotlib without pyplot, so it needs no display, has no global state and is deterministic.
 """
 
 import io
@@ -24,9 +25,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-GOLDEN_COLOUR = "#0072b2"  # blue and vermilion: distinguishable in grey and by colour-blind readers
+GOLDEN_COLOUR = "#0072b2"  # blue and vermilion differ in grey and for colour-blind people
 FAULTY_COLOUR = "#d55e00"
-LATER_COLOUR = "#999999"  # after the end of the drive
+LATER_COLOUR = "#999999"  # for data after the end of the drive
 PANEL_HEIGHT = 1.1  # inches
 WIDTH = 9.0
 PNG_DPI = 110
@@ -52,7 +53,7 @@ MARK_LINES = {MarkKind.TRIGGER: "-", MarkKind.MANIFEST: ":", MarkKind.ALERT: "--
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A vertical line at `t` (s of simulation), with its label."""
+    """A vertical line at `t` (in simulated seconds), and its label."""
 
     kind: MarkKind
     t: float
@@ -80,10 +81,10 @@ def draw_run(
     marks: Iterable[Mark] = (),
     end: float | None = None,
 ) -> "Figure":
-    """The manifest's channels of two runs, one panel for each; `save` writes the figure.
+    """Draw the manifest's channels of two runs, one panel each. `save` writes the figure.
 
     Data after the `end` of the drive (s) is grey and does not affect the axes. Compared channels (actuators)
-    come first. Channels that either run lacks are left out; MutatorError if none is left.
+    come first. Channels that either run lacks are left out. Raise MutatorError if no channel is left.
     """
     channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
     if not channels:
@@ -108,7 +109,7 @@ def _figure_type() -> type["Figure"]:
     from matplotlib.figure import Figure
 
     class RunFigure(Figure):
-        """A figure that notebooks show, whatever pyplot's backend."""
+        """A figure that notebooks show with any backend of pyplot."""
 
         def _repr_png_(self) -> bytes:
             self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
@@ -120,13 +121,14 @@ def _figure_type() -> type["Figure"]:
 def _panel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
-    """One channel: golden broad below, faulty narrow above, so that equal lines show both colours."""
+    """Draw one channel. The golden line is broad and below the narrow faulty line, so that equal lines show
+    both colours."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
         driven = np.where(time <= end, finite(values), np.nan)
         axis.plot(time, driven, color=colour, linewidth=width, alpha=alpha, label=label)
-    axis.set_ylim(axis.get_ylim())  # limits from the drive only
+    axis.set_ylim(axis.get_ylim())  # only the drive sets the limits
     for (time, values), _, width, alpha, _ in looks:
         if (time > end).any():
             later = np.where(time >= end, finite(values), np.nan)
@@ -149,7 +151,7 @@ def _decorate(
             axis.axvspan(end, right, color=LATER_COLOUR, alpha=0.15, linewidth=0)
     axes[0].set_xlim(left, right)
     top = axes[0]
-    # Names of close marks would overlap, so they alternate between three levels.
+    # Names use three levels in rotation, because those of close marks would overlap.
     for i, (mark, colour) in enumerate(zip(marks, colours, strict=True)):
         top.annotate(
             f"{mark.label} {mark.t:.2f}",
@@ -166,10 +168,10 @@ def _decorate(
 
 
 def save(figure: "Figure", paths: Sequence[Path]) -> None:
-    """Write a figure to each of `paths` (.svg or .png by suffix); deterministic."""
+    """Write a figure to each of `paths` as .svg or .png, by suffix. Equal figures give equal bytes."""
     import matplotlib
 
-    if figure.get_layout_engine() is not None:  # once for all: layout takes as long as drawing
+    if figure.get_layout_engine() is not None:  # once for all files, because layout takes as long as drawing
         figure.draw_without_rendering()
         figure.set_layout_engine("none")
     # A fixed salt and no date keep the SVG deterministic.
@@ -182,6 +184,6 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
 
 
 def finite(values: Any) -> Any:
-    """Replace infinities (time headway at standstill) with gaps."""
+    """Replace infinities, for example of time headway at standstill, with gaps."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

@@ -1,7 +1,7 @@
-"""The common style of a report's figures: colours, sizes, the blank figure.
+"""The common style of a report's figures: colours, sizes and the blank figure.
 
-A page shows figures in its light or dark theme (`themed`). Colours are those of Okabe and Ito, which
-colour-blind readers can distinguish; methods also differ in their markers.
+`themed` adapts a figure to the light or dark theme of a page. The colours are those of Okabe and Ito, which
+colour-blind people can distinguish. Methods also differ in their markers.
 """
 
 from typing import TYPE_CHECKING
@@ -21,12 +21,12 @@ _METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7
 
 
 def method_look(method: str) -> tuple[str, str]:
-    """Colour and marker: a method looks the same in every report."""
+    """The colour and marker of a method, which are the same in every report."""
     return _METHOD_LOOKS[list(Method).index(Method(method)) % len(_METHOD_LOOKS)]
 
 
 def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:
-    """A figure of `height` inches with its axes, row by row."""
+    """An empty figure of `height` inches, with its axes row by row."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -45,7 +45,7 @@ svg { color: #1b2027; --several: #444444; --hazard: #b00020 } text { fill: curre
   svg { color: #e4e8ec; --several: #a5afba; --hazard: #ff9a90 }
 }
 </style>"""
-_THEMED = {  # (nearly) black parts follow the theme; a transparent background shows the page
+_THEMED = {  # black parts follow the theme; the background is transparent
     'style="fill: #ffffff"': 'style="fill: none"',
     "#000000": "currentColor",
     INK: "currentColor",
@@ -56,7 +56,7 @@ _THEMED = {  # (nearly) black parts follow the theme; a transparent background s
 
 
 def themed(svg: str) -> str:
-    """A figure's SVG for a page: transparent, with light ink on a dark page."""
+    """A figure's SVG for a page, with a transparent background, and with light ink on a dark page."""
     for colour, shown in _THEMED.items():
         svg = svg.replace(colour, shown)
     return svg.replace("<defs>", f"{_DARK}<defs>", 1)

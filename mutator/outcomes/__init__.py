@@ -1,1 +1,2 @@
-"""The outcome of a run: golden runs, differences from them, verdicts, and the results table. Runs nothing."""
+"""The outcome of a run: golden runs, differences from them, verdicts, and the results table. This package
+runs no experiments."""

@@ -1,8 +1,8 @@
 """Decides whether target, fault or harness caused a mutant's run to fail.
 
-An exception is blamed on its origin. If an injected line is on its stack, or on that of its cause, the
-injection is the origin, whatever the line had called. Failures before the fault was first active are not the
-fault's: the fault-free run finishes normally.
+An exception is blamed on its origin. If an injected line is on the stack of the exception or of its cause,
+the injection is the origin, even if the exception was raised in a function that the line called. A failure
+before the fault was first active is blamed on the harness, because the fault-free run finishes normally.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -19,8 +19,8 @@ _At = tuple[str, int, int]  # file, line, column
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
-    """The origin of an exception outside the target: what injections (their `ids`) put into a line, or (no
-    tag) the probe."""
+    """The origin of an exception outside the target: the line that the injections `ids` changed, or, without
+    a tag, the probe."""
 
     place: str
     tag: Tag | None = None
@@ -28,20 +28,20 @@ class _Source:
 
 
 class _Files:
-    """The changed files of a mutant, looked up by stack position."""
+    """The changed files of a mutant. Stack positions are looked up in them."""
 
     def __init__(self, files: Mapping[str, bytes]) -> None:
         self._files = files
         self._lines = {path: data.splitlines() for path, data in files.items()}
 
     def tag_at(self, at: _At) -> Tag | None:
-        """The tag of a line, if it was injected."""
+        """The tag of a line; None if the line was not injected."""
         file, line = self._lines.get(at[0], ()), at[1]
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
     def injected_at(self, at: _At, tag: Tag, in_probe: bool) -> Sequence[str]:
-        """The injections that make the line do what raised there; empty if it is the line's original work or
-        a probe call. A changed line also does its original work."""
+        """The injections that added the code which raised at this position. Empty if the original part of the
+        line or a probe call raised. A changed line still has original parts."""
         if tag.was is None:
             return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
         file, line, column = at
@@ -52,9 +52,9 @@ class _Files:
 def assign_blame(
     execution: Execution, files: Mapping[str, bytes], raising: Collection[str]
 ) -> tuple[Status, str]:
-    """Status and detail of a failed run of a mutant with these changed files.
+    """Decide status and detail of a mutant's failed run. `files` are the changed files.
 
-    `raising` has the ids of injections whose fault models declare that they raise.
+    `raising` has the ids of injections whose fault models declare that they raise exceptions.
     """
     status, detail, raised = execution.status, execution.detail, execution.raised
     if status not in (Status.CRASHED, Status.TIMEOUT):
@@ -71,23 +71,23 @@ def assign_blame(
 
 
 def error_of(raised: Raised | None) -> RunError | None:
-    """The exception in record form."""
+    """The exception in the form in which records store it."""
     return RunError(kind=raised.kind, message=raised.message, place=raised.place) if raised else None
 
 
 def _source(raised: Raised, files: _Files) -> _Source | None:
-    """The origin of the exception; None: the target's own code."""
+    """The origin of the exception; None if it is the target's own code."""
     own, *others = raised.stacks
-    if raised.kind == RecursionError.__name__:  # which call exceeds the limit is chance
+    if raised.kind == RecursionError.__name__:  # it is chance which call exceeds the limit
         own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
     found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
     return min(found, key=lambda source: source.tag is not None, default=None)  # the probe comes first
 
 
 def _on_stack(stack: Stack, files: _Files) -> _Source | None:
-    """The innermost line on the stack that is not the target's. Failures of a probe helper on a value are
-    attributed to the calling line, and those of deciding whether the fault is active to the probe. Calls on a
-    changed value are the target's, so their exceptions are, too."""
+    """The innermost position on the stack that is not in the target's own code. If a probe helper fails on a
+    value, the calling line is the origin. If the decision whether the fault is active fails, the probe is.
+    Exceptions in calls that the target makes with a changed value belong to the target."""
     in_probe = in_target = False
     for at in stack:
         place, tag = f"{at[0]}:{at[1]}", files.tag_at(at)

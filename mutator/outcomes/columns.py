@@ -1,7 +1,7 @@
-"""Columns of the results table and related tables: names, types, units, meanings.
+"""The columns of the results table and related tables, with names, types, units and meanings.
 
-Hazards and compared channels of a target add columns; all others are common. The plan also has the columns
-that are known before a run.
+The hazards, compared channels and metrics of a target add columns; the others are the same for all targets.
+The plan also has the columns that are known before a run.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +17,7 @@ ColumnType = Literal["text", "flag", "count", "number"]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column. A `flag` is 0 or 1; `unit` is '' if there is none."""
+    """A column. The type `flag` is 0 or 1. `unit` is '' for a column without unit."""
 
     name: str
     type: ColumnType
@@ -91,7 +91,7 @@ TIMINGS = (
     Column("worker", "text", "", "the worker of the session"),
 )
 PLAN_COLUMNS = (*(column.name for column in _TO_MANIFEST[:11]), "variant", "aim", "condition")
-# Columns that readers of the table add; hazards cannot use their names.
+# Columns that readers of the table add. Hazards must not use these names.
 _DERIVED_TEXTS = ("kind", "fault", "row", "ending", "hazards", "warning", "through")
 DERIVED = (*_DERIVED_TEXTS, "rank", "hazard", "t_hazard")
 _PLAIN = (*_TO_MANIFEST, *_TO_REACTION, SEVERITY, *OF_PATHS, *EXTRA)
@@ -107,8 +107,9 @@ def result_columns(
     *,
     paths: bool = False,
 ) -> tuple[Column, ...]:
-    """The columns of results.csv, in order, for a target's hazards, compared channels, metrics (from
-    `metric_columns`) and the run's `severity_columns`; `paths` adds those of the fault's path."""
+    """The columns of results.csv, in order. They depend on the target's hazards, compared channels and
+    metrics (from `metric_columns`), and on the run's `severity_columns`. `paths` adds the columns of the
+    fault's path."""
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -129,29 +130,29 @@ def result_columns(
 
 
 def severity_columns(head: Mapping[str, Any]) -> tuple[Column, ...]:
-    """The severity columns from run.json: none for older runs, and no class if the target has no contact
-    data."""
+    """The severity columns according to run.json. Older runs have none. Without contact data in the target
+    there is no column for the class."""
     if "severity" not in head:
         return ()
     return (SEVERITY, *SINCE) if head["severity"] else SINCE
 
 
 def metric_columns(manifest: TargetManifest) -> list[list[str]]:
-    """Name, unit, meaning and worse direction of a target's metric columns; the end of the drive comes first
-    if a hazard can end it."""
+    """The name, unit, meaning and worse direction of each metric column of a target. If a hazard can end the
+    drive, the end of the drive comes first."""
     ends = any(hazard.terminal for hazard in manifest.rules)
     end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric", "lower"]]
     return [*(end if ends else ()), *([m.name, m.unit, m.about, m.worse] for m in manifest.measures)]
 
 
 def is_text(column: str) -> bool:
-    """Whether a table column, or one derived from it, holds text; others hold numbers."""
+    """Whether a column of the table, or a derived one, holds text. All others hold numbers."""
     return column in _TEXTS
 
 
 @lru_cache(maxsize=64)
 def hazard_columns(hazard: str) -> tuple[Column, Column]:
-    """The flag and the time of a hazard: `near` and `t_near` for NEAR."""
+    """The columns of a hazard, flag and time: `near` and `t_near` for NEAR."""
     name = hazard.lower()
     return (
         Column(name, "flag", "", f"whether hazard {hazard} came"),
@@ -160,14 +161,14 @@ def hazard_columns(hazard: str) -> tuple[Column, Column]:
 
 
 def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
-    """The hazards with columns in a table, in order: a flag, and a time of the same name."""
+    """The hazards of a table, in order: those with a flag and a time of the same name."""
     known = dict.fromkeys(columns)
     return tuple(name.upper() for name in known if f"t_{name}" in known)
 
 
 def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:
-    """The column of each compared channel: `max_dev_` and its first word (`wheel` for `wheel_turn`), or its
-    whole name if another channel begins with the same word."""
+    """The column of each compared channel: `max_dev_` and the first word of its name (`wheel` for
+    `wheel_turn`), or the whole name if another channel begins with the same word."""
     return _deviation_columns(tuple(channels))
 
 
@@ -181,15 +182,15 @@ def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
 
 
 def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) -> dict[str, str]:
-    """The `dev_` column of each compared channel, if a hazard can end the drive."""
+    """The `dev_` column of each compared channel; empty if no hazard can end the drive."""
     if T_END not in (name for name, *_ in metrics):
         return {}
     return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
 
 
 def check_names(manifest: TargetManifest) -> None:
-    """MutatorError, with the manifest line, for a hazard or metric whose columns collide with others or would
-    look like a hazard's flag and time."""
+    """Raise MutatorError, with the manifest line, if a column of a hazard or metric collides with another, or
+    if columns would look like a hazard's flag and time."""
     compared = [channel.name for channel in manifest.compared]
     taken = {column.name for column in result_columns((), compared, paths=True)}
     taken |= {SEVERITY.name, *(column.name for column in SINCE)}
@@ -217,7 +218,8 @@ def check_names(manifest: TargetManifest) -> None:
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """`PLAN_COLUMNS` of one experiment: `variant` includes text values, and `condition` is the trigger's."""
+    """The `PLAN_COLUMNS` of one experiment. `variant` includes a text value, and `condition` is that of the
+    trigger."""
     fault, trigger = experiment.fault, experiment.trigger
     variant = fault.spec.split("/", 2)[-1]
     is_text = isinstance(fault.value, str)

@@ -1,7 +1,7 @@
-"""Counts in the results table by column: faults activated, manifested, harmful.
+"""Counts activated, manifested and hazardous faults in the results table, by column.
 
-`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted separately and excluded
-from all other numbers.
+`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted separately and not included
+in other numbers.
 """
 
 from collections.abc import Mapping
@@ -16,25 +16,25 @@ if TYPE_CHECKING:
 
 
 def endings(texts: "pd.DataFrame") -> "pd.Series[str]":
-    """For each row the outcome of a successful run, or the status of a failed one."""
+    """The outcome of each row, or the status if the run failed."""
     worked = (texts["status"] == Status.OK.value) & (texts["outcome"] != "")
     return texts["outcome"].where(worked, texts["status"])
 
 
 def outcome_counts(texts: "pd.DataFrame") -> dict[str, int]:
-    """Rows by outcome of successful runs and by status of failed ones."""
+    """The number of rows by outcome, and by status for failed runs."""
     seen = endings(texts).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
     return {name: int(seen[name]) for name in order if name in seen}
 
 
 def hazard_names(texts: "pd.DataFrame") -> tuple[str, ...]:
-    """Every hazard that was checked, including those that never occurred."""
+    """The hazards that were checked, including those that never occurred."""
     return tuple(sorted(name for name in hazards_in(texts.columns) if (texts[name.lower()] != "").any()))
 
 
 def came(texts: "pd.DataFrame", hazard: str) -> "pd.Series[bool]":
-    """The rows in which a checked hazard occurred."""
+    """Whether the hazard occurred, for each row."""
     name = hazard.lower()
     return (texts[name] != "") & (texts[f"t_{name}"] != "")
 
@@ -45,7 +45,7 @@ def kinds(texts: "pd.DataFrame") -> "pd.Series[str]":
 
 
 def counts_by(texts: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
-    """One count for each of the `groups`, sorted by name, then the total."""
+    """A count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
     hazards = hazard_names(texts)

@@ -11,23 +11,24 @@ from mutator.outcomes.judging import judge_run
 from mutator.store.run_folder import GoldenRun, RunFolder
 from mutator.targets.manifest import TargetManifest
 
-Events = tuple[tuple[str, float], ...]  # (name, s of simulation)
+Events = tuple[tuple[str, float], ...]  # (name, simulated time in s)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultFreeRun:
-    """One fault-free run. `ranges` are the minimum and maximum of each recorded plotted channel."""
+    """One fault-free run. `ranges` has the name, minimum and maximum of each plotted channel that was
+    recorded."""
 
     scenario: str
     changes: tuple[str, ...]
-    seed: int | None  # None: the run folder's seed
+    seed: int | None  # None: the seed of the run folder
     hazards: Events
     alerts: Events
     ranges: tuple[tuple[str, float, float], ...]
 
 
 def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
-    """The fault-free runs of a run folder, by name. MutatorError if one cannot be read."""
+    """The fault-free runs of a run folder, sorted by name. Raise MutatorError if one cannot be read."""
     found = []
     for one in sorted(folder.goldens):
         place = folder.golden(*one)
@@ -46,7 +47,7 @@ def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultF
 
 
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Table:
-    """A line for each run: its alerts (if the target has any) and hazards with first times, and channel
+    """The table of fault-free runs: hazards and alerts (if the target has any) with first times, and channel
     ranges."""
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
     rows = []
@@ -60,7 +61,8 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
-    """A sentence on the alerts that fault-free runs raise, for tables that count alerts; empty if none."""
+    """A sentence on the alerts that fault-free runs raise, for tables that count alerts; '' if there are
+    none."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, _ in run.alerts:
@@ -72,8 +74,8 @@ def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
 
 
 def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
-    """The alerts that fault-free runs raise, by scenario and seed ('': the run folder's); runs of a scenario
-    with and without changes are combined."""
+    """The alerts that fault-free runs raise, by scenario and seed ('' for the seed of the run folder). Runs
+    of a scenario with and without changes are combined."""
     names: dict[tuple[str, str], frozenset[str]] = {}
     for run in runs:
         key = (run.scenario, "" if run.seed is None else str(run.seed))

@@ -19,7 +19,7 @@ from mutator.outcomes.trace_files import own_times
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
-Trace = Mapping[str, np.ndarray]  # channel name -> one value per step
+Trace = Mapping[str, np.ndarray]  # channel name -> values, one for each step or own time
 
 
 _LARGEST = sys.float_info.max
@@ -28,13 +28,14 @@ _TINY = 1e-9  # s
 
 
 class BadOutput(MutatorError):
-    """A run that finished without the trace or record that the manifest promises."""
+    """A run finished without a valid trace or record as described in the manifest."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """How a trace differs from golden: time of the first difference beyond tolerance (s), and the largest
-    difference of each compared channel in the whole run and (`dev`) up to the end of the drive."""
+    """How a trace differs from golden. `t_first` is the time (s) of the first difference beyond tolerance.
+    `max_dev` has the largest difference of each compared channel in the whole run, and `dev` that up to the
+    end of the drive."""
 
     t_first: float | None
     max_dev: tuple[tuple[str, float], ...]
@@ -42,7 +43,7 @@ class Difference:
 
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
-    """Digest of the trace file's bytes."""
+    """The digest of the trace file's bytes."""
     try:
         return digest(no_pipe(out / manifest.trace_file).read_bytes())
     except OSError as err:
@@ -56,8 +57,8 @@ def load_trace(
     channels: Sequence[Channel] | None = None,
     also: Sequence[Channel] = (),
 ) -> Trace:
-    """Channels (default: all) and time of the trace in the output folder `out`; channels in `also` may be
-    missing."""
+    """Load channels (default: all) and time of the trace in the output folder `out`. Channels in `also` may
+    be missing."""
     path = out / manifest.trace_file
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
@@ -68,7 +69,7 @@ def load_trace(
         raise BadOutput(f"no channel {err}", where=path, expected="the manifest's channels") from None
     except MutatorError:
         raise
-    except Exception as err:  # a run can write anything, and readers fail in many ways
+    except Exception as err:  # a run can write anything, so readers can fail in many ways
         _check_is_of_output(err)
         raise BadOutput(f"not a readable trace ({_why(err)})", where=path, expected=kind) from None
     _check_arrays(trace, manifest, path)
@@ -93,12 +94,13 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
 
 
 def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
-    """The times (s) of a channel's values: its own, or those of the steps in the channel `time`."""
+    """The times (s) of a channel's values: its own times, or else those of the steps, from the channel
+    `time`."""
     return trace.get(own_times(channel), trace[time])
 
 
 def until(trace: Trace, end: float, time: str) -> Trace:
-    """A trace cut at a time, s."""
+    """The trace up to the time `end` (s)."""
     cut = {}
     for name, values in trace.items():
         times = values if name.endswith(own_times("")) else times_of(trace, name, time)
@@ -107,8 +109,8 @@ def until(trace: Trace, end: float, time: str) -> Trace:
 
 
 def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
-    """A channel's value at each step; for a channel with its own times the newest value, NaN before its
-    first."""
+    """A channel's value at each step. A channel with its own times keeps its newest value; before the first
+    value it is NaN."""
     own = trace.get(own_times(channel))
     return trace[channel] if own is None else _newest(own, trace[channel], steps)
 
@@ -118,8 +120,8 @@ def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray
 
 
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
-    """The target's own record of a run in `out`: hazards, alerts and more; empty if the manifest names no
-    record."""
+    """Load the record that the target wrote in `out`, with hazards, alerts and more. It is empty if the
+    manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
     path = out / manifest.record_file
@@ -138,18 +140,18 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Raise Shortage if an output could not be read because memory or files ran out here, which is not the
-    run's fault."""
+    """Raise Shortage if mutator could not read an output because it ran out of memory or files. The run is
+    not to blame for that."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
                 bytes(_TRIAL)
-                return  # memory is plentiful: the trace claims to be larger
+                return  # there is enough memory, so the trace claims an impossible size
         raise short from err
 
 
 def _why(err: Exception) -> str:
-    """The error without its path, which differs between runs."""
+    """The error's text without its path, because that differs between runs."""
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 
@@ -166,17 +168,17 @@ def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
 
 
 def _events(record: Mapping[str, Any]) -> Any:
-    """All raises of alerts, or only the first ones, depending on the record."""
+    """The recorded alerts: every raise if the record has them, else only the first of each."""
     return record.get("alert_events") or record.get("alerts") or []
 
 
 def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
-    """(alert, time) of every recorded raise of a counted alert."""
+    """The name and time of every recorded raise of an alert in `counted`."""
     return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
 def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
-    """The faulty trace with golden's `time` channel object if both are equal, so that comparisons can skip
+    """The faulty trace. If its times equal golden's, it shares golden's array, so that comparisons can skip
     times."""
     return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
 
@@ -184,9 +186,9 @@ def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
 def compare(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None = None
 ) -> Difference:
-    """Compare channels value by value; NaN equals NaN. Traces of different lengths differ from the shorter's
-    end, and values at different times from the first of these. `t_end` is the end of the drive, if it is
-    before that of the run."""
+    """Compare channels value by value. NaN equals NaN. Traces of different lengths differ from the end of the
+    shorter one. Traces with different times differ from the first such time. `t_end` is the end of the drive
+    if that is before the end of the run."""
     end = np.inf if t_end is None else t_end + _TINY
     first = end_of_shorter(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
@@ -202,8 +204,8 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """|faulty - golden| of a channel at the times of both runs. `t_first` is when it first exceeds the
-    tolerance or its times differ; infinite: never."""
+    """The absolute difference |faulty - golden| of a channel at the times of both runs. `t_first` is the time
+    at which it first exceeds the tolerance or the times differ; infinite if neither happens."""
 
     at: np.ndarray
     values: np.ndarray
@@ -215,13 +217,13 @@ class Deviation:
 
 
 def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Deviation:
-    """The deviation of a run's channel from golden."""
+    """Compute the deviation of a channel from golden."""
     times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
     values = [golden[channel.name], faulty[channel.name]]
     at, values = _on_same_times(times, values)
     apart = values[0] != values[1]
     begin = int(apart.argmax()) if apart.size else 0
-    if not apart[begin : begin + 1].any():  # true for most channels
+    if not apart[begin : begin + 1].any():  # the case for most channels
         return Deviation(at[:0], at[:0], _other_times(*times))
     at, values = at[begin:], [one[begin:] for one in values]
     values_apart = _deviation(*values)
@@ -231,7 +233,7 @@ def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Devi
 
 
 def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """When the times of two runs first differ or one ends; infinite if they are equal."""
+    """The time at which the times of two runs first differ or one run ends; infinite if they are equal."""
     if golden is faulty:
         return np.inf
     rows = min(len(golden), len(faulty))
@@ -242,14 +244,15 @@ def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
 
 
 def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """The first time that only the longer run has; infinite for equal lengths."""
+    """The first time that only the longer run has; infinite if both have equal length."""
     rows = min(len(golden), len(faulty))
     longer = max(golden, faulty, key=len)
     return float(longer[rows]) if rows < len(longer) else np.inf
 
 
 def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Times of both runs with the values of each; if the times differ, all times with the newest values."""
+    """Common times and the values of both runs at them. If the times differ, these are the times of either
+    run, with the newest values."""
     if times[0] is times[1]:
         return times[0], values
     rows = min(map(len, times))
@@ -260,7 +263,8 @@ def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[n
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """|faulty - golden|, 0 if both are the same number, infinity or NaN; infinite if only one is NaN."""
+    """The absolute difference |faulty - golden|. It is 0 if both are the same number, infinity or NaN, and
+    infinite if only one is NaN."""
     golden, faulty = golden.astype(float), faulty.astype(float)
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
     with np.errstate(invalid="ignore", over="ignore"):
