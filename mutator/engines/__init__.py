@@ -1,4 +1,4 @@
-"""How to run a target once: the reference engine, and faster ones.
+"""Run a target once: the reference engine, and faster engines.
 
 This package does not interpret a run's output.
 """

@@ -1,4 +1,4 @@
-"""When a fault is first active: its trigger, evaluated on the ground truth of the golden run.
+"""When a fault is first active, found by evaluating its trigger on the golden run's observations.
 
 Until then a mutant's run equals the golden run, so its probe observes exactly the same values.
 """
@@ -17,12 +17,12 @@ from mutator.mutants.probe import decision_in
 from mutator.triggers.over_time import ARITHMETIC, COMPARE
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity: there are thousands
+@dataclass(frozen=True, kw_only=True, eq=False)  # hashed by identity: thousands of values are slow to hash
 class Observed:
     """What a probe observes in a golden run.
 
-    `values` are time and observed values of each observation, `before` the number of observations before each
-    step, `libraries` the modules imported during the run.
+    `values` has a tuple for each observation: the time (s), then the observed values. `before` has the number
+    of observations made before each step. `libraries` lists the modules imported during the run.
     """
 
     values: tuple[tuple[float, ...], ...]
@@ -31,19 +31,19 @@ class Observed:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """`values`, a row for time and for each observed value."""
+        """`values` transposed: a row for the time, then a row for each observed value."""
         return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
-        """The step of that observation; none is made before the first step."""
+        """The step in which this observation was made. None is made before the first step."""
         return bisect_right(self.before, observation) - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Start:
-    """Where a mutant leaves the golden run: before this step, after `observed` observations.
+    """The point where a mutant leaves the golden run: before `step`, after `observed` observations.
 
-    The first of these was at time `began` (s), the last at `t`; None: there was none.
+    `began` is the time of the earliest of these observations, `t` of the last (s); None without observations.
     """
 
     step: int
@@ -53,14 +53,14 @@ class Start:
 
 
 def first_active(own: str, seen: Observed) -> Start | None:
-    """Where a mutant must leave the golden run; None if its trigger never holds.
+    """The point where a mutant leaves the golden run; None if its trigger never holds.
 
-    `own` is the source of its probe's own part (`probe.parts_of`).
+    `own` is the source of the probe's own part (see `probe.parts_of`).
     """
     return _first_active(*decision_in(own), seen)
 
 
-@lru_cache(maxsize=64)  # faults share triggers, the contexts of the hazard analysis
+@lru_cache(maxsize=64)  # cached, because faults share triggers: the contexts of the hazard analysis
 def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | None:
     if not seen.values:
         return None
@@ -74,13 +74,15 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
         return None
     step = seen.step_of(int(at[0]))
     done = seen.before[step]
-    times = seen.columns[0, :done].tolist()  # a restarted run restarts no later
+    times = seen.columns[0, :done].tolist()  # `min`, because time starts again if the run restarts
     last = times[-1] if done else None
     return Start(step=step, observed=done, began=min(times, default=None), t=last)
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """Whether a probe's condition holds in each observation; numpy's doubles equal Python's."""
+    """Whether a probe's condition holds in each observation. The arithmetic on numpy's doubles equals
+    Python's.
+    """
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):
@@ -92,7 +94,7 @@ def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """The value of an expression of `conditions.to_code`: an array, or one value for all observations."""
+    """The value of an expression made by `conditions.to_code`: an array, or one value for all."""
 
     def of(node: ast.expr) -> Any:
         return _value(node, values)
@@ -127,7 +129,7 @@ def _compared(operator: ast.cmpop, one: Any, other: Any) -> Any:
 
 
 def _least(*terms: Any) -> Any:
-    """Like Python's `min`, including NaN."""
+    """Like Python's `min`, also for NaN."""
     return reduce(lambda least, term: np.where(term < least, term, least), terms)
 
 
@@ -139,6 +141,6 @@ _FUNCTIONS: Mapping[str, Any] = {
     "abs": np.abs,
     "min": _least,
     "max": _greatest,
-    "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's differs in the last bit
+    "math.hypot": np.vectorize(math.hypot, otypes=[float]),  # numpy's `hypot` differs in the last bit
     "_div": np.divide,
 }

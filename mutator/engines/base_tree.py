@@ -1,4 +1,4 @@
-"""The pristine tree that runs link their files from: copying takes up to a tenth of a run."""
+"""The pristine tree that runs link their files from. Copying it instead takes up to a tenth of a run."""
 
 import os
 import shutil
@@ -10,10 +10,10 @@ _Stamp = tuple[int, int, int, int]
 
 
 class BaseTree:
-    """The tree in the folder `folder`, made by `prepare_base`.
+    """The pristine tree in `folder`, made by `prepare_base`.
 
-    A run may write through its links. Then the tree is restored, and each run of that time is repeated on a
-    tree without links.
+    A run may write through its links and so change this tree. The engine then restores the tree, and repeats
+    each run made meanwhile on a copy without links.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -22,7 +22,7 @@ class BaseTree:
         self._stamps = self._look()
 
     def lay_out(self, tree: Path, *, linked: bool) -> None:
-        """Make the new folder `tree` with the files of this one."""
+        """Create the folder `tree` with this tree's files, linked or copied."""
         if linked:
             shutil.copytree(self._folder, tree, copy_function=_link_or_copy)
             return
@@ -32,8 +32,8 @@ class BaseTree:
             place.write_bytes(data)
 
     def was_changed(self) -> bool:
-        """Whether a file was changed, or restored by another process, since the last call; it is pristine
-        now.
+        """Restore changed files; return whether a file was changed since the last call, or another process
+        restored one.
         """
         if (stamps := self._look()) == self._stamps:
             return False
@@ -50,7 +50,7 @@ class BaseTree:
             return False
 
     def _mend(self, path: Path) -> None:
-        """Replace the file atomically, since others may be linking it now."""
+        """Replace the file atomically, because other processes may be linking it."""
         whole = self._folder.with_name(f"{self._folder.name}-mended.{os.getpid()}")
         whole.write_bytes(self._files[path])
         whole.chmod(self._stamps[path][0])

@@ -1,8 +1,8 @@
-"""Find the functions of a loaded program that a mutant changes, and whether their code can be swapped.
+"""Find the functions of a loaded program that a mutant changes, and check whether their code can be swapped.
 
-Between two steps of a run no function of the target is active, so code can be swapped in place. Until its
-trigger first holds, such a program acts like the pristine one: the probe guards every inserted statement, and
-no mutant changes what a name means.
+No function of the target is active between two steps of a run, so code can be swapped in place. Until the
+trigger first holds, the changed program acts like the pristine one: the probe guards every inserted
+statement, and no mutant changes the meaning of a name.
 """
 
 import re
@@ -24,12 +24,14 @@ _IMPORT = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
 
 
 class NotSwappable(Exception):
-    """The mutant cannot be put into a running program; the text says why."""
+    """The mutant cannot be put into a running program. The text says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FunctionSwap:
-    """A function of a module, the names that lead to it (class, method), and its code before and after."""
+    """A function of `module` with its code before and after; `path` has the names that lead to it (class,
+    method).
+    """
 
     module: str
     path: tuple[str, ...]
@@ -41,10 +43,10 @@ class FunctionSwap:
 class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
-    The parts of `probe` run one after the other; `own` is the source of the first (`probe.parts_of`).
-    `imports` are modules that injected lines import; they may be loaded beforehand. `settings` are modules
-    and the code of their lines that tell the probe what to set; they must be loaded already, since a loading
-    module reads its own constants.
+    The parts of `probe` run in order; `own` is the source of the first (`probe.parts_of`). `imports` are the
+    modules that injected lines import; they may be loaded early. `settings` has modules and the code of their
+    lines that set values in the probe. These modules must already be loaded, because loading one runs those
+    lines with its own constants.
     """
 
     functions: tuple[FunctionSwap, ...]
@@ -55,9 +57,9 @@ class CodeSwap:
 
 
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
-    """What turns the loaded pristine program, whose tree is the folder `tree`, into the mutant with `files`.
+    """What turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
-    NotSwappable if the result might differ from the mutant started alone.
+    Raises NotSwappable if the result might differ from a mutant that is started alone.
     """
     functions: list[FunctionSwap] = []
     settings: list[tuple[str, CodeType]] = []
@@ -78,18 +80,18 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
         raise NotSwappable("there is no probe")
     own, common = parts_of(files[probe_file].decode())
     name = f"{tree}/{probe_file}"
-    # the shared part takes ten times as long to compile, so it is compiled once
+    # cached, because compiling the shared part takes ten times as long
     probe = (compile(own, name, "exec", dont_inherit=True), _compiled(common.encode(), name))
     return CodeSwap(
         functions=tuple(functions), settings=tuple(settings), probe=probe, own=own, imports=tuple(imports)
     )
 
 
-@lru_cache(maxsize=256)  # every mutant changes the observing file, mostly in the same way
+@lru_cache(maxsize=256)  # cached, because every mutant changes the observing file, mostly in the same way
 def _in_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
-    """The changed functions of one file, and what its injected lines import."""
+    """The changed functions of a file, and the modules that its injected lines import."""
     if unsplice(mutated) != pristine:
         raise NotSwappable(f"{path} differs by more than inserted lines")
     imports = _guarded_imports(path, mutated.splitlines())
@@ -102,7 +104,7 @@ def _in_file(
 
 
 def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
-    """The module of a file, and the code of its lines that tell the probe what to set, if any."""
+    """A file's module and the code of its lines that set values in the probe; empty if there are none."""
     if not sets_values(mutated):
         return []
     lines = _only(mutated, sets=True)
@@ -110,7 +112,7 @@ def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeT
 
 
 def _only(mutated: bytes, *, sets: bool) -> bytes:
-    """A file's lines that tell the probe what to set, or the others, with line numbers kept."""
+    """Only a file's lines that set values in the probe, or only the others; line numbers stay."""
     if not sets and not sets_values(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
@@ -128,7 +130,7 @@ def _compiled(data: bytes, filename: str) -> CodeType:
 
 
 def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
-    """What injected lines import; NotSwappable unless every injected block asks the probe first."""
+    """The modules that injected lines import. NotSwappable if a block does not ask the probe first."""
     imports: list[str] = []
     before, margin = "", 0
     tags = [tag for line in lines if (tag := tag_of(line)) and tag.was is not None]
@@ -139,7 +141,7 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
         if tag and tag.of_fault and tag.was is None and not tag.sets:
             indent = len(tag.code) - len(tag.code.lstrip())
             if tag.id == before and indent == margin and tag.opens_original:
-                before = ""  # other injected lines must ask again
+                before = ""  # the next injected lines must ask again
                 continue
             if tag.id != before or indent <= margin:
                 margin = indent
@@ -156,7 +158,7 @@ def changed_functions(
 ) -> Iterator[tuple[tuple[str, ...], CodeType, CodeType]]:
     """Names, old code and new code of the functions that differ in a module, or in its class `names`.
 
-    `old` and `new` are the bodies to compare. NotSwappable if anything except functions differs.
+    `old` and `new` are the bodies to compare. Raises NotSwappable if anything except functions differs.
     """
     before, after = _inner(old), _inner(new)
     if [code.co_name for code in before] != [code.co_name for code in after]:
@@ -177,7 +179,7 @@ def changed_functions(
 
 
 def _check(old: CodeType, new: CodeType, name: str) -> None:
-    """Raise NotSwappable unless a function with `new` code acts as with `old` until a trigger holds."""
+    """Raise NotSwappable unless the function with `new` code acts as with `old` until a trigger holds."""
     if old.co_name.startswith("<"):
         raise NotSwappable(f"{name} is a function without a name")
     if new.co_flags & _SUSPENDED:
@@ -200,17 +202,17 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def same(one: CodeType, other: CodeType) -> bool:
-    """Whether two functions do the same, on any lines."""
+    """Whether two functions do the same, regardless of their line numbers."""
     return essence(one) == essence(other)
 
 
 def essence(code: CodeType) -> tuple[object, ...]:
-    """A key of what a function's code and nested code do, equal for functions that do the same."""
+    """A key of what the code and its nested code do; equal for functions that do the same."""
     return (*_essence(code), *map(essence, _inner(code)))
 
 
 def _essence(code: CodeType) -> tuple[object, ...]:
-    """What a function's code does, without line numbers and nested functions."""
+    """What the code does, without its line numbers and nested functions."""
     values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

@@ -1,8 +1,8 @@
-"""The fork engine: a mutant is a fork of its golden run, made right before its fault is first active.
+"""The fork engine: each mutant is a fork of its golden run, made just before its fault is first active.
 
-Results equal the reference engine's byte for byte; that engine runs mutants that cannot be forked, and
-repeats failed runs. `warm` forks before the first step, as this does for runs that end at a terminal hazard
-of golden.
+Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
+and reruns those that crash. The `warm` engine forks before the first step. This engine does the same if a run
+stops at its first terminal hazard and the golden run has one, too.
 """
 
 import marshal
@@ -43,7 +43,7 @@ _Key = tuple[str, int, tuple[str, ...]]
 
 
 class ForkEngine:
-    """Arguments as for ReferenceEngine; `null` are the files of the mutant without a fault."""
+    """Arguments as for ReferenceEngine. `null` has the files of the null mutant."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class ForkEngine:
         self._pool: Pool | None = None
         self._pools = 0
         self._unfit = None if manifest.stepwise else Refused(f"target {manifest.name} is not stepwise")
-        self._seen: dict[_Key, Observed | Refused] = {}  # or why there is none
+        self._seen: dict[_Key, Observed | Refused] = {}  # or the reason why there are none
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]:
         for job in jobs:
@@ -78,7 +78,7 @@ class ForkEngine:
                 remove_folder(folder)
 
     def execute(self, job: Job, folder: Path) -> Execution:
-        """Run one job; its scratch folder `folder` is new, and left to the caller."""
+        """Run one job in the new scratch folder `folder`, which the caller deletes."""
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)
@@ -121,7 +121,7 @@ class ForkEngine:
         if self._warm:
             return self._from_the_start(job, folder, swap)
         seen = self._observed(job, job.golden)
-        if job.stop and job.golden_ends:  # maybe before the fault is active: no fork leads there
+        if job.stop and job.golden_ends:  # the run may stop before the fault is active, where no fork is made
             return self._from_the_start(job, folder, swap)
         start = first_active(swap.own, seen)
         if start is None:
@@ -129,7 +129,7 @@ class ForkEngine:
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
 
     def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
-        """Let a fork of the loaded target run the whole job."""
+        """Run the whole job in a fork of the loaded target."""
         first = self._running().first
         first.load(_needed(swap), self._patience_s)
         return self._become(first, job, folder, swap, _FROM_THE_START)
@@ -186,7 +186,8 @@ class ForkEngine:
             "stop": stop_source(self._manifest) if job.stop else None,
             "watch": [value.name for value in self._manifest.observation.values] if watch else None,
         }
-        if waiting.key is None:  # it must begin the run; watch it if the waiting ones were watched
+        # the child must begin the run; with `watch`, its arguments are those of the waiting processes
+        if waiting.key is None:
             request["args"] = self._arguments(job, self._running().home if watch else out)
         limits = {"wall_s": self._limits.wall_s, "disk_mb": self._limits.disk_mb}
         asked = {"do": "mutant", "job": marshal.dumps(request), "home": str(folder), **limits}
@@ -200,7 +201,7 @@ class ForkEngine:
         return replace(self._judged(job, folder, ended), start=start.step)
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
-        """The result of a child; Refused if the reference engine must repeat it."""
+        """The result of a child; Refused if the reference engine must rerun the job."""
         report = read_report(folder / "report.json", threads=list)
         if report is not None:
             self._check(job, report)
@@ -223,7 +224,9 @@ class ForkEngine:
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
-        """Raise Refused unless the child was the job's mutant and left the server unchanged."""
+        """Raise Refused unless the child ran this job's mutant and can be trusted: no other sources, no other
+        threads.
+        """
         if report["ended"] == "swap refused":
             raise Refused(str(report.get("why")))
         if report["outside"]:
@@ -235,7 +238,7 @@ class ForkEngine:
             raise Refused(problem)
 
     def _observed(self, job: Job, golden: Path) -> Observed:
-        """What a probe observes in a job's golden run, which is run once to find out."""
+        """What a probe observes in a job's golden run. The first call runs it."""
         key = _key(job)
         if key not in self._seen:
             try:
@@ -257,7 +260,7 @@ class ForkEngine:
             swap = plan_swap(self._manifest, self._null, str(self._running().tree))
             null = replace(job, mutant=None, stop=False)
             self._at(job, 0, swap)  # Refused, with the reason, if the run cannot begin
-            # From before its beginning: no fork would have what it observed then.
+            # Fork before the first step, because a later fork misses earlier observations.
             first = self._running().first
             execution = self._become(first, null, folder, swap, _FROM_THE_START, watch=True)
             if execution.status is Status.HARNESS_ERROR:
@@ -288,7 +291,7 @@ _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
 def _needed(swap: CodeSwap) -> list[str]:
-    """Modules to load before the mutant is made: those it changes and those it imports."""
+    """Modules to load before the mutant is made: those that it changes and those that it imports."""
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imports]
 
 
@@ -302,7 +305,7 @@ def _resolved(scenario: Path) -> str:
 
 
 def _golden(job: Job, golden: Path) -> Execution:
-    """The result of a mutant whose trigger never holds: that of the golden run."""
+    """The result of a mutant whose trigger never holds, which is the golden run's."""
     return Execution(
         status=Status.OK,
         detail="",
@@ -327,12 +330,12 @@ def _lost(why: str, folder: Path) -> Execution:
 
 
 def make_fork(setting: Setting) -> ForkEngine:
-    """The fork engine of a campaign."""
+    """Make the fork engine of a campaign."""
     return _make(setting, warm=False)
 
 
 def make_warm(setting: Setting) -> ForkEngine:
-    """The same, but each run is a fork of the loaded target before its first step."""
+    """Make the engine that forks each run from the loaded target before the first step."""
     return _make(setting, warm=True)
 
 

@@ -1,6 +1,6 @@
-"""The harness's side of a fork server: golden runs that wait at their steps to be forked.
+"""The harness's side of a fork server: golden runs that wait between steps to be forked.
 
-fork_server.py is the other side.
+The target's side is fork_server.py.
 """
 
 import marshal
@@ -23,18 +23,19 @@ from mutator.engines.threads import too_many, turned_off
 from mutator.targets.manifest import TargetManifest
 
 _SERVER = Path(__file__).parent / "in_target" / "fork_server.py"
-_MOST = 8  # waiting processes, each some 20 MB
-_NEAR = 100  # steps; a process that close behind is moved on, as it is soon made again
-_LOOK_UP_S = 0.5  # how often a waiter checks that its parent is alive
+_MOST = 8  # waiting processes, of about 20 MB each
+# steps; a process at most this far behind is advanced instead of copied, because remaking it is fast
+_NEAR = 100
+_LOOK_UP_S = 0.5  # interval of the check that the parent is alive
 _START_S = 120.0
 
 
 class Lost(Exception):
-    """A process of the server is gone or does not answer."""
+    """A process of the fork server is gone or does not answer."""
 
 
 class Refused(Exception):
-    """This target, or this run of it, cannot be forked; the text says why, `remedy` what to do, if known."""
+    """This target or run cannot be forked. The text says why; `remedy` says what to do, if known."""
 
     def __init__(self, why: str, remedy: str = "") -> None:
         super().__init__(why, remedy)
@@ -46,15 +47,16 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: its key, and a function for the arguments that begin it."""
+    """A golden run: its key, and a function that returns the arguments to begin it with."""
 
     key: Hashable
     arguments: Callable[[], list[str]]
 
 
 class Waiting:
-    """A process of the server: the first, before any run (`key` None), or one before `step` of the golden
-    run `key`.
+    """A waiting process of the server.
+
+    The first waits before any run (`key` None). Others wait before `step` of the golden run `key`.
     """
 
     def __init__(self, connection: socket.socket, parent: int | None, key: Hashable = None) -> None:
@@ -67,7 +69,7 @@ class Waiting:
         connection.settimeout(_LOOK_UP_S)
 
     def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
-        """The reply, and the descriptors sent with it."""
+        """Send a request; return the reply and the file descriptors sent with it."""
         data = marshal.dumps(request)
         self._connection.settimeout(patience_s)
         try:
@@ -85,7 +87,7 @@ class Waiting:
         return reply, handles
 
     def load(self, modules: Sequence[str], patience_s: float) -> None:
-        """Load what mutants will import, once for all of them."""
+        """Load what mutants will import, so that each fork finds it loaded."""
         if new := [name for name in modules if name not in self.loaded]:
             self.ask({"do": "load", "modules": new}, patience_s)
             self.loaded.update(new)
@@ -116,8 +118,8 @@ class Waiting:
 class Pool:
     """A fork server with its waiting processes, in the new scratch folder `home`.
 
-    `base` is the pristine tree; the server has a copy. Refused if the target cannot be loaded or has more
-    than one thread, Lost if the server ends instead of answering.
+    The server uses a copy of the pristine tree `base`. Raises Refused if the target cannot be loaded or has
+    more than one thread, and Lost if the server ends without an answer.
     """
 
     def __init__(self, manifest: TargetManifest, base: Path, home: Path, parent: int | None) -> None:
@@ -166,7 +168,7 @@ class Pool:
             raise Lost("the tree of the fork server is not the pristine one")
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
-        """A process that waits before `step` of a golden run, with these modules loaded."""
+        """A process that waits before `step` of the golden run, with these modules loaded."""
         if self._process.poll() is not None:
             raise Lost("the fork server is gone")
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
@@ -205,7 +207,7 @@ class Pool:
         return made
 
     def close(self) -> None:
-        """End all of its processes."""
+        """End all processes of the server."""
         for waiting in (self.first, *self._waiting):
             waiting.close()
         end(self._process)

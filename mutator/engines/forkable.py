@@ -1,4 +1,4 @@
-"""What a forking engine can run: loadable targets, and faults whose code fits into a loaded program."""
+"""What a forking engine can run: targets that can be loaded, and faults whose code fits a loaded program."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,7 +24,7 @@ def unfit(manifest: TargetManifest) -> Refused | None:
 
 
 def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
-    """Why the target cannot be forked once loaded, by trying it; None if it can.
+    """Why the target cannot be forked once it is loaded, found by trying; None if it can.
 
     `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
     """
@@ -40,7 +40,7 @@ def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | 
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
-    """Variants that the reference engine always runs, with the reason, by trying one fault of each."""
+    """Variants that only the reference engine can run, with the reason, found by trying one fault of each."""
     variants = {fault.spec: fault for fault in faults}
     if why := not_forkable(manifest):
         return dict.fromkeys(variants, why)
@@ -51,5 +51,5 @@ def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[F
         except NotSwappable as reason:
             found[name] = str(reason)
         except MutatorError:
-            continue  # preflight reports it, or it is not run
+            continue  # an unbuildable fault never runs; preflight reports it
     return found

@@ -1,4 +1,4 @@
-"""Jobs and engines: what is run, its results, and the engine interface."""
+"""Jobs and engines: what to run, the results, and the interface of engines."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -18,37 +18,38 @@ class RunMode(StrEnum):
     REFERENCE = "reference"
     WARM = "warm"
     FORK = "fork"
-    GOLDEN = "golden"  # the trigger never held, so nothing was run
+    GOLDEN = "golden"  # the trigger never held, so no run was needed
 
 
-FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})  # modes that need a proof
+# modes that need the equivalence check
+FAST = frozenset({RunMode.WARM.value, RunMode.FORK.value, RunMode.GOLDEN.value})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """One run of the target. `files` are the changed and new files of its tree (none: pristine)."""
+    """One run of the target. `files` are the changed and new files of its tree; empty if pristine."""
 
     name: str
     scenario: Path
     seed: int
     changes: tuple[str, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
-    mutant: str | None = None  # the id that the probe must report; None: a tree without probe
-    injections: tuple[str, ...] = ()  # ids that it must report on
+    mutant: str | None = None  # the id that the probe must report; None for a tree without a probe
+    injections: tuple[str, ...] = ()  # all ids that the probe must report on
     hash_seed: int = 0
-    golden: Path | None = None  # output folder of the run without the fault, if known
+    golden: Path | None = None  # output folder of the fault-free run, if known
     observe: bool = False  # keep what the probe observes
     stop: bool = False  # end the run at its first terminal hazard
-    golden_ends: bool = False  # whether one is also in its golden run
-    watch: bool = False  # like `observe`, and note calls that make a target nondeterministic
+    golden_ends: bool = False  # whether the golden run has a terminal hazard, too
+    watch: bool = False  # like `observe`; also note calls that make a target nondeterministic
     lines: bool = False  # note which lines of the tree run from the first observation on
 
     def problem_of(self, report: object) -> str:
-        """What is wrong with its probe's report; empty if nothing is, or without a probe."""
+        """The problem with the probe's report; empty if there is none, or no probe."""
         return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
 
 
-# (file, line, start byte in the line, -1 if unknown) in the tree, innermost first
+# frames in the tree, innermost first: file, line, start byte in the line (-1 if unknown)
 Stack = tuple[tuple[str, int, int], ...]
 
 
@@ -56,7 +57,7 @@ Stack = tuple[tuple[str, int, int], ...]
 class Raised:
     """The exception that ended a run: its type, its text, and where it left the tree.
 
-    `stacks[0]` is its own; the others are those of its causes and of the exceptions in it.
+    `stacks[0]` is the exception's own stack. The others are those of its causes and of the exceptions in it.
     """
 
     kind: str
@@ -65,12 +66,12 @@ class Raised:
 
     @property
     def place(self) -> str:
-        """`file:line` of the innermost target line (without the probe); empty if there is none."""
+        """`file:line` of the innermost target line outside the probe; empty if there is none."""
         return next((f"{path}:{line}" for path, line, _ in self.stacks[0] if not is_probe(path)), "")
 
     @property
     def text(self) -> str:
-        """Type, text and place, for people."""
+        """Type, text and place, for messages."""
         if self.kind == SystemExit.__name__:
             what = f"exit status {self.message}"
         else:
@@ -80,13 +81,13 @@ class Raised:
 
 @dataclass(frozen=True, kw_only=True)
 class Execution:
-    """The result of a job. `out` holds the target's trace and record when status is ok.
+    """The result of a job. `out` holds the target's trace and record if `status` is OK.
 
-    * `status`: how the run ended; `outcomes.blame` decides whose fault that is
-    * `raised`: the exception that ended it; `active`: whether an injection was active in it
+    * `status`: how the run ended; `outcomes.blame` decides what caused it
+    * `raised`: the exception that ended it; `active`: whether an injection was active
     * `probe`: the probe's report; `log`: the tail of what the run printed
     * `mode`: how the run was done; `why`: why another engine did it; `start`: the step where it left golden
-    * `stopped`: a terminal hazard ended it early
+    * `stopped`: whether a terminal hazard ended it early
     * `modules`: the third-party top-level modules that it imported
     * `watched`, `seen`, `lines` (from 1, by file): notes of the reference engine
     """
@@ -110,23 +111,23 @@ class Execution:
 
 
 class Engine(Protocol):
-    """Runs jobs and yields each with its result, in any order; `out` is valid until the next one.
+    """Runs jobs and yields each with its result, in any order. `out` stays valid until the next result.
 
-    The output folder may be the golden run's if the trigger never holds: do not change it.
+    Never change the output folder: if the trigger never holds, it is the golden run's.
     """
 
     def run(self, jobs: Iterable[Job]) -> Iterator[tuple[Job, Execution]]: ...
 
     def close(self) -> None:
-        """End what the engine keeps running between jobs."""
+        """End the processes that the engine keeps between jobs."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
     """What an engine is made from.
 
-    `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
-    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go).
+    `base` is a pristine tree made by `prepare_base`, and never written to. `work` is an existing scratch
+    folder. If `parent` is a process id, the engine exits once that process is no longer its parent.
     """
 
     manifest: TargetManifest

@@ -1,4 +1,4 @@
-"""The list of engines, with descriptions and factories. Nothing is imported for it."""
+"""The list of engines, with descriptions and factories. Imports no engine."""
 
 from dataclasses import dataclass
 

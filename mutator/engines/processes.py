@@ -1,4 +1,4 @@
-"""Processes that targets run in: starting them, and reporting how they ended."""
+"""Start the processes that targets run in, and report how they ended."""
 
 import json
 import os
@@ -19,22 +19,22 @@ from mutator.errors import MutatorError
 from mutator.model import Limits, Status
 from mutator.targets.environment import FIXED, KEPT
 
-LOST = "lost"  # nobody is left to report how it ended
-PATIENCE_S = 60.0  # beyond a run's wall limit, until its guard must report
+LOST = "lost"  # no process is left to report the ending
+PATIENCE_S = 60.0  # time for the guard's report, after a run's wall limit
 _END_S = 10.0
 _REPORT = {"ended": str, "disk_full": bool, "outside": list, "probe": object}
-_NAMES = ("outside", "modules", "libraries", "threads")  # lists in a report: texts
+_NAMES = ("outside", "modules", "libraries", "threads")  # lists of texts in a report
 _LOG_TAIL = 4000
-_LEAST_FREE = 4 << 20  # a failed run is not blamed on the target if the disk has less room
-_TRIAL = 1 << 20  # nor if so much cannot be written
+_LEAST_FREE = 4 << 20  # with less free space than this, a failed run is not blamed on the target
+_TRIAL = 1 << 20  # nor if a file of this size cannot be written
 _OUTSIDE_SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """How a run's process ended: exit code (negative for a signal), CPU and wall time.
+    """How a run's process ended: exit code (negative for a signal), CPU time and wall time.
 
-    `stopped` is why it was stopped (WALL or DISK of `guard`, LOST, or "").
+    `stopped` is why it was stopped: WALL or DISK of `guard`, LOST, or "".
     """
 
     code: int
@@ -44,9 +44,9 @@ class Ended:
 
 
 def check_limits(limits: Limits) -> None:
-    """Raise MutatorError if this process's limits are below those of the campaign.
+    """Raise MutatorError if this process's own limits are lower than the campaign's.
 
-    Such a run would end here, but not elsewhere.
+    Otherwise a run could end here that would not end elsewhere.
     """
     wanted = (
         (resource.RLIMIT_AS, "memory_mb", limits.memory_mb << 20, "ulimit -v"),
@@ -57,7 +57,7 @@ def check_limits(limits: Limits) -> None:
         soft, hard = resource.getrlimit(number)
         if hard != resource.RLIM_INFINITY and hard < least:
             try:
-                resource.setrlimit(number, (soft, least))  # as root's runs would
+                resource.setrlimit(number, (soft, least))  # as for runs by root
             except ValueError:
                 raise MutatorError(
                     f"a limit of {hard} here (`{command}`), and runs may take {least} ({name})",
@@ -67,7 +67,7 @@ def check_limits(limits: Limits) -> None:
 
 
 def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-    """Status and detail of a run of the right tree, from its end and its report."""
+    """Status and detail of a run on the right tree, from its ending and its report."""
     if stopped := _judge_stopped(limits, ended):
         return stopped
     if report is not None:
@@ -78,7 +78,7 @@ def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[
 
 
 def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
-    """Status and detail of a run stopped by a limit or from outside, even after its report."""
+    """Status and detail of a run that a limit or an outside signal stopped, even after its report."""
     killed = signal.Signals(-ended.code) if ended.code < 0 else None
     if ended.stopped == LOST:
         return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ended.code})"
@@ -94,7 +94,7 @@ def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
 
 
 def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
-    """Status and detail of a run that reported how it ended."""
+    """Status and detail of a run that reported its ending."""
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
     if raised := raised_in(report):
@@ -116,14 +116,16 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
 
 
 def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """The whole environment of a run: what starting Python needs, and `more`, nothing else of the user's."""
+    """The complete environment of a run: what Python needs to start, and `more`; nothing else from the
+    user's.
+    """
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
     return {**kept, **(more or {}), **own}
 
 
 def end(guarding: subprocess.Popen[bytes]) -> None:
-    """Wait for a guarding process, which ends as its connection is closed."""
+    """Wait for a guarding process. It ends when its connection is closed."""
     try:
         guarding.wait(_END_S)
     except subprocess.TimeoutExpired:
@@ -132,7 +134,7 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
 
 
 def tail(path: Path) -> str:
-    """The end of what a run printed; empty if it deleted its log."""
+    """The end of what a run printed; empty if the run deleted its log."""
     if not path.is_file():
         return ""
     with path.open("rb") as file:
@@ -141,9 +143,10 @@ def tail(path: Path) -> str:
 
 
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
-    """The child's report; None if it is missing, partial or invalid.
+    """The child's report; None if it is missing, incomplete or invalid.
 
-    A run may write anything, and exit. `more` are an engine's own reports.
+    A run may write anything to this file and exit, so each field is checked. `more` are the fields of one
+    engine only.
     """
     try:
         report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
@@ -156,17 +159,17 @@ def read_report(path: Path, **more: type) -> dict[str, Any] | None:
 
 
 def inactive(folder: Path) -> Path:
-    """The file in a run's folder that its first activation deletes."""
+    """The file in a run's folder that the first activation deletes."""
     return folder / "inactive"
 
 
 def was_active(folder: Path) -> bool:
-    """Whether an injection was active in the run of that folder."""
+    """Whether an injection was active in the run in this folder."""
     return not inactive(folder).exists()
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:
-    """Whether a failed run had too little room, on the disk or in a quota."""
+    """Whether a failed run lacked space on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
     state = os.statvfs(work)
@@ -181,7 +184,7 @@ def is_full(work: Path, report: dict[str, Any] | None) -> bool:
 
 
 def steady(detail: str, folder: Path) -> str:
-    """The text without what differs from run to run (scratch paths, addresses), printable, kept short."""
+    """The text without parts that differ between runs (scratch paths, addresses), printable and short."""
     text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
     text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -1,4 +1,4 @@
-"""The reference engine: a fresh interpreter for each job, on its own tree."""
+"""The reference engine: each job runs in a fresh interpreter on its own tree."""
 
 import json
 import os
@@ -39,17 +39,18 @@ from mutator.targets.manifest import TargetManifest
 from mutator.targets.stopping import stop_source
 
 _CHILD = Path(__file__).parent / "in_target" / "run_once.py"
-_LOOK_UP_S = 0.5  # how often a waiting engine checks that its parent is alive
-_LONGEST = 4096  # bytes of the guard's report
+_LOOK_UP_S = 0.5  # interval of the check that the parent is alive
+_LONGEST = 4096  # size of the guard's report, in bytes
 
 
 class ReferenceEngine:
-    """A fresh interpreter per job, on its own tree, with nothing else of the package to import.
+    """Runs each job in a fresh interpreter on its own tree; nothing else of the package can be imported
+    there.
 
-    `base` is a pristine tree made by `prepare_base`, never written to; `work` an existing scratch folder.
-    `parent` is the process that must stay this one's parent, or the engine leaves (None: it may go). Runs of
-    an `independent` engine use nothing that other runs left, if the manifest supports it; nor do runs of a
-    mutant that changes files which decide what is left.
+    `base` is a pristine tree made by `prepare_base`, and never written to. `work` is an existing scratch
+    folder. If `parent` is a process id, the engine exits once that process is no longer its parent. Runs of
+    an `independent` engine use nothing that other runs left, if the manifest supports this. The same holds
+    for mutants of files that decide what runs leave.
     """
 
     def __init__(
@@ -81,13 +82,13 @@ class ReferenceEngine:
                 remove_folder(folder)
 
     def close(self) -> None:
-        """Nothing to close."""
+        """Do nothing: no process is kept between jobs."""
 
     def execute(self, job: Job, folder: Path) -> Execution:
-        """Run one job in the new scratch folder `folder`, which is left to the caller."""
+        """Run one job in the new scratch folder `folder`, which the caller deletes."""
         with raising_disk_full(self.work):
             ended = self._run(self._prepare(job, folder), folder, job.hash_seed)
-            if self._base_tree.was_changed():  # by this run, or by another at the same time
+            if self._base_tree.was_changed():  # by this run, or by another one at the same time
                 remove_folder(folder)
                 ended = self._run(self._prepare(job, folder, linked=False), folder, job.hash_seed)
         log = tail(folder / "log")
@@ -113,7 +114,7 @@ class ReferenceEngine:
         )
 
     def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
-        """Write a job's tree and request; returns the request's file."""
+        """Write a job's tree and request; return the path of the request."""
         tree, out = folder / "tree", folder / "out"
         self._base_tree.lay_out(tree, linked=linked)
         bytecode.put(job.files, tree)
@@ -158,12 +159,12 @@ class ReferenceEngine:
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed(self) -> tuple[str, list[str]]:
-        """Where a probe keeps what it observes, and the names of the observed values."""
+        """The object in which the probe keeps its observations, and the names of the observed values."""
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
     def _run(self, request: Path, folder: Path, hash_seed: int) -> Ended:
-        """Run the job in a guarded process; both end when the connection is closed."""
+        """Run the job in a guarded process. Process and guard end when the connection is closed."""
         began = time.monotonic()
         ours, theirs = socket.socketpair()
         with ours:
@@ -175,7 +176,7 @@ class ReferenceEngine:
                     stderr=subprocess.STDOUT,
                     env=environment(hash_seed, folder, self.manifest.env),
                     pass_fds=[theirs.fileno()],
-                    start_new_session=True,  # a Ctrl-C at the terminal is for us, not the target
+                    start_new_session=True,  # Ctrl-C at the terminal is for the command, not for the target
                 )
             try:
                 told = self._told(ours, began + self.limits.wall_s + PATIENCE_S)
@@ -188,7 +189,7 @@ class ReferenceEngine:
         return Ended(**json.loads(told))
 
     def _told(self, connection: socket.socket, deadline: float) -> bytes:
-        """How the run ended, in JSON; nothing if nobody reports in time. Leaves if our own parent is gone."""
+        """The guard's JSON report; empty if none arrives in time. Exits if this process's parent is gone."""
         connection.settimeout(_LOOK_UP_S)
         while time.monotonic() < deadline:
             try:
@@ -208,11 +209,12 @@ class ReferenceEngine:
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
     def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
-        """What is wrong with the tree that ran; empty if it was the job's."""
+        """The problem with the tree that ran; empty if it was the job's."""
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
-        more = {path for path in report["files"] if path.endswith(".py")}  # a data cache may be left there
+        # a data cache may leave files there
+        more = {path for path in report["files"] if path.endswith(".py")}
         for path in sorted(expected.keys() | more):
             if report["files"].get(path) != expected.get(path):
                 return f"{path} in the tree that ran is not the one of this job"
@@ -220,7 +222,7 @@ class ReferenceEngine:
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:
-    """The exception in texts that can be stored: a run may use any names."""
+    """The exception with reproducible texts, because a run may use any names."""
     stacks = tuple(
         tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
     )
@@ -228,12 +230,12 @@ def _steady(raised: Raised, folder: Path) -> Raised:
 
 
 def make_reference(setting: Setting) -> ReferenceEngine:
-    """The reference engine of a campaign."""
+    """Make the reference engine of a campaign."""
     return ReferenceEngine(setting.manifest, setting.base, setting.work, setting.limits, setting.parent)
 
 
 def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
-    """The pristine tree with its bytecode in the folder `dest`, made unless it is complete."""
+    """Make the pristine tree with its bytecode in the folder `dest`, unless it is complete; return it."""
     if not dest.is_dir():
         half = dest.with_name(f"{dest.name}.{os.getpid()}")
         with raising_disk_full(dest):

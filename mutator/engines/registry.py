@@ -9,13 +9,13 @@ from mutator.engines.kinds import ENGINES, FORK, REFERENCE
 from mutator.errors import MutatorError
 from mutator.targets.manifest import TargetManifest
 
-WORTH_IT = 40  # experiments; for fewer, the equivalence check would repeat most
+WORTH_IT = 40  # with fewer experiments, the equivalence check would rerun most of them
 
 
 def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
-    """The name of the engine for so many experiments: the requested one, or the fastest that pays off.
+    """The name of the engine for this many experiments: the requested one, or the fastest that pays off.
 
-    MutatorError if the requested one is unknown or cannot run this target here.
+    Raises MutatorError if the requested engine is unknown or cannot run this target here.
     """
     if asked is None:
         return REFERENCE if not_worth_forking(manifest, experiments) else FORK
@@ -28,19 +28,19 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
 
 
 def make_engine(name: str, setting: Setting) -> Engine:
-    """Make an engine by name."""
+    """Make the engine with this name."""
     engine: Engine = resolve_name(ENGINES[name].factory)(setting)
     return engine
 
 
 def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
-    """Why so many experiments are not forked unless requested; empty if they are."""
+    """Why this many experiments are not forked unless requested; empty if they are."""
     few = f"that pays off from {WORTH_IT} experiments on" if experiments < WORTH_IT else ""
     return not_forkable(manifest) or few
 
 
 def not_forkable(manifest: TargetManifest) -> str:
-    """Why nothing of this target can be forked here; empty if it can."""
+    """Why this target cannot be forked here; empty if it can."""
     if manifest.stepwise is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":

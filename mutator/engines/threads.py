@@ -1,10 +1,10 @@
-"""Threads that prevent forking: their names, and what turns them off."""
+"""Threads that prevent forking: their names, and how to turn them off."""
 
 from collections.abc import Sequence
 
-_LISTED = 4  # names listed; a pool may have dozens
+_LISTED = 4  # names to list, because a pool may have dozens
 _NUMBERS = "OMP_NUM_THREADS, OPENBLAS_NUM_THREADS"
-_KNOWN = (  # how a thread's name begins, what it is, what turns it off
+_KNOWN = (  # start of a thread's name, what the thread is, how to turn it off
     (
         "jemalloc_bg_thd",
         "of the memory allocator jemalloc",
@@ -23,14 +23,14 @@ _OTHER = ("", "start it after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:
-    """The message about a process with these threads besides its main one."""
+    """The message about a process that has these threads in addition to its main one."""
     told = [*dict.fromkeys(map(_told, others))]
     listed = ", ".join([*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])])
     return f"it has {len(others) + 1} threads, and only one can be forked: besides the main one, {listed}"
 
 
 def turned_off(others: Sequence[str]) -> str:
-    """What to do about these threads."""
+    """How to turn off these threads."""
     return "; ".join(dict.fromkeys(_about(name)[1] for name in others))
 
 
@@ -40,7 +40,7 @@ def _told(name: str) -> str:
 
 
 def _about(name: str) -> tuple[str, str]:
-    """What a thread is, and what turns it off."""
+    """What the thread is, and how to turn it off."""
     if not name:
         return _UNNAMED
     return next(((what, remedy) for begin, what, remedy in _KNOWN if name.startswith(begin)), _OTHER)

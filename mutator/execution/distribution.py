@@ -1,4 +1,4 @@
-"""Distribute a session's pending work to processes: one interface, one module for each way."""
+"""Distribute a session's pending work to processes: one interface, and one module for each way."""
 
 from pkgutil import resolve_name
 from typing import Protocol
@@ -15,17 +15,18 @@ _DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 class Distributor(Protocol):
     """Distributes the pieces of a prepared session until none is left, or the session must stop.
 
-    Finished work is in the run folder by then, appended by the workers or by the distributor. What ends the
-    session early goes to `session.problem` and `session.interrupted`.
+    When `run` returns, finished work is in the run folder. Workers or the distributor append it. Reasons for
+    an early end go to `session.problem` and `session.interrupted`.
     """
 
     def run(self, session: Session) -> None: ...
 
 
 def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
-    """The distributor for a cluster, or without one for this machine; MutatorError for an unusable cluster.
+    """The distributor for a cluster, or for this machine if there is none; MutatorError for an unusable
+    cluster.
 
-    Nothing is started or connected.
+    Starts nothing and opens no connection.
     """
     if cluster is None:
         if insecure:
@@ -36,6 +37,6 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
             )
         return LocalWorkers()
     where = parse(cluster)
-    with importing("cluster"):  # an optional package: imported only on request
+    with importing("cluster"):  # imported only on request, because the package is optional
         deals: Distributor = resolve_name(_DASK)(where, insecure=insecure)
     return deals

@@ -1,4 +1,4 @@
-"""The outcome of a finished run, cached so that its million records need not be read again."""
+"""Cache the outcome of a finished run, so that later sessions need not read its records."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ def keep_end(folder: RunFolder, ended: Ended) -> None:
 
 
 def ended_before(folder: RunFolder) -> Ended | None:
-    """The stored outcome of a finished run with exactly these verified bytes; else None."""
+    """The stored outcome of a finished run whose verified bytes have not changed; else None."""
     if not folder.finished or not (key := integrity.content_key(folder.path)):
         return None
     known = verified_runs.recall(key)

@@ -33,7 +33,9 @@ def followed(session: Session) -> Iterator[None]:
 
 
 def _stages(session: Session) -> Iterator[Progress]:
-    """Yield the current progress at each request: experiments, then, once all have a record, the proof."""
+    """Yield the current progress at each request: of the experiments, then, once all have a record, of the
+    proof.
+    """
     folder = session.folder
     experiments = Tail("experiments", folder.path / "records", folder.planned)
     while (progress := experiments.poll()).done < progress.total:

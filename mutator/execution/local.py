@@ -15,7 +15,7 @@ _PLUGIN = "mutator.execution.pytest_plugin"
 
 
 class LocalWorkers:
-    """The distributor of `mutator run`: `session.workers` processes, or this process alone if 0."""
+    """The distributor of `mutator run`: `session.workers` processes, or only this process if 0."""
 
     def run(self, session: Session) -> None:
         """Run the pending pieces as pytest items, ignoring the user's pytest configuration."""
@@ -44,14 +44,12 @@ def _without(*names: str) -> Iterator[None]:
 
 
 class _Silent:
-    """Pytest plugin that makes the terminal reporter write into a buffer, leaving the terminal to the
-    caller.
-    """
+    """Pytest plugin that sends the terminal reporter's output to a buffer: the caller owns the terminal."""
 
     def __init__(self) -> None:
         self.text = io.StringIO()
 
-    @pytest.hookimpl(trylast=True)  # after the reporter was made, before xdist (registered later) takes it
+    @pytest.hookimpl(trylast=True)  # after the reporter is made, and before xdist (registered later) uses it
     def pytest_configure(self, config: pytest.Config) -> None:
         manager = config.pluginmanager
         manager.unregister(name="terminalreporter")

@@ -1,4 +1,4 @@
-"""Merge the run folders of all shards of a plan into the folder that one machine would have made."""
+"""Merge the run folders of all shards of a plan into the folder that a single run would have made."""
 
 import os
 import shutil
@@ -37,16 +37,16 @@ from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
-_MARK = f".{HEAD}."  # with a process id: the half-written head, present from the beginning of a merge
+_MARK = f".{HEAD}."  # followed by a process id: the unfinished head, present from the beginning of a merge
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
 def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -> Path:
-    """Merge the run folders `shards` into the new or empty folder `out`; returns its results.csv.
+    """Merge the run folders `shards` into the new or empty folder `out`; return the path of its results.csv.
 
-    MutatorError for a shard that is missing, duplicate, unfinished, in use or of another plan, and, unless
-    `accept_versions`, for one run with another Python or other packages. CheckFailed if a proof failed, or if
-    golden runs differ, which means that the machines do not compute alike.
+    Raises MutatorError for a shard that is missing, duplicate, unfinished, in use, or of another plan; unless
+    `accept_versions`, also for one that ran with another Python or other packages. Raises CheckFailed if a
+    proof failed, or if golden runs differ: then the machines compute different results.
     """
     if RunFolder.exists(out):
         raise MutatorError(
@@ -80,7 +80,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
 
 
 def _make_empty(out: Path) -> None:
-    """Make the folder to merge into, without the remains of a killed merge."""
+    """Make the folder to merge into. Delete what a killed merge left there."""
     if any(out.glob(f"{_MARK}*")):
         with owned(out, patience_s=0.0):
             cleaning.clear(out)
@@ -144,7 +144,7 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_complete(folder: RunFolder) -> None:
-    """Check that every experiment of the share has a record that counts, and the proof is complete."""
+    """Check that every experiment of the share has a record that counts, and that the proof is complete."""
     records = folder.records()
     done = sum(one.counts for one in endings(records))
     if done < folder.planned:
@@ -165,7 +165,7 @@ def _check_complete(folder: RunFolder) -> None:
 
 
 def _check_goldens(folders: Sequence[RunFolder]) -> None:
-    """Check that fault-free runs are equal everywhere, or the results do not belong together."""
+    """Check that fault-free runs are equal in all shards. If not, the results do not belong together."""
     first = read_json(folders[0].path / CHECKS, CHECKS_SCHEMA)["goldens"]
     for folder in folders[1:]:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
@@ -179,8 +179,8 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
 
 
 def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
-    """The stretches of all shards. Python and packages must equal the first shard's last ones, or be
-    accepted.
+    """The stretches of all shards. Unless accepted, Python and packages must equal those of the first shard's
+    last stretch.
     """
     first = folders[0]
     for folder in folders:
@@ -198,7 +198,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 
 
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
-    """Copy everything of the shards; the head last, so an unfinished folder is not a run folder."""
+    """Copy everything of the shards. The head comes last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = digests.settled(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
@@ -238,9 +238,9 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
 
 
 def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
-    """Pack the series of all shards under one run's budget.
+    """Pack the series of all shards, within the limit for one run.
 
-    This must happen before the head is written, since nothing does it later.
+    Call this before the head is written, because nothing packs them later.
     """
     shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):

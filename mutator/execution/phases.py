@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mutator.store.progress import Progress
 
-LINE_EVERY_S = 15.0  # an occasional line in a log shows that the run is alive
+LINE_EVERY_S = 15.0  # a line now and then shows in a log that the run is alive
 
 STAGES = {
     "plan": "planning",
@@ -23,7 +23,7 @@ STAGES = {
 
 
 class Lines:
-    """Writes a line at each new stage, then one every `LINE_EVERY_S`."""
+    """Writes a line at each new stage, then one every `LINE_EVERY_S` seconds."""
 
     def __init__(self, write: Callable[[str], None]) -> None:
         self._write = write
@@ -46,12 +46,12 @@ def title(progress: "Progress") -> str:
 
 
 def count(progress: "Progress") -> str:
-    """`12/60`, if there is something to count."""
+    """The count, such as `12/60`; empty if there is nothing to count."""
     return f"{progress.done}/{progress.total}" if progress.total else ""
 
 
 def rate(progress: "Progress") -> str:
-    """The rate if known: `1.5 a second`, or if slower `24.0 a minute`."""
+    """The rate if known: `1.5 a second`, or `24.0 a minute` for slow runs."""
     if progress.per_s is None:
         return ""
     if progress.per_s < 1.0:
@@ -60,7 +60,7 @@ def rate(progress: "Progress") -> str:
 
 
 def endings(outcomes: Counter[str]) -> str:
-    """`hazard 12, sdc 30, masked 2`: the outcomes so far."""
+    """The outcomes so far: `hazard 12, sdc 30, masked 2`."""
     return ", ".join(f"{name} {outcomes[name]}" for name in sorted(outcomes) if outcomes[name])
 
 
@@ -70,7 +70,7 @@ def remaining(progress: "Progress") -> str:
 
 
 def duration(seconds: float) -> str:
-    """`45 s`, `3 min 20 s`, `2 h 05 min`."""
+    """A duration: `45 s`, `3 min 20 s`, `2 h 05 min`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -36,11 +36,11 @@ class Deals(Protocol):
 
 
 class HarnessErrors(Exception):
-    """The harness could not judge experiments of a chunk."""
+    """The harness could not judge some experiments of a chunk."""
 
 
 class CampaignItem(pytest.Item):
-    """Some work of a campaign. It fails only for harness errors, and then without a traceback."""
+    """Work of a campaign. Fails only for harness errors. The report of a known error has no traceback."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, HarnessErrors | MutatorError):
@@ -52,9 +52,7 @@ class CampaignItem(pytest.Item):
 
 
 class WorkItem(CampaignItem):
-    """One chunk of the plan, or one experiment of the proof. It fails only for harness errors: a hazard is
-    a result.
-    """
+    """One chunk of the plan, or one experiment of the proof. A hazard is a result, not a failure."""
 
     def __init__(self, *, work: Pending | Sample, worker: "LazyWorker", **keywords: Any) -> None:
         super().__init__(**keywords)
@@ -101,7 +99,7 @@ def _defect(err: Exception, chunk: str) -> str:
 
 
 class LazyWorker:
-    """This process's Worker, made when the first chunk runs, as collecting needs none."""
+    """This process's Worker, made when the first chunk runs, because collecting needs none."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self._workspace = workspace
@@ -130,8 +128,8 @@ def configure(
 ) -> None:
     """Register the plugin for this process's role.
 
-    Whatever the user's configuration says about files, each worker takes the next piece of work. With a
-    `distributor`, pytest distributes none.
+    Each worker takes the next piece of work, whatever the user's configuration says about files. With a
+    `distributor`, pytest itself distributes nothing.
     """
     if getattr(config.option, "dist", "no") != "no":
         config.option.dist = "load"
@@ -147,9 +145,9 @@ def configure(
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
-    """Make chunks, then experiments of the proof, the session's items, without collecting anything else.
+    """Make the session's items: chunks, then experiments of the proof. Nothing else is collected.
 
-    The proof comes last, in the smallest items, so that workers end together.
+    The proof has the smallest items and comes last, so that the workers finish at about the same time.
     """
     session.items = []
     for work in works:
@@ -163,7 +161,7 @@ def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker:
 
 
 class WorkerSide:
-    """Plugin of an xdist worker: collects the pending work, and runs what it is sent."""
+    """Plugin of an xdist worker: collects the pending work, and runs the items that it receives."""
 
     def __init__(self, config: pytest.Config, given: dict[str, Any], worker_id: str) -> None:
         bind_to_parent(given["parent"])
@@ -221,7 +219,7 @@ class Controller:
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
-            return None  # xdist's: nothing is collected here
+            return None  # xdist's hook, which collects nothing in this process
         assert self.begun is not None
         begun = self.begun
         name = begun.worker_name("main")
@@ -235,7 +233,7 @@ class Controller:
     def pytest_keyboard_interrupt(self, excinfo: pytest.ExceptionInfo[BaseException]) -> None:
         if self.begun is None:
             return
-        if type(excinfo.value) is KeyboardInterrupt:  # pytest's own kinds mean a regular stop
+        if type(excinfo.value) is KeyboardInterrupt:  # pytest's own exceptions mean a regular stop
             self.begun.interrupted = True
         for pid in living_workers(self.begun.folder.path):
             os.kill(pid, signal.SIGTERM)
@@ -254,7 +252,7 @@ class Controller:
 
 
 class PlainController(Controller):
-    """Like Controller, for pytest called directly: also plans, checks, and reports the end."""
+    """Controller for a pytest command of the user: also plans, checks, and reports the end."""
 
     def __init__(
         self,
@@ -337,7 +335,7 @@ class PlainController(Controller):
 
 
 def _told(config: pytest.Config) -> Notify | None:
-    """Reports the stages without pytest items; None with `-q`."""
+    """A function that reports stages without pytest items; None with `-q`."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None

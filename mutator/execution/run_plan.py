@@ -1,4 +1,4 @@
-"""The frozen plan of a command: new, or from its run folder."""
+"""The frozen plan of a command: a new one, or the one in its run folder."""
 
 from dataclasses import asdict
 from pathlib import Path
@@ -19,8 +19,8 @@ def open_frozen(
 ) -> RunFolder:
     """Open the run folder `out`, which the caller owns, with a frozen plan of the campaign.
 
-    With `reviewed`, also store the approvals; CheckFailed, and no new plan, unless everything is approved.
-    MutatorError if the folder has another plan, other sources or another version of mutator.
+    With `reviewed`, also store the approvals. If anything is not approved, raise CheckFailed and store no new
+    plan. Raises MutatorError if the folder has another plan, other sources or another version of mutator.
     """
     if RunFolder.exists(out):
         folder = _found(workspace, campaign, out, choices)
@@ -35,7 +35,7 @@ def open_frozen(
 
 
 def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
-    """Open a run folder that was planned from this campaign, choices and sources; MutatorError otherwise."""
+    """Open a run folder planned from this campaign, choices and sources; MutatorError if any differs."""
     folder = RunFolder.open(out)
     head = folder.head
     check_version(out, head["schema"], head["provenance"])

@@ -26,15 +26,15 @@ from mutator.store.series_format import encode
 from mutator.store.series_packing import EncodedSeries
 from mutator.targets.manifest import TargetManifest
 
-_KEPT = 32  # golden runs: those of one seed and the next
+_KEPT = 32  # golden runs: those of the current seed and the next
 
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """An experiment with its record. `out` (the target's output folder) is valid until the next one.
+    """An experiment with its record. `out` (the target's output folder) is valid until the next result.
 
-    It is None without a mutant or a run. `mode`, `why` and `start` are the execution's. `series` is None if
-    not requested or if the run failed.
+    `out` is None without a mutant or a run. `mode`, `why` and `start` are those of the execution. `series` is
+    None if not requested or if the run failed.
     """
 
     experiment: Experiment
@@ -44,16 +44,17 @@ class Finished:
     cpu_s: float = 0.0
     wall_s: float = 0.0
     log: str = ""
-    mode: RunMode | None = None  # None: not run
+    mode: RunMode | None = None  # None if nothing ran
     why: str = ""
     start: int = 0
     series: EncodedSeries | None = None
 
 
 class Goldens:
-    """The channels of golden runs, loaded on request; the last few are kept.
+    """The channels of golden runs, loaded on request. Only the last few are kept in memory.
 
-    `folder_of` finds the files of an experiment's golden run; with `several_seeds` each seed has golden runs.
+    `folder_of` finds the output folder of an experiment's golden run. With `several_seeds`, each seed has
+    golden runs.
     """
 
     def __init__(
@@ -63,25 +64,25 @@ class Goldens:
         *,
         several_seeds: bool = False,
     ) -> None:
-        self.folder = folder_of  # finds the files of the run without the fault
+        self.folder = folder_of  # finds the output folder of the fault-free run
         self._several_seeds = several_seeds
         self._trace = lru_cache(_KEPT)(partial(load_channels, manifest))
         self._sampler = lru_cache(_KEPT)(lambda folder: Sampler(manifest, self._trace(folder)))
         self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
 
     def key(self, experiment: Experiment) -> str:
-        """The name of its golden run."""
+        """The name of the experiment's golden run."""
         return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
 
     def trace(self, experiment: Experiment) -> Trace:
         return self._trace(self.folder(experiment))
 
     def ends(self, experiment: Experiment) -> bool:
-        """Whether a terminal hazard is in the golden run of an experiment."""
+        """Whether the golden run of an experiment reaches a terminal hazard."""
         return self._ends(self.folder(experiment))
 
     def sampler(self, experiment: Experiment) -> Sampler:
-        """Makes the series of runs compared with an experiment's golden run."""
+        """The sampler that makes series of runs compared with the experiment's golden run."""
         return self._sampler(self.folder(experiment))
 
 
@@ -108,8 +109,7 @@ class Runner:
     def run(self, experiments: Iterable[Experiment]) -> Iterator[Finished]:
         """Yield each experiment with its record.
 
-        A mutant that cannot be built is not run. An experiment that is the same run as another gets its
-        record.
+        A mutant that cannot be built is not run. Experiments that share a run get the same record.
         """
         shared = {same[0].id: same for same in runs(self.manifest, experiments)}
         for finished in self._run([same[0] for same in shared.values()]):
@@ -195,7 +195,7 @@ class Runner:
     def _record(
         self, experiment: Experiment, built: Mutant, execution: Execution
     ) -> tuple[Record, Trace | None]:
-        """The record, and the trace of a run that ended well."""
+        """The record, and the trace of a run that ended normally."""
         if execution.status is not Status.OK or execution.probe is None:
             return self._failed(experiment, built, execution), None
         activation = activation_of(execution.probe)
@@ -211,7 +211,7 @@ class Runner:
     def _judged(
         self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
     ) -> Record:
-        """The record of a run that ended well, compared with golden."""
+        """The record of a run that ended normally, compared with golden."""
         activation = activation_of(execution.probe or {})
         reference, time = self.goldens.trace(experiment), self.manifest.time_channel
         if execution.stopped:
@@ -245,14 +245,14 @@ class Runner:
 
     def _failed(self, experiment: Experiment, built: Mutant, execution: Execution) -> Record:
         status, detail = assign_blame(execution, built.files, self._raising(experiment, built))
-        # a time-out's count depends on the machine's speed, a crash's does not
+        # a crash's count is reproducible; a time-out's depends on the machine's speed
         activation = activation_of(execution.probe or {}) if status is Status.CRASHED else None
         bare = _bare(experiment, status, detail, built, activation)
         return replace(bare, error=error_of(execution.raised))
 
 
 def _problem_of(err: BadOutput) -> str:
-    """What is wrong with an output, without its scratch folder."""
+    """The problem with an output, without the path of its scratch folder."""
     return f"{Path(err.where or '').name}: {err.got}"
 
 
@@ -278,7 +278,7 @@ def _bare(
 
 
 def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
-    """The record of an experiment that has only a status."""
+    """The record of an experiment that has a status but no outcome."""
     return Record(
         experiment_id=experiment_id,
         status=status,

@@ -1,6 +1,6 @@
-"""Run a campaign: plan if needed, check, run what lacks a record, build the table.
+"""Run a campaign: plan if needed, check, run what has no record yet, build the table.
 
-`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` share everything except who starts pytest.
+`mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` differ only in what starts pytest.
 """
 
 from pathlib import Path
@@ -30,12 +30,13 @@ def run_campaign(
 ) -> Summary:
     """Run or resume the campaign in the run folder `out` with `workers` processes (0: in this process).
 
-    A frozen plan in `out` is used as it is: omitted `choices` are the frozen ones. MutatorError for other
-    choices, or a changed campaign file or target. `engine` is a name in `engines.kinds` (None: the fastest
-    that pays off). With `reviewed`, only approved mutants run (`mutator.review.gate`). A run continues with
-    the Python and packages it began with, unless `accept_versions`. `notify` is called from another thread
-    about twice a second. MutatorError for wrong input; CheckFailed if something is not approved, or a
-    preflight or the equivalence check fails.
+    A frozen plan in `out` is used unchanged. Omitted `choices` are the frozen ones. `engine` is a name in
+    `engines.kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
+    (`mutator.review.gate`). A run continues only with the Python and packages that it began with, unless
+    `accept_versions`. Another thread calls `notify` about twice a second.
+
+    Raises MutatorError for wrong input, other choices than the frozen ones, or a changed campaign file or
+    target. Raises CheckFailed if something is not approved, or a preflight or the equivalence check fails.
     """
     with open_session(
         workspace,

@@ -51,7 +51,7 @@ Notify = Callable[[Progress], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """The outcome of a run. `outcomes` as in Progress; `harness_errors` are (experiment id, detail) pairs."""
+    """The outcome of a session. `outcomes` is as in Progress."""
 
     planned: int  #: planned experiments of this folder
     done: int  #: those with a record that counts
@@ -103,8 +103,7 @@ class Session:
         self.pending: tuple[Pending, ...] = ()
         self.proof: tuple[equivalence.Sample, ...] = ()
         self.manifest = workspace.manifest(folder.head["target"])
-        # of the whole plan, so that all its shards, and a run on one machine, agree on whether there is a
-        # proof
+        # For the whole plan, so that all shards and an unsharded run agree on whether there is a proof.
         experiments = folder.head["experiments"]
         self.engine = choose_engine(engine, self.manifest, experiments)
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
@@ -117,10 +116,9 @@ class Session:
         self._known: Ended | None = None
 
     def prepare(self) -> None:
-        """Find the work to do and, if there is any, check, lay out the pristine tree, and note the stretch of
-        work.
+        """Find the work to do. If there is any, run the checks, create the pristine tree and begin a stretch.
 
-        MutatorError for other versions that are not accepted.
+        Raises MutatorError for other versions that are not accepted.
         """
         self._known = ended_before(self.folder)
         if self._known and are_there(self.folder):
@@ -161,7 +159,7 @@ class Session:
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
-        """Everything an xdist worker needs, in types that execnet can send."""
+        """Everything that an xdist worker needs, in types that execnet can send."""
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
@@ -173,7 +171,7 @@ class Session:
         }
 
     def finish(self) -> Summary:
-        """Build the tables from what is there, and report the outcome of the run."""
+        """Build the tables from the existing records, and return the outcome of the session."""
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)
@@ -239,20 +237,24 @@ class Session:
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:
-        """A full disk does not lose anything: the records are there, the rest can be made later."""
+        """Note a full disk as the session's problem. The records are complete, and the rest can be made
+        later.
+        """
         try:
             yield
         except DiskFull as err:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Enter what this session's workers wrote; the next session does so for one that is still ending."""
+        """Enter the files that this session's workers wrote. If a worker is still ending, the next session
+        does it.
+        """
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
-        """Pack what this session's workers appended; the next session does so for one that is still
-        ending.
+        """Pack the series that this session's workers wrote. If a worker is still ending, the next session
+        does it.
         """
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
@@ -273,7 +275,7 @@ def open_session(
     accept_versions: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
-    """Own the run folder `out` with a frozen plan in it; scratch is cleared before and after."""
+    """Own the run folder `out` with a frozen plan in it. Scratch folders are deleted before and after."""
     is_new = not out.exists()
     make_run_folder(out)
     with terminable(), owned(out):
@@ -282,7 +284,7 @@ def open_session(
         try:
             folder = open_frozen(workspace, campaign, out, choices, reviewed=reviewed)
         except MutatorError:
-            if is_new and not RunFolder.exists(out):  # nothing was planned, so there is nothing to keep
+            if is_new and not RunFolder.exists(out):  # nothing was planned, so nothing is worth keeping
                 shutil.rmtree(out, ignore_errors=True)
             raise
         digests.close_segments(folder.path)

@@ -1,4 +1,4 @@
-"""Run one experiment outside a campaign, keeping everything, for `try`, `show` and `rerun --trace`."""
+"""Run one experiment outside a campaign and keep its whole output, for `try`, `show` and `rerun --trace`."""
 
 import os
 from collections.abc import Iterator
@@ -25,10 +25,10 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class Single:
-    """An experiment run alone: `golden` and `faulty` are output folders (`golden.load_trace` reads them)."""
+    """An experiment run alone. `golden` and `faulty` are output folders (`golden.load_trace` reads them)."""
 
     experiment: Experiment
-    mutant: Mutant | None  # None: the mutant does not compile (the record says so)
+    mutant: Mutant | None  # None if the mutant does not compile; the record says so
     record: Record
     golden: Path
     faulty: Path
@@ -46,8 +46,8 @@ def run_single(
 ) -> Single:
     """Run `experiment` into the folder `out`: golden/ (unless given), faulty/ and mutant.patch.
 
-    `faulty` is empty if the mutant was refused, and holds what the run left if it failed. CheckFailed if the
-    golden run fails.
+    `faulty` is empty if the mutant was refused. It holds what the run left if the run failed. Raises
+    CheckFailed if the golden run fails.
     """
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
@@ -67,9 +67,9 @@ def run_single(
 def run_golden(
     workspace: Workspace, manifest: TargetManifest, experiment: Experiment, out: Path, *, limits: Limits
 ) -> Path:
-    """Run `experiment` without its fault into the folder `out`, and return its output folder.
+    """Run `experiment` without its fault into the folder `out`; return the output folder.
 
-    CheckFailed if the run fails.
+    Raises CheckFailed if the run fails.
     """
     with _engine(manifest, out, limits) as engine:
         return _run_golden(workspace, engine, experiment, out / "golden")
@@ -80,7 +80,7 @@ def rerun(
 ) -> tuple[Single, bool]:
     """Rerun a planned experiment into the folder `out` (default: traces/<id>/ of the run folder).
 
-    The flag says whether the record equals the campaign's (True if there is none yet).
+    The second value says whether the record equals the campaign's. It is True if there is none yet.
     """
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
@@ -99,9 +99,9 @@ def rerun(
 
 
 def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
-    """Whether an experiment that was rerun has the campaign's record, True if there is none yet.
+    """Whether a rerun's record equals the campaign's; True if there is none yet.
 
-    MutatorError if that record's patch is damaged.
+    Raises MutatorError if the patch of the campaign's record is damaged.
     """
     if known is None:
         return True
@@ -110,7 +110,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
-    """The target of a run; MutatorError if its sources are no longer those of the run."""
+    """The target of a run; MutatorError if its sources have changed since the run."""
     manifest = workspace.manifest(folder.head["target"])
     check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, folder.scenarios))
     return manifest
@@ -118,7 +118,7 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 
 @contextmanager
 def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
-    """An engine alone in `out`, whose scratch is deleted afterwards."""
+    """An engine that works in `out`. Its scratch folder is deleted afterwards."""
     check_requirements(manifest)
     make_folder(out)
     with alone_in(out):
@@ -133,7 +133,7 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
 
 
 def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:
-    """The fault-free run of the experiment's scenario, its output at `place`."""
+    """Run the experiment's scenario without a fault, and move the output to `place`."""
     job = Job(
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
@@ -165,7 +165,7 @@ def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
 
 
 def _replace(new: Path, place: Path) -> None:
-    """Replace a folder that somebody may be reading."""
+    """Replace a folder that another process may be reading."""
     aside = Path(mkdtemp(dir=new.parent))
     if os.path.lexists(place):
         place.rename(aside / place.name)

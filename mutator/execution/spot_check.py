@@ -1,4 +1,4 @@
-"""Spot-check a run: rerun randomly drawn experiments on the reference engine, and compare their records."""
+"""Spot-check a run: rerun randomly drawn experiments on the reference engine, and compare the records."""
 
 from collections.abc import Iterator, Sequence
 from random import SystemRandom
@@ -16,7 +16,7 @@ from mutator.workspace import Workspace
 def drawn(folder: RunFolder, count: int) -> list[str]:
     """Ids of `count` experiments that have a result, or of all if there are fewer.
 
-    The draw has no seed, so that nobody can predict it.
+    The draw has no seed, so nobody can predict it.
     """
     records = folder.records().values()
     ids = sorted(record.experiment_id for record in records if record.status is not Status.HARNESS_ERROR)
@@ -24,7 +24,7 @@ def drawn(folder: RunFolder, count: int) -> list[str]:
 
 
 def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
-    """Run these experiments, and yield those whose records differ. The folder is not written to."""
+    """Rerun these experiments, and yield those whose records differ. The run folder is not changed."""
     manifest, records = manifest_of(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:

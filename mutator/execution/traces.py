@@ -18,7 +18,7 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True)
 class Traces:
-    """Fault-free and faulty trace of any experiment of a run folder."""
+    """The fault-free and faulty traces of any experiment in a run folder."""
 
     workspace: Workspace
     folder: RunFolder
@@ -43,9 +43,10 @@ class Traces:
         return self._records[experiment_id]
 
     def of(self, experiment_id: str) -> tuple[Trace, Trace]:
-        """(fault-free, faulty) of an experiment that ended well; it is rerun if no trace is stored.
+        """The fault-free and the faulty trace of an experiment that ended normally.
 
-        MutatorError if that is impossible or the result differs from the campaign's.
+        Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
+        result differs from the campaign's.
         """
         kept = self.folder.path / "traces" / experiment_id
         experiment = self._experiments[experiment_id]
@@ -60,10 +61,10 @@ class Traces:
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
 
     def sampled(self, experiment_id: str, *, drive: bool = False) -> tuple[Trace, Trace]:
-        """(fault-free, faulty) of an experiment from its series, at most 20 values a second.
+        """The fault-free and the faulty trace from an experiment's series, at most 20 values a second.
 
-        One without a series is rerun if `drive` says so. MutatorError if there is none, it is damaged, or the
-        rerun fails as in `of`.
+        Without a series, the experiment is rerun if `drive` is set. Raises MutatorError if there is no
+        series, it is damaged, or the rerun fails as in `of`.
         """
         series = SeriesFolder(self.folder.path)
         found = series.read(experiment_id)
@@ -80,7 +81,7 @@ class Traces:
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
-        """Whether the trace of the campaign's run is stored, not that of another state of the sources."""
+        """Whether the stored trace is that of the campaign's run, and not of other sources."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():
             return False

@@ -32,10 +32,10 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Assignment:
-    """Who a worker is.
+    """The role of a worker.
 
-    `name` makes its files in the run folder its own, `engine` runs its chunks, and `parent` is the process
-    that it must not outlive (None: it is the command itself).
+    `name` makes its file names in the run folder unique. `engine` runs its chunks. `parent` is the process
+    that it must not outlive (None: the worker is the command itself).
     """
 
     run: Path
@@ -65,7 +65,7 @@ class Worker:
         self._seed: int | None = None  # the seed being run
         self._prover: Runner | None = None
         self._proofs: LineWriter | None = None
-        self._needs_proof: bool | None = None  # None: nothing that it ran decides it
+        self._needs_proof: bool | None = None  # None: not known from its own runs
         self._planned: Mapping[str, Experiment] = {}
         self._faults = plan_file.read_faults(self.folder.path)
         plan = head["plan"]
@@ -74,7 +74,7 @@ class Worker:
         self._timings = LineWriter(self._file("timings"), {"schema": TIMINGS_SCHEMA, "plan": plan})
 
     def run(self, pending: Pending) -> list[tuple[str, str]]:
-        """Run the rest of a chunk; returns (experiment id, detail) of its harness errors."""
+        """Run the rest of a chunk; return (experiment id, detail) of each harness error."""
         experiments = plan_file.read_chunk(
             self.folder.path, self.folder.head["chunks"][pending.chunk], self._faults
         )
@@ -95,10 +95,11 @@ class Worker:
         self._seed = seed
 
     def prove(self, sample: Sample) -> list[tuple[str, str]]:
-        """Run an experiment of the proof's sample on the reference engine; harness errors as in `run`.
+        """Run an experiment of the proof's sample on the reference engine; return harness errors as `run`
+        does.
 
-        Its run shares nothing with others, as what is shared is also to be proved. If nothing was forked,
-        none is run.
+        The run shares nothing with others, because the proof must also cover what runs share. If nothing was
+        forked, nothing is run.
         """
         if self._needs_proof is None:
             self._needs_proof = equivalence.needless(self.folder) is None
@@ -150,7 +151,7 @@ class Worker:
         )
 
     def _keep(self, finished: Finished) -> None:
-        """Append the patch first, the record last: an experiment with a record has everything."""
+        """Append the patch first and the record last, so that everything exists for each record."""
         if finished.mutant is not None:
             self._patches.append(finished.experiment.id, finished.mutant.patch_bytes)
         if self._series is not None and finished.series is not None:
@@ -159,7 +160,7 @@ class Worker:
         self._records.append(line_of(finished.record))
 
     def _sync_blocks(self) -> None:
-        """Sync before records, since a stored record names patches that must survive a power cut."""
+        """Sync blocks before records, because a stored record names patches that must survive a power cut."""
         self._patches.sync()
         if self._series is not None:
             self._series.sync()
@@ -182,7 +183,7 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """The beginning of a Python command line whose process dies with `parent` from the start."""
+    """The start of a Python command line. From its start, the process dies with `parent`."""
     return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
 
 

@@ -1,4 +1,4 @@
 """Scripts that run inside a target's process.
 
-They use only the standard library and numpy, since the harness must not change what a target does.
+They use only the standard library and numpy, because the harness must not change what a target does.
 """

@@ -1,9 +1,9 @@
 """A loaded target that forks: `python -P -s fork_server.py SOCKET START.marshal`. Standard library only.
 
-Each process waits at a step boundary of a golden run (the first one before any run) and answers on its own
-socket in marshalled dicts, each after its length. On request it forks a mutant, or a process that waits some
-steps later, while it has one thread. It ends when the other end of its socket is closed, or with the first
-process (guard.py).
+Each process waits between two steps of a golden run; the first waits before any run. It answers on its own
+socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on request:
+a mutant, or a process that waits at a later step. It ends when its socket is closed at the other end, or when
+the first process ends (guard.py).
 """
 
 import array
@@ -38,7 +38,7 @@ def main(connection: int, start_file: str) -> int:
     try:
         serve_first(connection, marshal.loads(Path(start_file).read_bytes()))
     finally:
-        os._exit(0)  # exit handlers of the target are for its runs
+        os._exit(0)  # exit handlers registered before this belong to the server, not to the target's runs
 
 
 def serve_first(connection: int, start: dict[str, Any]) -> None:
@@ -60,18 +60,18 @@ def serve_first(connection: int, start: dict[str, Any]) -> None:
 
 
 class Abandoned(Exception):
-    """Nobody waits for this process any more."""
+    """The process is no longer needed."""
 
 
 class Process:
-    """One waiting process. `run` is its golden run, at `step`; None before any."""
+    """A waiting process. `run` is its golden run, before `step`; None before any run."""
 
     def __init__(self, start: dict[str, Any], connection: socket.socket) -> None:
         self.start = start
         self.connection = connection
         self.places = child.places(start["tree"])
         self.stamp = child.stamp(self.places)
-        self.outside: list[str] = []  # files of its packages imported from elsewhere
+        self.outside: list[str] = []  # files outside the tree from which the target's packages were imported
         self.begin: Any = None
         self.run: Any = None
         self.step = 0
@@ -83,7 +83,7 @@ class Process:
         self.connection.sendall(data)
 
     def serve(self) -> None:
-        """Answer until nobody asks any more."""
+        """Answer requests until the other end closes the socket."""
         answers: dict[str, Callable[..., dict[str, Any] | None]] = {
             "branch": self.branch,
             "advance": self.advance,
@@ -114,9 +114,9 @@ class Process:
         return data
 
     def branch(self, step: int, args: list[str] | None = None) -> None:
-        """Fork a process that waits before `step` of this golden run, or of the one that `args` begin.
+        """Fork a process that waits before `step` of this golden run, or of a new one begun with `args`.
 
-        Its socket is the reply.
+        The reply carries its socket.
         """
         ours, theirs = socket.socketpair()
         get_ready()
@@ -133,7 +133,7 @@ class Process:
         theirs.close()
 
     def go_on(self, step: int, args: list[str] | None) -> None:
-        """In a new process: go to its place, report, and wait."""
+        """In a new process: advance to `step`, report, and wait."""
         try:
             if args is not None:
                 sys.argv = [self.start["module"], *args]
@@ -145,7 +145,7 @@ class Process:
         self.serve()
 
     def advance(self, step: int) -> dict[str, Any]:
-        """Advance to before `step` of the golden run."""
+        """Advance the golden run until just before `step`."""
         while self.step < step and not self.run.done:
             self.run.step()
             self.step += 1
@@ -153,7 +153,9 @@ class Process:
         return {"step": self.step}
 
     def load(self, modules: list[str]) -> dict[str, Any]:
-        """Load what mutants will import; failures are left to their own imports."""
+        """Import modules that mutants will need. Failures are ignored, because the mutant's own import
+        reports them.
+        """
         for name in modules:
             with suppress(Exception):
                 importlib.import_module(name)
@@ -162,9 +164,9 @@ class Process:
         return {"threads": threads.others()}
 
     def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
-        """Fork and guard a child that continues as a mutant; returns how it ended.
+        """Fork and guard a child that continues as a mutant; return how it ended.
 
-        The child reads the job: what this process writes to, it must copy after each fork.
+        Only the child unmarshals the job: memory that this process writes to must be copied after each fork.
         """
         if others := threads.others():
             return {"threads": others}
@@ -178,7 +180,7 @@ class Process:
         return {**ended, "threads": [], "touched": self.touched()}
 
     def become(self, job: dict[str, Any]) -> NoReturn:
-        """In a new child: become a mutant of the run so far, finish it, report."""
+        """In a new child: become a mutant of the run so far, finish it, and report."""
         self.connection.close()
         log = os.open(job["log"], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o644)
         os.dup2(log, 1)
@@ -191,7 +193,7 @@ class Process:
         report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
         report["threads"] = threads.others()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-        if not report["threads"]:  # with more it does not count
+        if not report["threads"]:  # with other threads, the result does not count
             end()
         os._exit(0)
 
@@ -207,7 +209,7 @@ class Process:
             return True
 
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Finish the run as the mutant; returns its report."""
+        """Finish the run as the mutant; return its report."""
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         watch = job["watch"]
         probe, known = None, set() if watch is None else set(sys.modules)
@@ -217,7 +219,8 @@ class Process:
             swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
-            holder, state = job["probe_state"]  # its state had it been there from the start
+            # the state that the probe would have if it had been there from the start
+            holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
             seen = None if watch is None else swap.keep_observations(probe, holder, watch)
@@ -238,21 +241,21 @@ class Process:
 
 
 def get_ready() -> None:
-    """Before a fork: flush output, and freeze old objects for the new collector."""
+    """Prepare for a fork: flush output, and exclude existing objects from garbage collection."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     gc.freeze()
 
 
 def end() -> None:
-    """Do what an interpreter does at its end, except tearing itself down, which is slower than many runs.
+    """Do what an interpreter does at exit, except freeing its memory, which takes longer than many runs.
 
-    That is: end what `threading` keeps, call `atexit` handlers, flush open files.
+    That is: end the threads of `threading`, call `atexit` handlers, and flush open files.
     """
     if "threading" in sys.modules:
         sys.modules["threading"]._shutdown()
     atexit._run_exitfuncs()
-    for thing in gc.get_objects():  # new ones only: those from before the fork are frozen
+    for thing in gc.get_objects():  # only new ones, because those from before the fork are frozen
         if isinstance(thing, io.IOBase):
             with suppress(Exception):
                 thing.flush()
@@ -261,7 +264,7 @@ def end() -> None:
 
 
 def reap() -> None:
-    """Reap children that ended."""
+    """Reap children that have ended."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

@@ -1,7 +1,7 @@
-"""Run code in a separate process within limits, and leave nothing behind. Standard library only.
+"""Run code in a separate process within limits, and end everything it started. Standard library only.
 
-The waiting process is a subreaper: anything its descendants leave, in any session, becomes its child and is
-killed. As a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
+The waiting process is a subreaper: it adopts whatever its descendants leave in any session, and kills it. As
+a script, `guard.py PARENT PROGRAM WORDS...` becomes that program, but dies with its parent.
 """
 
 import ctypes
@@ -16,19 +16,19 @@ from collections.abc import Iterable
 from contextlib import suppress
 from typing import Any
 
-WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # why a process was stopped
-HARD_CPU_EXTRA_S = 2  # a process that ignores SIGXCPU is killed this much later
+WALL, DISK, ABANDONED = "wall", "disk", "abandoned"  # reasons for stopping a process
+HARD_CPU_EXTRA_S = 2  # delay until a process that ignores SIGXCPU is killed
 _PR_SET_PDEATHSIG = 1
 _PR_SET_CHILD_SUBREAPER = 36
 _MINDED = signal.valid_signals() - {signal.SIGKILL, signal.SIGSTOP, signal.SIGPIPE, signal.SIGXFSZ}
-_LOOK_S = 0.2  # between two checks of a limit of space
-_LOOK_SHARE = 20  # the checks take at most one part in so many of the time
-_BLOCK = 512  # bytes, the unit of st_blocks
+_LOOK_S = 0.2  # interval between two checks of the space used
+_LOOK_SHARE = 20  # the checks may take at most one part in this many of the time
+_BLOCK = 512  # bytes; the unit of st_blocks
 _libc = ctypes.CDLL(None)
 
 
 class Space:
-    """Room for `disk_mb` MiB more in the folder `home` than it uses now."""
+    """Limit of `disk_mb` MiB on what the folder `home` may use in addition to what it uses now."""
 
     def __init__(self, home: str, disk_mb: int) -> None:
         self._home = home
@@ -41,12 +41,12 @@ class Space:
 def fork(
     caller: int, *, wall_s: float = math.inf, space: Space | None = None, patience_s: float = 0.0
 ) -> dict[str, Any] | None:
-    """Fork: None in the child, which leads its own session and dies with its parent.
+    """Fork. Return None in the child, which leads its own session and dies with its parent.
 
-    The parent waits until the child ends, a limit stops it, or the other end of `caller`, a pipe or socket,
-    is closed; then nothing of it is left. A child whose caller is gone is asked to end, and has `patience_s`
-    for it. Returns `code` (negative for a signal), `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or
-    "".
+    The parent waits until the child ends, a limit stops it, or the other end of `caller` (a pipe or socket)
+    is closed. It then kills everything that the child left. If the caller closes its end, the parent asks the
+    child to end and gives it `patience_s` to do so. The parent returns `code` (negative for a signal),
+    `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
@@ -74,7 +74,7 @@ def fork(
 
 
 def _mind_signals() -> None:
-    """Restore default signal handling, which shells change for background processes."""
+    """Restore the default signal handling, which shells change for background processes."""
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in _MINDED:
         if signal.getsignal(number) is signal.SIG_IGN:
@@ -82,14 +82,14 @@ def _mind_signals() -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Make the kernel kill this process when its parent dies; exits now if that is no longer `parent`."""
+    """Make the kernel kill this process when `parent` dies. Exit now if `parent` is no longer the parent."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def used(folder: str) -> int:
-    """Bytes on the disk of a folder's content, as far as readable."""
+    """Bytes that a folder's readable content takes on the disk."""
     total, folders = 0, [folder]
     while folders:
         with suppress(OSError), os.scandir(folders.pop()) as entries:
@@ -106,7 +106,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
-    """Wait until the child ended (it is not reaped) or must be stopped; returns why."""
+    """Wait until the child has ended (without reaping it) or must be stopped; return the reason."""
     handle, pause = os.pidfd_open(pid), _LOOK_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)
@@ -128,7 +128,7 @@ def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
 
 
 def _ask_to_end(pid: int, patience_s: float) -> None:
-    """Tell an unreaped child to end, and wait for it so long."""
+    """Tell an unreaped child to end, and wait up to `patience_s` seconds."""
     os.kill(pid, signal.SIGTERM)
     handle = os.pidfd_open(pid)
     try:
@@ -138,8 +138,9 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
 
 
 def _end_what_is_left() -> None:
-    """Kill and reap children of other sessions with all their descendants."""
-    session, spared = os.getsid(0), set[int]()  # spared: root's, when this process is not root's
+    """Kill and reap children in other sessions, with all their descendants."""
+    # processes that may not be killed: those of root, if this process is not root's
+    session, spared = os.getsid(0), set[int]()
     while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
         for pid in _with_descendants(left):
             try:
@@ -160,9 +161,9 @@ def _with_descendants(pids: Iterable[int]) -> list[int]:
 
 
 def _children(pid: int) -> list[int]:
-    """Children of `pid`, including unreaped dead ones."""
+    """Children of `pid`, including dead ones that are not reaped."""
     found: list[int] = []
-    with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # it may end meanwhile
+    with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process may end meanwhile
         for thread in threads:
             with io.FileIO(f"{thread.path}/children") as file:
                 found += map(int, file.read().split())

@@ -1,7 +1,7 @@
 """Note which lines of a tree run from the first observation on. Standard library only.
 
-Python 3.12 reports each line once (`sys.monitoring`); older versions trace the tree's functions, which is
-slower. Neither changes what the target does. Lines of other threads are noted from 3.12 on.
+From Python 3.12 on, `sys.monitoring` reports each line once. Older versions trace the tree's functions, which
+is slower. Neither changes what the target does. Lines run by other threads are noted only from 3.12 on.
 """
 
 import os
@@ -11,13 +11,13 @@ from types import CodeType, FrameType
 from typing import Any
 
 _monitoring: Any = getattr(sys, "monitoring", None)
-_TOOL = 1  # of `sys.monitoring`: the id for coverage
+_TOOL = 1  # the tool id that `sys.monitoring` reserves for coverage
 
 
 class Lines:
-    """Notes lines of the tree at `tree` after a line in `since` of the file `path` ran.
+    """Notes lines of the tree at `tree`, once a line in `since` of the file `path` has run.
 
-    Faults cannot act in lines that ran before.
+    A fault cannot act in lines that run only before that.
     """
 
     def __init__(self, tree: str, path: str, since: Iterable[int]) -> None:
@@ -35,7 +35,7 @@ class Lines:
             sys.settrace(self._trace)
 
     def found(self) -> dict[str, list[int]]:
-        """The lines of each file, from 1, in order; noting stops."""
+        """Stop noting; return the lines of each file, counted from 1, in order."""
         if _monitoring:
             _monitoring.set_events(_TOOL, 0)
             _monitoring.free_tool_id(_TOOL)
@@ -47,7 +47,7 @@ class Lines:
         return files
 
     def _note(self, file: str, line: int) -> bool:
-        """Note a line of the tree; returns whether it is the first observation, where noting restarts."""
+        """Note a line of the tree; return whether it is the first observation, where noting starts again."""
         first = not self._begun and file == self._path and line in self._since
         if first:
             self._begun = True

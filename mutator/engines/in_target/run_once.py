@@ -1,9 +1,9 @@
-"""One run of a target in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
+"""Run a target once in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
-Standard library only: the harness must not change what the target does. It forks first. The parent guards the
-run (see guard.py) and sends how it ended into the socket. The child limits itself, puts the tree first on
-sys.path, runs the entry module as `__main__`, and writes report.json: how the run ended, digests of the
-tree's files, imports of its packages from elsewhere, and what the probe counted.
+Standard library only, because the harness must not change what the target does. The script forks first. The
+parent guards the run (see guard.py) and sends the ending over the socket. The child limits itself, puts the
+tree first on sys.path and runs the entry module as `__main__`. It writes report.json: how the run ended,
+digests of the tree's files, imports of its packages from elsewhere, and the probe's counts.
 """
 
 import errno
@@ -25,12 +25,12 @@ from pathlib import Path
 from typing import Any
 
 _NO_SPACE = (errno.ENOSPC, errno.EDQUOT)
-_LONGEST = 2000  # characters of an exception's text
-_MOST_ERRORS = 50  # causes of an exception
+_LONGEST = 2000  # characters stored of an exception
+_MOST_ERRORS = 50  # exceptions stored: the one raised and those behind it
 
 
 def beside(name: str) -> Any:
-    """The module of that name in this file's folder, which is not on sys.path."""
+    """Load the module of this name from this file's folder, which is not on sys.path."""
     spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -42,7 +42,10 @@ guard = beside("guard")
 
 
 class Harness:
-    """Finds `mutator`, whose glue targets import, next to this file, whatever is installed."""
+    """Import hook that finds `mutator`, which the target's glue imports, next to this file.
+
+    It ignores any other installed version.
+    """
 
     package = Path(__file__).resolve().parents[2]
 
@@ -63,7 +66,7 @@ def main(job_file: str, connection: int) -> int:
         os.close(connection)
         run(job)
     else:
-        ended["cpu_s"] += time.process_time()  # include the interpreter's start
+        ended["cpu_s"] += time.process_time()  # includes the interpreter's start
         with suppress(BrokenPipeError):
             os.write(connection, json.dumps(ended).encode())
         os._exit(0)
@@ -121,7 +124,7 @@ def limit_resources(job: dict[str, Any]) -> None:
 
 
 def run_module(module: str, args: list[str]) -> None:
-    """Run `module` like `python -m`; exit status 0 is a success."""
+    """Run `module` like `python -m`. Exit status 0 counts as success."""
     sys.argv = [module, *args]
     try:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
@@ -131,7 +134,7 @@ def run_module(module: str, args: list[str]) -> None:
 
 
 def run_until(job: dict[str, Any]) -> bool:
-    """Run to the end or the first terminal hazard, and write the results; returns whether it was stopped."""
+    """Run to the end or the first terminal hazard; write the results; return whether it was stopped."""
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
@@ -141,7 +144,7 @@ def run_until(job: dict[str, Any]) -> bool:
 
 
 def note_activation(probe: Any, inactive: str) -> None:
-    """Make the first activation delete the file `inactive`, so that it is known however the run ends."""
+    """Make the first activation delete the file `inactive`, so that it shows however the run ends."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -156,7 +159,7 @@ def note_activation(probe: Any, inactive: str) -> None:
 
 
 def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
-    """The report of the probe `name`; if that fails, the error is how the run ended."""
+    """The report of the probe `name`. If the probe fails, its error becomes the run's ending."""
     try:
         said = probe.report()
     except BaseException as err:
@@ -164,12 +167,12 @@ def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
     try:
         json.dumps(said)
     except Exception:
-        said = "what JSON cannot tell"  # the run overwrote the probe's data
+        said = "what JSON cannot tell"  # the run has overwritten the probe's data
     return {"probe": said}
 
 
 def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
-    """How a run failed, in a reproducible text; `probe` is a module."""
+    """How a run failed, in a reproducible text. `probe` is the name of the probe's module."""
     kind = type(err)
     if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}
@@ -180,7 +183,7 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """An object as text; classes of the target may fail to convert in any way."""
+    """An object as text. Any conversion may fail for the target's classes."""
     try:
         return str(thing)
     except BaseException as why:
@@ -188,12 +191,12 @@ def text(thing: object) -> str:
 
 
 def of_full_disk(err: BaseException) -> bool:
-    """Whether an error reports a full disk or quota, including errors of libraries."""
+    """Whether an error reports a full disk or quota, also if a library raised it."""
     return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
 
 
 def origins(err: BaseException) -> list[BaseException]:
-    """The exception, then its causes and the ones in it, without duplicates."""
+    """The exception, its causes, and the exceptions in it, without duplicates."""
     found: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
     while todo and len(found) < _MOST_ERRORS:
@@ -206,7 +209,9 @@ def origins(err: BaseException) -> list[BaseException]:
 
 
 def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
-    """Where the exception passed the tree: (file, line) without duplicates, innermost first, with column."""
+    """Where the exception passed through the tree: file, line and column, innermost first, without
+    duplicates.
+    """
     places = []
     trace = err.__traceback__
     while trace is not None:
@@ -221,14 +226,14 @@ def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
 
 
 def column(trace: types.TracebackType) -> int:
-    """The start byte of what raised or was called in its line; -1 if unknown."""
+    """The byte at which the failing or called expression starts in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
     *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
     return -1 if begins is None else begins
 
 
 def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:
-    """Files outside the tree from which packages were imported, among modules of these names."""
+    """Files outside the tree from which the packages were imported, searched among modules of these names."""
     found = []
     for name in sorted(name for name in names if name.partition(".")[0] in packages):
         file = getattr(sys.modules[name], "__file__", None)
@@ -238,7 +243,7 @@ def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str])
 
 
 def imported_since(name: str) -> list[str]:
-    """The modules imported after that one, newest first, and itself."""
+    """Module `name` and the modules imported after it, newest first."""
     names = []
     for newer in reversed(sys.modules):
         names.append(newer)
@@ -248,21 +253,22 @@ def imported_since(name: str) -> list[str]:
 
 
 def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Modules imported since the `known` ones, in order, without those of the packages."""
+    """Modules imported since the `known` ones, in order, without modules of the packages."""
     return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
 
 
 def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Top-level names of third-party modules imported since the `known` ones, or whose shared library is
-    in use.
+    """Top-level names of third-party modules imported since the `known` ones, or with a shared library in
+    use.
     """
     own = {*sys.stdlib_module_names, Harness.package.name, *packages, *known}
     return sorted({name.partition(".")[0] for name in (*libraries(known, packages), *mapped())} - own)
 
 
 def mapped() -> Iterator[str]:
-    """Yield names, in module folders, of files mapped into memory: a library can be used without its
-    package.
+    """Yield the names, relative to module folders, of files mapped into memory.
+
+    This shows libraries that are used without an import of their package.
     """
     folders = sorted((f"{folder}/" for folder in sys.path if folder), key=len, reverse=True)
     with suppress(OSError):
@@ -273,7 +279,7 @@ def mapped() -> Iterator[str]:
 
 
 def tree_files(tree: str) -> dict[str, str]:
-    """Digest of every file of the tree except bytecode, by path."""
+    """Digest of each file in the tree except bytecode, by path."""
     files = {}
     for folder, _, names in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -284,7 +290,7 @@ def tree_files(tree: str) -> dict[str, str]:
 
 
 def places(tree: str) -> list[str]:
-    """Every folder and file of the tree except bytecode, which is checked against its source when used."""
+    """Every folder and file in the tree except bytecode, which Python checks against its source."""
     found = []
     for folder, _, files in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -293,7 +299,7 @@ def places(tree: str) -> list[str]:
 
 
 def stamp(places: list[str]) -> list[tuple[int, int, int]]:
-    """What changes when one of them is written to, added or removed."""
+    """A value that changes when a file or folder is written to, added or removed."""
     states = map(os.stat, places)
     return [(state.st_mtime_ns, state.st_size, state.st_ino) for state in states]
 

@@ -6,16 +6,16 @@ from typing import Any
 
 
 def drive(run: Any, source: str | None) -> bool:
-    """Make the steps of a run; returns whether it was stopped.
+    """Make the steps of a run; return whether it was stopped.
 
-    `source` has the function that says after each step whether the drive is over (None: it never is).
+    `source` defines the function that says after each step whether to stop; None: run to the end.
     """
     if source is None:
         while not run.done:
             run.step()
         return False
     over = compiled(source)
-    recorded = run.recorded  # now: a run without it must not reach its activation
+    recorded = run.recorded  # looked up now: a run without it must not reach its activation
     while not run.done:
         run.step()
         if over(recorded()):
@@ -24,7 +24,7 @@ def drive(run: Any, source: str | None) -> bool:
 
 
 def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
-    """The function `over` of the source."""
+    """The function `over` defined in `source`."""
     names = {"abs": abs, "min": least, "max": greatest, "float": float}
     space: dict[str, Any] = {"__builtins__": names, "math": math}
     exec(source, space)
@@ -33,10 +33,10 @@ def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
 
 
 def least(*values: float) -> float:
-    """The least number; NaN if one is NaN, as over a trace. Python's `min` depends on the order."""
+    """The smallest number; NaN if any is NaN, as in a trace. Python's `min` depends on the order."""
     return math.nan if any(map(math.isnan, values)) else min(values)
 
 
 def greatest(*values: float) -> float:
-    """The greatest number, with the same rule."""
+    """The largest number; NaN if any is NaN."""
     return math.nan if any(map(math.isnan, values)) else max(values)

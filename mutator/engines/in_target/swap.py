@@ -1,4 +1,4 @@
-"""Put a mutant's code into this process's loaded modules. Standard library only.
+"""Put a mutant's code into the loaded modules of this process. Standard library only.
 
 Only the target's process imports this module. `mutator.engines.code_swap` decides what may be swapped; this
 module checks that the loaded program is the one that was analysed.
@@ -9,7 +9,8 @@ import types
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-_INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")  # of methods, properties, wrappers
+# attributes that lead to the function of a method, property or wrapper
+_INSIDE = ("__func__", "fget", "fset", "fdel", "func", "__wrapped__")
 _OWN_REFERENCES = 3  # to a code object: from its function, a local, an argument
 
 
@@ -31,7 +32,7 @@ def install(name: str, parts: Sequence[types.CodeType]) -> Any:
 
 
 def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
-    """Give each function (module, path, old code, new code) its new code; all of them or none."""
+    """Replace the code of each function (module, path, old code, new code): of all or of none."""
     name = probe.__name__.rpartition(".")[2]
     found = [(live_function(module, path, old), new) for module, path, old, new in functions]
     for function, new in found:
@@ -40,7 +41,7 @@ def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> No
 
 
 def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
-    """Run lines of modules (module, code) that tell the probe what to set, each in its module."""
+    """Run the lines of modules (module, code) that set values in the probe, each in its module."""
     name = probe.__name__.rpartition(".")[2]
     for module, code in settings:
         if module not in sys.modules:
@@ -51,7 +52,7 @@ def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> 
 
 
 def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
-    """The only function at `path` with this code; SwapRefused if there is none, or if it is running."""
+    """The only function at `path` with this code. SwapRefused if there is none, or if it is running."""
     where = ".".join((module, *path))
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
@@ -72,7 +73,7 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """The functions behind a name: itself, parts of a method or property, wrapped ones."""
+    """The functions behind a name: the function itself, those of a method or property, and wrapped ones."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
@@ -81,13 +82,13 @@ def _functions(named: Any) -> Iterator[types.FunctionType]:
 
 
 def _mangled(holder: Any, name: str) -> str:
-    """The name as in the dict of a class."""
+    """The name as a class's dict has it."""
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
 def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Make the probe keep its observations, in the returned list: time and values of these `names`.
+    """Make the probe keep its observations; return the list that they go to: the time, then `names`.
 
     `holder` is the name of the object in which the probe keeps the time.
     """
@@ -103,7 +104,7 @@ def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tup
 
 
 def observations_before_steps(run: Any, seen: list[Any]) -> list[int]:
-    """Run to the end; returns the number of observations (`seen`) before each step."""
+    """Run to the end; return the number of observations in `seen` before each step."""
     before = []
     while not run.done:
         before.append(len(seen))

@@ -10,13 +10,13 @@ _TASKS = Path("/proc/self/task")
 
 
 def others() -> list[str]:
-    """Names of all threads except the main one, including those of libraries; "" without a name.
+    """Names of all threads except the main one, including those of libraries; "" for threads without a name.
 
-    Python's threads have the program's names, others the system's.
+    Python's threads have their names in the program, others those in the system.
     """
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}
-    try:  # not counted by the folder's links, which some kernels do not maintain
+    try:  # listed instead of counted by the folder's link count, which some kernels do not keep up to date
         numbers = [int(task.name) for task in _TASKS.iterdir() if task.name != str(os.getpid())]
     except FileNotFoundError:  # not on Linux
         return sorted(name for name in known.values() if name != threading.main_thread().name)
@@ -29,6 +29,6 @@ def others() -> list[str]:
 
 
 def _system_name(number: int) -> str:
-    with suppress(OSError):  # it just ended
+    with suppress(OSError):  # the thread has just ended
         return (_TASKS / str(number) / "comm").read_text().strip()
     return ""

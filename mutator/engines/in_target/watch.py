@@ -1,8 +1,8 @@
-"""Note lines of a tree that read a clock, draw without a seed or start a thread. Standard library and numpy
-only.
+"""Note lines of a tree that read a clock, draw without a seed, or start a thread.
 
-Watched functions are replaced before the target imports them, so results of such runs do not count. The
-innermost line of the tree on the stack is noted, even behind a library, except while that is imported.
+Standard library and numpy only. Replaces functions before the target imports them, so results of watched runs
+do not count. The line noted is the innermost one of the tree on the stack, even if a library made the call.
+Calls made while that library is imported are ignored.
 """
 
 import builtins
@@ -27,25 +27,25 @@ threads: Any = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(threads)
 
 CLOCK, DRAW, THREAD, HASH, PROCESS = "clock", "draw", "thread", "hash", "process"
-_MOST = 200  # most noted lines
+_MOST = 200  # most lines to note
 _CLOCKS = ("time", "monotonic", "perf_counter", "process_time", "thread_time", "clock_gettime")
-_STILL = ("localtime", "gmtime", "strftime", "ctime")  # clocks, unless a time is passed
+_STILL = ("localtime", "gmtime", "strftime", "ctime")  # functions that read a clock unless a time is passed
 _IMPORTING = "<frozen importlib"
 _INSTALLED = f"{os.sep}site-packages{os.sep}"
 
 
 class Watcher:
-    """Watches the tree at `tree` from `begin` on."""
+    """Watches the tree at `tree`, starting with `begin`."""
 
     def __init__(self, tree: str) -> None:
         self._tree = tree + os.sep
         self.noted: dict[tuple[str, int], dict[str, Any]] = {}
         self._threads: set[str] = set()
         self._quiet = False
-        self._seeded: set[Any] = set()  # shared generators with a seed
+        self._seeded: set[Any] = set()  # shared generators that have a seed
 
     def begin(self) -> None:
-        self._watch_numpy()  # first: it may use `secrets`
+        self._watch_numpy()  # first, because watching it may use `secrets`
         for name in _CLOCKS:
             for one in (name, f"{name}_ns"):
                 self._watch(time, one, CLOCK, f"time.{one}() reads the clock")
@@ -67,7 +67,9 @@ class Watcher:
         self._watch_seed(random.Random)
 
     def note(self, kind: str, what: str, *, direct: bool = False) -> None:
-        """Note the innermost line of the tree on the stack; `direct`: only if it is the caller itself."""
+        """Note the innermost line of the tree on the stack. With `direct`, only if this line itself made the
+        call.
+        """
         frame: FrameType | None = sys._getframe()
         here, via = sys._getframe().f_code.co_filename, ""
         while frame is not None and frame.f_code.co_filename == here:
@@ -88,7 +90,7 @@ class Watcher:
         self.noted.setdefault(place, told | {"what": what, "via": via})
 
     def look_for_threads(self, probe: Any, seen: list[Any]) -> None:
-        """Check observations 1, 2, 4, 8 and so on, by the length of `seen`, for threads."""
+        """Look for threads at observations 1, 2, 4, 8 and so on, counted by the length of `seen`."""
         observe = probe.observe
 
         def observe_and_look(**values: Any) -> None:
@@ -99,7 +101,7 @@ class Watcher:
         probe.observe = observe_and_look
 
     def found(self) -> dict[str, Any]:
-        """What was noted, in order of first appearance, and the threads besides the main one."""
+        """The notes in order of first appearance, and the threads except the main one."""
         names = sorted(self._threads.union(threads.others()))
         return {"noted": list(self.noted.values()), "threads": names}
 
@@ -113,7 +115,7 @@ class Watcher:
         *,
         direct: bool = False,
     ) -> None:
-        """Replace a function by one that notes its caller if the call `counts`."""
+        """Replace a function by one that notes its caller if `counts` accepts the call."""
         original = getattr(home, name, None)
         if original is None:
             return
@@ -128,7 +130,7 @@ class Watcher:
         """Replace the date classes, which cannot be changed, by similar ones in a module that only the tree
         imports.
 
-        Compiled code, such as that of pandas, crashes with another class.
+        Compiled code such as that of pandas crashes if it gets another class.
         """
         watched = ModuleType("datetime")
         vars(watched).update(vars(datetime))
@@ -136,7 +138,8 @@ class Watcher:
             original = getattr(datetime, name)
             like = _Like(name, (original,), {"__module__": "datetime", "like": original})
             for method in methods:
-                setattr(like, method, getattr(original, method))  # returns an original
+                # the method returns an object of the original class
+                setattr(like, method, getattr(original, method))
                 self._watch(like, method, CLOCK, f"datetime.{name}.{method}() reads the clock")
             setattr(watched, name, like)
         load = builtins.__import__
@@ -221,15 +224,15 @@ class Watcher:
         like = _Like("RandomState", (kind,), {"__init__": make, "like": kind})
         for home in (drawn, drawn.mtrand):
             setattr(home, "RandomState", like)  # noqa: B010
-        # everything else created without a seed asks this function for one
+        # all other generators without a seed get one from this function
         self._watch(bit_generator, "randbits", DRAW, what)
 
 
 class _Watched:
-    """A function, and what is done before each call.
+    """A function with an action before each call.
 
-    Like the built-in functions it replaces, it is not a method as a class attribute, and a copy of it is
-    itself.
+    Like the built-in functions that it replaces, it does not become a method as a class attribute, and
+    copying it returns the same object.
     """
 
     def __init__(self, original: Callable[..., Any], before: Callable[..., None]) -> None:
@@ -245,7 +248,7 @@ class _Watched:
 
 
 class _Like(type):
-    """The metaclass of a replacement class, which shares everything with the original."""
+    """Metaclass that makes a replacement class behave like the original."""
 
     like: type
 
@@ -262,5 +265,5 @@ def _is_salted(thing: object) -> bool:
 
 
 def _without_time(*args: Any, **_: Any) -> bool:
-    """Whether `time.localtime` and similar functions get no time."""
+    """Whether `time.localtime` or a similar function is called without a time."""
     return not any(isinstance(one, int | float | tuple | time.struct_time) for one in args)

@@ -1,7 +1,7 @@
-"""The board: which worker does which piece of work next. It knows no network and starts nothing.
+"""Decide which worker runs which piece of work next. Uses no network and starts nothing.
 
-Pieces are cut on demand, each a share of the rest by measured times, so that all workers finish at about the
-same time. A worker keeps the golden run that it has. Near the end, idle workers repeat late pieces.
+Pieces are cut on demand, sized by measured times, so that all workers finish at about the same time. A worker
+gets work with the golden run that it already has, if possible. Near the end, idle workers repeat late pieces.
 """
 
 import time
@@ -17,28 +17,28 @@ from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 from mutator.verification.equivalence import Sample
 
-LEAST_S, MOST_S = 0.5, 8.0  # duration of a piece
-_SHARE = 4  # a piece is the rest, divided by the number of workers and by this
+LEAST_S, MOST_S = 0.5, 8.0  # shortest and longest intended duration of a piece
+_SHARE = 4  # a piece is the remaining work divided by the number of workers and by this
 _FIRST = 4  # runs in a piece before the first measurement
 _GUESS_S = 0.5  # duration of a run before the first measurement
-_LATE = 3.0  # multiple of the expected time after which a piece is repeated elsewhere
-_LATE_S = 5.0  # and the minimum
-_DEATHS = 2  # of workers, before a piece is split
-_PROOF_S = 20.0  # without other work, before a worker proves its own runs; longer if runs are long
+_LATE = 3.0  # a piece that takes this many times as long as expected is repeated elsewhere
+_LATE_S = 5.0  # and not before this many seconds
+_DEATHS = 2  # workers that a piece may kill before it is split
+_PROOF_S = 20.0  # idle time before a worker may check its own runs; longer if runs are long
 
 
 @dataclass
 class _Out:
-    """A piece in progress: by whom, since when, and its expected duration."""
+    """A piece in progress: its worker, its start, and its expected duration."""
 
     piece: Piece
     worker: str
     since: float
     expected_s: float
-    others: set[str] = field(default_factory=set)  # workers that repeat it
+    others: set[str] = field(default_factory=set)  # workers that repeat the piece
 
     def goes_on_without(self, worker: str) -> bool:
-        """Whether another worker is still doing it."""
+        """Take a worker off the piece; return whether another worker is still running it."""
         if worker not in self.others and self.others:
             self.worker = self.others.pop()
             return True
@@ -76,7 +76,7 @@ class Board:
         self._slots[worker] = slots
 
     def leave(self, worker: str) -> None:
-        """Remove a worker that is gone, or gets no more work."""
+        """Remove a worker that is gone, or that gets no more work."""
         for known in (self._slots, self._at, self._idle_since):
             known.pop(worker, None)
 
@@ -87,18 +87,19 @@ class Board:
 
     @property
     def ran_all(self) -> bool:
-        """Whether only proof is left."""
+        """Whether only the proof is left."""
         outstanding = any(out.piece.kind is Kind.RUN for out in self._out.values())
         return not (self._waiting or outstanding)
 
     def drop_proof(self) -> None:
-        """Drop the proof, as nothing needs one."""
+        """Drop the proof, because no record needs one."""
         self._proof.clear()
 
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
         """The next piece for a worker, or None.
 
-        A piece taken `ahead` waits at the worker while it runs another; there are none near the end.
+        With `ahead`, the piece waits at the worker while another one runs there. Near the end no piece is
+        given ahead.
         """
         if ahead and self._waiting * self._mean_s(Kind.RUN) < 2 * self._at_once * LEAST_S:
             return None
@@ -117,7 +118,7 @@ class Board:
         return piece
 
     def done(self, piece: Piece, worker: str, seconds: float) -> bool:
-        """Note that a piece is done; False if another worker has already done it."""
+        """Note that a piece is done; return False if another worker has already done it."""
         if self._out.pop(piece.number, None) is None:
             return False
         self._seconds[piece.kind] += seconds
@@ -127,7 +128,7 @@ class Board:
         return True
 
     def give_back(self, piece: Piece, worker: str) -> None:
-        """Return an unfinished piece, for reasons unrelated to it."""
+        """Put back an unfinished piece that is not the cause of the problem."""
         if (out := self._out.get(piece.number)) is None:
             return
         if not out.goes_on_without(worker):
@@ -135,10 +136,10 @@ class Board:
             self._again(out.piece)
 
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
-        """Note that a worker, or its process, died during a piece, perhaps in the experiment `at`.
+        """Note that a worker or its process died during a piece, perhaps in the experiment `at`.
 
-        Another worker tries next, if there is one. A piece that killed twice is split. A piece of one
-        experiment that killed twice is returned: it is given up.
+        The piece goes to another worker, if there is one. A piece that killed twice is split. If it has only
+        one experiment, it is returned, and the caller gives it up.
         """
         if (out := self._out.get(piece.number)) is None:
             return None
@@ -194,7 +195,9 @@ class Board:
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
     def _group_for(self, worker: str) -> Group | None:
-        """The work with the worker's golden run; else the group with the most work left per worker."""
+        """The group with the worker's golden run if it has work; else the one with the most work left per
+        worker.
+        """
         own = self._groups.get(self._at.get(worker, ""))
         if own is not None and self._has_for(own, worker):
             return own
@@ -206,13 +209,15 @@ class Board:
         return bool(group.left) or any(self._may_try(worker, piece) for piece in group.again)
 
     def _may_try(self, worker: str, piece: Piece) -> bool:
-        """Whether a piece did not kill this worker before, or there is no other worker."""
+        """Whether the worker may run the piece: the piece has not killed it, or has killed every worker
+        present.
+        """
         return worker not in piece.died_at or self._slots.keys() <= set(piece.died_at)
 
     def _proof_for(self, worker: str) -> Piece | None:
-        """An experiment of the proof that another worker, or an earlier session, ran.
+        """An experiment of the proof that another worker or an earlier session ran.
 
-        A worker gets its own only without other workers, or after they left it for long.
+        A worker gets its own only if it is alone, or after a long idle time.
         """
         running = {name for out in self._out.values() for name in out.piece.lines if name in self._sampled}
         idle_s = self._now() - self._idle_since.get(worker, self._now())

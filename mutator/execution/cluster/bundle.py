@@ -1,12 +1,12 @@
-"""The bundle: everything a worker needs of a campaign except its plan, named by its digest.
+"""The bundle: everything that a worker needs of a campaign except its plan. Its digest is its name.
 
-    meta.json           engine, limits, digests of the golden runs, version of mutator
-    manifest/NAME       the target's manifest
-    target/, overlay/   its tree, and other files in its root that runs read (`{root}/...` in their arguments)
-    templates/          the fault models
-    scenarios/          the scenario files of the golden runs
+* meta.json: engine, limits, digests of the golden runs, version of mutator
+* manifest/NAME: the target's manifest
+* target/, overlay/: its tree, and files in its root that runs read (`{root}/...` in their arguments)
+* templates/: the fault models
+* scenarios/: the scenario files of the golden runs
 
-Each machine makes the golden runs, so that their digests show whether it computes alike.
+Each machine makes the golden runs itself. Their digests show whether it computes the same results.
 """
 
 import json
@@ -43,7 +43,7 @@ class Bundle:
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder, engine: str) -> "Bundle":
-        """What workers need of a run that passed its checks."""
+        """Pack what workers need of a run that passed its checks."""
         data = pack(dict(_parts(workspace, folder, engine)))
         return cls(data, sha256(data).hexdigest())
 
@@ -91,7 +91,7 @@ def _below(folder: Path, name: str) -> Iterator[tuple[str, bytes]]:
 
 
 def lay_out(data: bytes, place: Path) -> None:
-    """Write the files of a bundle into the folder `place`; MutatorError if it is damaged."""
+    """Write the files of a bundle into the folder `place`; MutatorError if the bundle is damaged."""
     with raising_disk_full(place):
         for name, content in unpack(data).items():
             path = place / name
@@ -112,7 +112,7 @@ class Site:
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        """The target, with the root from the bundle."""
+        """The target, with its root in the bundle."""
         path = self.place / "manifest" / self.meta["manifest"]
         overlay = self.place / "overlay"
         found = load_manifest(path, self.place / "target", overlay if overlay.is_dir() else None)
@@ -126,11 +126,11 @@ class Site:
 
     @property
     def limits(self) -> Limits:
-        """Limits of each run."""
+        """The limits of each run."""
         return Limits(**self.meta["limits"])
 
     def scenario(self, name: str) -> Path:
-        """The file of a scenario."""
+        """The path of a scenario's file."""
         return self.place / "scenarios" / f"{name}.yaml"
 
     @cached_property

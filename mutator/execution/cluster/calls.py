@@ -1,4 +1,4 @@
-"""Functions called on a worker by Dask."""
+"""Call functions on a worker through Dask."""
 
 import asyncio
 import uuid
@@ -16,17 +16,17 @@ _T = TypeVar("_T")
 
 
 class Refused(Exception):
-    """A worker gets no work, or no more."""
+    """A worker gets no work, or no more work."""
 
 
 class Cut(Refused):
-    """The scheduler briefly lost the command, and dropped all its tasks."""
+    """The scheduler lost its connection to the command briefly, and dropped all tasks."""
 
 
 def submit(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> "Future[_T]":
-    """Make exactly the worker at this address call a function."""
+    """Submit a function to the worker at this address, and to no other."""
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Sending large graph")  # a bundle goes to each worker once
+        warnings.filterwarnings("ignore", "Sending large graph")  # a bundle is sent to each worker only once
         return client.submit(
             function,
             *arguments,
@@ -39,7 +39,7 @@ def submit(client: Client, address: str, function: Callable[..., _T], *arguments
 
 
 async def call(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
-    """Call a function on a worker now; as `answer`."""
+    """Call a function on a worker now, and return its result. Errors are those of `answer`."""
     future = submit(client, address, function, *arguments)
     try:
         return await answer(future)
@@ -48,11 +48,14 @@ async def call(client: Client, address: str, function: Callable[..., _T], *argum
 
 
 async def answer(future: "Future[_T]") -> _T:
-    """The result of a task. Refused if it raises, Cut if nobody will answer; a dead worker never answers."""
+    """The result of a task. Raises Refused if the task raises, Cut if the scheduler dropped it.
+
+    If the worker is dead, this never returns.
+    """
     try:
         return cast("_T", await future)
     except KilledWorker:
-        await asyncio.Event().wait()  # the worker is gone, which is noticed elsewhere
+        await asyncio.Event().wait()  # the worker is gone; other code notices that
         raise
     except FutureCancelledError:
         raise Cut("the scheduler dropped its work") from None

@@ -1,7 +1,7 @@
 """The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
 
-It receives pieces from its host over the connection FD, and sends ids of finished experiments, then the
-result. It is separate from the host so that no run can kill the worker.
+It receives pieces from its host over the connection FD. It sends the id of each finished experiment, then the
+result of the piece. Because it is separate from the host, no run can kill the worker.
 """
 
 import os
@@ -40,7 +40,7 @@ from mutator.verification.preflight_rules import look
 
 
 class Unlike(Exception):
-    """A golden run differs from the campaign's."""
+    """A golden run made here differs from the campaign's."""
 
 
 class PieceRunner:
@@ -59,12 +59,13 @@ class PieceRunner:
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
-        """Run a piece; `tell` is called with each finished experiment. Unlike if the golden run differs
+        """Run a piece. Calls `tell` with each finished experiment; raises Unlike if the golden run differs
         here.
         """
         began = time.monotonic()
         experiments = piece.experiments()
-        for same in runs(self._site.manifest, experiments):  # compared with the golden run of its first
+        # a shared run is compared with the golden run of its first experiment
+        for same in runs(self._site.manifest, experiments):
             if (key := self._golden_of(same[0]).key) not in self._alike:
                 self._have_golden(key)
         runner = self._runner(piece.kind)
@@ -109,7 +110,7 @@ class PieceRunner:
         return self._runners[kind]
 
     def _have_golden(self, key: str) -> None:
-        """Get a golden run, new or from the cache; Unlike unless its bytes are the campaign's."""
+        """Make a golden run or copy it from the cache. Unlike if its bytes differ from the campaign's."""
         golden, known = self._site.goldens[key]
         place = self._goldens / key
         self._goldens.mkdir(exist_ok=True)
@@ -119,7 +120,7 @@ class PieceRunner:
         self._alike.add(key)
 
     def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
-        """Make a golden run in the folder `place`; Unlike if it differs from the campaign's."""
+        """Make a golden run in the folder `place`. Unlike if it differs from the campaign's."""
         site = self._site
         engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
         job = Job(
@@ -184,7 +185,7 @@ def _serve(connection: Connection, runner: PieceRunner) -> None:
 
 
 def _refuse(connection: Connection, err: Exception) -> None:
-    """Answer the first piece with the reason why none can run here."""
+    """Answer the first piece with the reason why no piece can run here."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))
@@ -194,7 +195,7 @@ def _refuse(connection: Connection, err: Exception) -> None:
 def main() -> int:
     """Run pieces until the host closes the connection, or report why that is impossible."""
     connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # for the host to handle
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host handles these signals
     try:
         with raising_disk_full(site.place):
             runner = PieceRunner(site, name, os.getppid())

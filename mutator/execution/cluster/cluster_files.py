@@ -1,6 +1,7 @@
-"""Cluster files: the kind of cluster to start for a run, its number of workers, and its options.
+"""Cluster files: which kind of cluster to start for a run, how many workers, and the cluster's options.
 
-The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes; a file never names what to import.
+The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes. A file cannot name other code to
+import.
 """
 
 import difflib
@@ -39,7 +40,7 @@ _CLASSES = {
     "lsf": ("dask_jobqueue", "LSFCluster"),
     KUBERNETES: ("dask_kubernetes.operator", "KubeCluster"),
 }
-# Options not allowed in a file: those that are set here, and those that name Python objects.
+# Options that a file may not set: those set by this module, and those that name Python objects.
 RESERVED = (
     "asynchronous",
     "config_name",
@@ -71,14 +72,14 @@ class ClusterModel(StrictModel, title="A cluster file"):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ClusterFile:
-    """A checked cluster file; the class checks the names of its options."""
+    """A checked cluster file. The cluster's class checks the names of the options."""
 
     model: ClusterModel
     source: Source
 
     @asynccontextmanager
     async def open(self, *, insecure: bool) -> AsyncIterator["Client"]:
-        """As in `Where`: starts the cluster, and ends it with all its jobs or pods."""
+        """Start the cluster, as in `Where`; on exit, end it with all its jobs or pods."""
         if not insecure:
             self._check_closed()
         cluster_class = _class(self.model.kind)
@@ -94,7 +95,7 @@ class ClusterFile:
             try:
                 await self._started(cluster, insecure, problems)
             except BaseException:
-                with suppress(Exception):  # the cause is known
+                with suppress(Exception):  # the cause is already known
                     await cluster.close()
                 _delete_keys(cluster)
                 raise
@@ -106,7 +107,7 @@ class ClusterFile:
                 _delete_keys(cluster)
 
     async def _started(self, cluster: Any, insecure: bool, problems: list[Exception]) -> None:
-        """Wait for scheduler and jobs; jobs that the system refuses are added to `problems`."""
+        """Wait for the scheduler and the jobs. Errors of jobs that the system refuses go to `problems`."""
         with self._blamed():
             await cluster
         if not insecure and not is_closed(cluster.scheduler_address):
@@ -117,7 +118,7 @@ class ClusterFile:
             await cluster
             if problems:
                 raise problems[0]
-        if self.model.kind != KUBERNETES:  # there the operator does it
+        if self.model.kind != KUBERNETES:  # on Kubernetes, the operator does this
             cluster.adapt(minimum=workers, maximum=workers, interval=_RENEWED_EVERY)
 
     def _check_closed(self) -> None:
@@ -135,7 +136,7 @@ class ClusterFile:
         raise refused(what, where=self.source.path, line=self.source.line(("options",)))
 
     def _check_options(self, cluster_class: type) -> None:
-        """Raise MutatorError for an option that the class lacks or that a file may not set."""
+        """Raise MutatorError for an option that the class does not have, or that a file may not set."""
         known = set(_parameters(cluster_class)) - _NO_OPTIONS
         for name, value in self.model.options.items():
             if name not in known:
@@ -159,7 +160,7 @@ class ClusterFile:
             )
 
     def _options(self) -> dict[str, Any]:
-        """The arguments of the class: one thread for each worker, a dashboard for this machine only."""
+        """The arguments of the class: one thread per worker, and a dashboard only for this machine."""
         options = dict(self.model.options)
         if self.model.kind == KUBERNETES:
             from tornado.ioloop import IOLoop
@@ -176,9 +177,7 @@ class ClusterFile:
 
     @contextmanager
     def _blamed(self) -> Iterator[None]:
-        """Report the class's complaints about options, and the queueing system's about a job, as errors of
-        the file.
-        """
+        """Turn complaints of the class about options, and of the queueing system about a job, into errors."""
         try:
             yield
         except FileNotFoundError as error:
@@ -202,7 +201,7 @@ def load_cluster(path: Path) -> ClusterFile:
 
 
 def _noting(job_class: Any, problems: list[Exception]) -> type:
-    """A class of jobs that notes failed submissions, which Dask would only log."""
+    """A class of jobs that keeps the errors of failed submissions, which Dask only logs."""
 
     from distributed import Status
 
@@ -218,18 +217,20 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
 
 
 def _delete_keys(cluster: Any) -> None:
-    """Delete the files of `security: true`: Dask does so when the cluster is collected, perhaps never."""
+    """Delete the files of `security: true`. Dask deletes them only on garbage collection, which may never
+    come.
+    """
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):
             file.close()
 
 
 def _class(kind: str) -> Any:
-    """The class that starts clusters of a kind; MutatorError if its extra is not installed."""
+    """The class that starts clusters of this kind; MutatorError if its extra is not installed."""
     module, name = _CLASSES[kind]
     original = signal.signal
     try:
-        # importing dask_jobqueue sets a handler of Ctrl-C, which fails in a thread
+        # importing dask_jobqueue sets a Ctrl-C handler, which fails in a thread
         signal.signal = lambda *_: None
         with importing(KUBERNETES if kind == KUBERNETES else "cluster"):
             return getattr(importlib.import_module(module), name)

@@ -1,4 +1,4 @@
-"""Connect to Dask schedulers: allowed networks, and the errors of failed connections."""
+"""Connect to Dask schedulers: which networks are allowed, and why a connection failed."""
 
 import asyncio
 import ipaddress
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from distributed import Client, Security
     from distributed.deploy.cluster import Cluster
 
-CONNECT_S = 10.0  # before a silent scheduler is given up
+CONNECT_S = 10.0  # before giving up on a silent scheduler
 _ADDRESS = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
@@ -28,9 +28,9 @@ _TO_CLOSE = (
 
 
 def checked_address(address: str, *, where: Path | None = None) -> str:
-    """The address of a scheduler, as it is; MutatorError for what is none.
+    """Return the scheduler's address unchanged; MutatorError if it is not a valid address.
 
-    `where` is the file that it was read from.
+    `where` is the file that the address was read from.
     """
     found = _ADDRESS.fullmatch(address)
     if found and 0 < int(found["port"]) < 2**16:
@@ -44,16 +44,16 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Whether nobody else can read or join: over TLS, or on this machine only.
+    """Whether nobody else can read the traffic or join, because it uses TLS or stays on this machine.
 
-    Host names are not looked up; this machine's is `localhost`.
+    Host names are not looked up, except that `localhost` is this machine.
     """
     found = _ADDRESS.fullmatch(address)
     return found is not None and (found["protocol"] == "tls" or is_loopback(found["host"]))
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host's name or number means this machine."""
+    """Whether a host name or number means this machine."""
     try:
         return host == "localhost" or ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -61,7 +61,7 @@ def is_loopback(host: str) -> bool:
 
 
 def refused(what: str, *, where: Path | None = None, line: int | None = None) -> MutatorError:
-    """The error (not raised) of a network on which others can reach the scheduler."""
+    """Make (not raise) the error for a network on which others can reach the scheduler."""
     return MutatorError(
         f"{what}, which is neither on the loopback nor encrypted",
         where=where,
@@ -88,8 +88,8 @@ def importing(extra: str) -> Iterator[None]:
 def own_scheduler() -> Iterator[None]:
     """Dask settings for a scheduler in this process.
 
-    A frozen worker is noticed within a minute, Dask does not spend CPU time on watching its threads, and the
-    dashboard's link is for this machine only, the only one it answers.
+    A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
+    dashboard's link uses this machine's own address, the only one that it answers on.
     """
     import dask
 
@@ -104,7 +104,7 @@ def own_scheduler() -> Iterator[None]:
 
 
 def certificates() -> "Security":
-    """TLS from Dask's configuration (`distributed.comm.tls`); MutatorError unless it is usable."""
+    """TLS settings from Dask's configuration (`distributed.comm.tls`); MutatorError if unusable."""
     from distributed import Security
 
     remedy = (
@@ -125,7 +125,7 @@ def certificates() -> "Security":
 
 @asynccontextmanager
 async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncIterator["Client"]:
-    """An asynchronous client of a scheduler or cluster; MutatorError if it does not answer in time."""
+    """Connect an asynchronous client to a scheduler or cluster; MutatorError after a time limit."""
     from distributed import Client
 
     address = to if isinstance(to, str) else to.scheduler_address
@@ -154,9 +154,10 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
 
 
 async def _reason(address: str, error: BaseException) -> str:
-    """The reason, from the innermost error, since Dask only reports how long it tried.
+    """The reason for a failed connection, from the innermost error. Dask itself only reports how long it
+    tried.
 
-    If its last try was cut short, that error says nothing, and one more try is made.
+    If Dask's last attempt was cut short, that error says nothing, so this makes one more attempt.
     """
     while error.__cause__ is not None:
         error = error.__cause__

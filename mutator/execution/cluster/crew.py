@@ -10,12 +10,12 @@ from mutator._common.text import counted
 from mutator._common.version import VERSION
 from mutator.store.stretches import Stretch, differences
 
-_RECENT = 20  # pieces that a worker's rate is measured over
+_RECENT = 20  # finished pieces used to measure a worker's rate
 
 
 @dataclass
 class _Member:
-    """An admitted worker: its machine, and when it finished how many experiments."""
+    """An admitted worker: its machine, and how many experiments it finished when."""
 
     host: str
     finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -31,7 +31,7 @@ class Crew:
 
     @property
     def packages(self) -> list[str]:
-        """The packages whose versions must equal the stretch's."""
+        """The packages whose versions must equal those of the stretch."""
         return sorted(self._stretch.packages)
 
     def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
@@ -47,8 +47,9 @@ class Crew:
         self.refused[name] = why
 
     def objection(self, facts: Mapping[str, Any]) -> str:
-        """Why a worker may not take part: anything that would keep its machine from resuming the run, else
-        empty.
+        """Why a worker may not take part; empty if it may.
+
+        The reasons are those for which its machine could not resume the run.
         """
         if facts["mutator"] != VERSION:
             return f"mutator {facts['mutator']}, here {VERSION}"
@@ -56,12 +57,12 @@ class Crew:
         return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
 
     def finished(self, name: str, count: int) -> None:
-        """Note that a worker finished so many experiments."""
+        """Note that a worker finished this many experiments."""
         if name in self._present:
             self._present[name].finished.append((self._now(), count))
 
     def told(self) -> str:
-        """`3 workers on alpha 2.4 a second, beta 0.9 a second`."""
+        """A summary: `3 workers on alpha 2.4 a second, beta 0.9 a second`."""
         hosts: dict[str, list[float | None]] = {}
         for member in self._present.values():
             hosts.setdefault(member.host, []).append(self._per_s(member))
@@ -80,7 +81,7 @@ class Crew:
 
 
 def describe(name: str, facts: Mapping[str, Any]) -> str:
-    """A worker, for people: its name and, as far as known, its machine, processor and versions."""
+    """Describe a worker in messages: its name and, if known, its machine, processor and versions."""
     if not facts:
         return name
     parts = (facts["host"], facts["cpu"] or facts["platform"], facts["python"], f"mutator {facts['mutator']}")

@@ -1,7 +1,7 @@
 """Functions that the command submits to Dask workers by reference.
 
-A worker takes part in a run through a task outside the thread pool that lasts as long as the run (`attend`).
-When that task ends, everything of the run on the worker ends. Each piece is a separate task.
+For each run, a worker runs a task outside the thread pool (`attend`) that lasts as long as the run. When that
+task ends, everything of the run on this worker ends. Each piece is a separate task.
 """
 
 import platform
@@ -20,14 +20,14 @@ from mutator.campaigns import machine
 from mutator.errors import MutatorError
 from mutator.execution.cluster.host import Host, Wanted
 
-_PATIENCE_S = 60.0  # for the run to exist when its first piece comes
+_PATIENCE_S = 60.0  # time for the run to be delivered before its first piece
 
 _hosts: dict[str, Host] = {}  # by run
 _arrived = threading.Condition()
 
 
 def facts(packages: Iterable[str]) -> dict[str, Any]:
-    """What this worker computes with, as in a stretch of work, including versions of these packages."""
+    """What this worker computes with, including the versions of these packages, as in a stretch of work."""
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
@@ -40,7 +40,7 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
 
 
 def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
-    """Unpack the bundle of a run; MutatorError if damaged."""
+    """Unpack the bundle of a run; MutatorError if it is damaged."""
     if sha256(bundle).hexdigest() != digest:
         raise MutatorError("another bundle arrived than was sent", remedy="check the network")
     host = Host.lay_out(bundle, get_worker().local_directory, name)
@@ -50,19 +50,19 @@ def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
 
 
 def attend(run: str) -> None:
-    """Take part in a run until the command releases this task, or is gone."""
+    """Take part in a run until the command releases this task or is gone."""
     host, wanted = _hosts[run], _wanted()
     secede()
     try:
         host.attend(wanted)
     finally:
         with _arrived:
-            if _hosts.get(run) is host:  # the run may have returned meanwhile
+            if _hosts.get(run) is host:  # the run may have been delivered again meanwhile
                 del _hosts[run]
 
 
 def leave(run: str) -> None:
-    """Leave a run, and wait until everything it had here is gone."""
+    """Leave a run, and wait until everything of it on this worker is gone."""
     if (host := _hosts.get(run)) is not None:
         host.end()
 

@@ -23,11 +23,11 @@ class ClusterWorkers:
         self._where, self._insecure = where, insecure
 
     def run(self, session: Session) -> None:
-        """Distribute the pending work in another thread, so that a signal finds this one idle."""
+        """Distribute the pending work in another thread, so that signals reach this one while it is idle."""
         remarks: queue.Queue[str] = queue.Queue()
         loop = asyncio.new_event_loop()
         deal = loop.create_task(self._deal(session, remarks.put))
-        # not by joining: in CPython 3.11 and 3.12 a thread counts as ended once Ctrl-C interrupts its join
+        # no join: in CPython 3.11 and 3.12 a thread counts as ended once Ctrl-C interrupts its join
         over = threading.Event()
         thread = threading.Thread(target=_run, args=(loop, deal, over), name="cluster")
         thread.start()
@@ -39,7 +39,7 @@ class ClusterWorkers:
             with suppress(RuntimeError):  # the loop has just closed
                 loop.call_soon_threadsafe(deal.cancel)
             over.wait()
-            if not isinstance(err, KeyboardInterrupt):  # if warnings are errors
+            if not isinstance(err, KeyboardInterrupt):  # in case warnings are errors
                 raise
             session.interrupted = True
         if not deal.cancelled() and (error := deal.exception()) is not None:
@@ -53,7 +53,7 @@ class ClusterWorkers:
 
 def _run(loop: asyncio.AbstractEventLoop, deal: "asyncio.Task[None]", over: threading.Event) -> None:
     try:
-        with suppress(BaseException):  # the waiter on the task gets it
+        with suppress(BaseException):  # whoever waits for the task gets the error
             loop.run_until_complete(deal)
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.run_until_complete(loop.shutdown_default_executor())

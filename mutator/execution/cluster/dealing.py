@@ -1,7 +1,7 @@
 """Distribute work through Dask, which carries the bytes and knows which workers are present.
 
-The board decides which worker does what: each task names its worker, a worker has at most two tasks per
-thread, and a finished task is released at once.
+The board decides which worker runs which piece. Each task names its worker. A worker has at most two tasks
+per thread. A finished task is released immediately.
 """
 
 import asyncio
@@ -29,9 +29,9 @@ from mutator.verification import equivalence
 _LOOK_S = 0.5  # between two checks of the present workers
 _ALONE_S = 60.0  # without any worker, before the command gives up
 _AHEAD = 2  # pieces per thread of a worker: one waits while the other runs
-_FAILURES = 3  # of a worker in a row, before it gets no more work
+_FAILURES = 3  # consecutive failures after which a worker gets no more work
 _PAUSE_S = 0.1  # before an idle worker asks again
-_PART_S = 5.0  # for workers to drop the run
+_PART_S = 5.0  # time for workers to drop the run
 _PATIENCE_S = 30.0  # with a silent scheduler
 
 
@@ -46,20 +46,19 @@ class _Tended:
     name: str
     address: str
     slots: int
-    lease: "Future[None] | None" = None  # the task that is its part in the run
+    lease: "Future[None] | None" = None  # the task that represents the worker's part in the run
     task: "asyncio.Task[None] | None" = None
     has: dict[int, Piece] = field(default_factory=dict)
     is_cut: bool = False  # to be admitted again
-    failures: int = 0  # since it last finished something
+    failures: int = 0  # since its last finished piece
     ailment: str = ""  # reason of the last failure
-    facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted
+    facts: Mapping[str, Any] = field(default_factory=dict)  # until they are noted in run.json
 
 
 class Deal:
     """Distributes the work of a session to the workers of a scheduler.
 
-    `remark` is called with messages for people; `queued` is how many workers will come in time, None if
-    unknown.
+    `remark` is called with messages for the user. `queued` is how many workers are expected; None if unknown.
     """
 
     def __init__(
@@ -107,7 +106,7 @@ class Deal:
             self._intake.close()
 
     async def _part(self) -> None:
-        """Tell the workers to drop the run; silent ones drop it once the client is gone."""
+        """Tell the workers to drop the run. Any that do not answer drop it once the client is gone."""
         present = [one for one in self._tended.values() if one.lease is not None]
         parting = [call(self._client, one.address, dask_side.leave, self._run) for one in present]
         with suppress(TimeoutError):
@@ -147,11 +146,11 @@ class Deal:
             self._tended[key] = one
         for one in self._tended.values():
             if one.task is not None and one.task.done():
-                one.task.result()  # raises what ended everything
+                one.task.result()  # raises the error that ended this worker's part
         self._check_left()
 
     async def _mourn(self, one: _Tended) -> None:
-        """Handle a lost worker. Its running pieces may be the cause; waiting ones are not."""
+        """Handle a lost worker. A piece that it was running may be the cause; a waiting piece cannot be."""
         assert one.task is not None
         one.task.cancel()
         await asyncio.gather(one.task, return_exceptions=True)
@@ -178,7 +177,7 @@ class Deal:
     def _drop_needless_proof(self) -> None:
         """Drop the proof once everything ran and nothing was forked."""
         if self._board.ran_all and self._session.proof and not self._forked:
-            self._forked = True  # computed once
+            self._forked = True  # so that this is computed only once
             if equivalence.needless(self._session.folder) is not None:
                 self._board.drop_proof()
 
@@ -257,10 +256,10 @@ class Deal:
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
         """Handle a piece that is done for the first time."""
-        if one.facts:  # its first results: run.json must name their origin
+        if one.facts:  # before its first results are written, run.json must name the worker
             self._session.note_machine({"worker": one.name, **one.facts})
             one.facts = {}
-        for other in self._tended.values():  # the piece was not the cause
+        for other in self._tended.values():  # the piece ran here, so it did not cause the failures elsewhere
             other.failures += other.name in piece.died_at and other is not one
         self._forked |= result.forked
         self._crew.finished(one.name, len(piece.lines))
@@ -273,7 +272,7 @@ class Deal:
             await self._write(self._intake.give_up, given_up, f"{what} twice: {result.text}")
 
     async def _write(self, function: Callable[[Piece, Any], None], piece: Piece, what: Any) -> None:
-        """Write into the run folder, one write at a time. A write that has begun is finished."""
+        """Write into the run folder, one write at a time. Cancellation does not interrupt a write."""
 
         async def in_turn() -> None:
             async with self._writing:
@@ -286,7 +285,7 @@ class Deal:
 
 
 def _read(data: bytes, piece: Piece) -> Result:
-    """The result of a piece; a damaged one counts as missing."""
+    """The result of a piece. Damaged data counts as a piece that could not run there."""
     try:
         return Result.of(data)
     except MutatorError as err:

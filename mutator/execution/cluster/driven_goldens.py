@@ -1,7 +1,7 @@
 """Cached golden runs that this machine made for earlier campaigns.
 
-An entry is found by everything that a golden run depends on: sources, scenario, seed, limits, and the
-machine's software. Its bytes are compared with the campaign's digest like those of a new run.
+An entry's key covers everything that a golden run depends on: sources, scenario, seed, limits, and the
+machine's software. Cached bytes are compared with the campaign's digest, like those of a new run.
 """
 
 import platform
@@ -35,9 +35,7 @@ class DrivenGoldens:
         ]
 
     def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
-        """Copy a golden run to `to`. False, with nothing there, unless one with the digest `known` is
-        cached.
-        """
+        """Copy the golden run to `to`; False, without `to`, if none with digest `known` is cached."""
         with suppress(OSError):
             kept_folders.fetch(self._entry(golden), to)
             if digest_of(self._site.manifest, to) == known:
@@ -46,7 +44,7 @@ class DrivenGoldens:
         return False
 
     def keep(self, golden: GoldenRun, out: Path) -> None:
-        """Cache the golden run in the folder `out`; an unwritable cache is ignored."""
+        """Cache the golden run in the folder `out`. If the cache is not writable, do nothing."""
         kept_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
 
     def _entry(self, golden: GoldenRun) -> Path:

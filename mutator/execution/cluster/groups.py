@@ -1,4 +1,4 @@
-"""The pending work of a run folder by golden run, read from the plan on demand."""
+"""The pending work of a run folder, grouped by golden run. Plan lines are read on demand."""
 
 import json
 from collections import deque
@@ -12,9 +12,9 @@ from mutator.execution.cluster.pieces import Piece
 from mutator.store import plan_file
 from mutator.store.run_folder import RunFolder
 
-_OF_A_RUN = ("fault", "trigger", "seed")  # equal in experiments that share a run
+_OF_A_RUN = ("fault", "trigger", "seed")  # equal for experiments that share a run
 
-Run = dict[str, bytes]  # lines of the plan by experiment id: a run, and those that share it
+Run = dict[str, bytes]  # plan lines of the experiments that share one run, by experiment id
 Faults = Mapping[str, bytes]  # lines of the plan's faults by id
 
 
@@ -24,7 +24,7 @@ class Group:
 
     golden: str
     runs: Iterator[Run]
-    left: int  # experiments not yet cut off
+    left: int  # experiments not yet put into a piece
     again: deque[Piece] = field(default_factory=deque)  # returned pieces
 
     @property
@@ -33,7 +33,7 @@ class Group:
 
 
 def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> dict[str, Group]:
-    """The pending work by golden run. A chunk has one."""
+    """The pending work by golden run. All experiments of a chunk have the same one."""
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
         first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
@@ -45,7 +45,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """Yield the rest of these chunks run by run, with sharing experiments together."""
+    """Yield the rest of these chunks run by run. Experiments that share a run come together."""
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
         read = [(_read(lines[place]), lines[place]) for place in one.places]

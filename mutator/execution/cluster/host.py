@@ -1,7 +1,7 @@
-"""A worker's side of a run: its bundle on the disk, and the processes that run its pieces.
+"""A worker's side of a run: the bundle on its disk, and the processes that run its pieces.
 
-One thread attends a host throughout. It starts the processes, and the kernel kills them when the thread ends.
-The host's folder is then deleted. Other threads pass it pieces.
+One thread attends a host for the whole run and starts the processes. When that thread ends, the kernel kills
+the processes, and the host's folder is deleted. Other threads pass pieces to the host.
 """
 
 import os
@@ -28,7 +28,7 @@ from mutator.execution.worker import dying_python
 
 _LOOK_S = 0.25  # between two checks whether the work is still wanted
 _END_S = 5.0
-_START_S = 60.0  # for a process to begin its first piece
+_START_S = 60.0  # time for a process to begin its first piece
 _CHILD = "mutator.execution.cluster.child"
 
 Wanted = Callable[[], bool]
@@ -46,7 +46,7 @@ class _Child:
     connection: Connection
 
     def run(self, data: bytes, piece: Piece, patience_s: float, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted as soon as nobody waits for it; the process is then unusable."""
+        """Run a piece. Raises NotWanted once nobody waits for it; the process is then unusable."""
         finished: set[str] = set()
         try:
             result = self._answer(data, patience_s, wanted, finished)
@@ -59,7 +59,7 @@ class _Child:
         return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
 
     def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """Its answer about a piece; notes finished experiments. TimeoutError after so much silence."""
+        """The process's result for a piece; fills `finished`. TimeoutError after `patience_s` of silence."""
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
@@ -74,7 +74,7 @@ class _Child:
         raise TimeoutError
 
     def end(self) -> None:
-        """Kill it; what it started dies with it."""
+        """Kill the process. Everything that it started dies with it."""
         self.connection.close()
         self.process.kill()
         self.process.wait()
@@ -88,7 +88,7 @@ class _Child:
 
 @dataclass
 class Host:
-    """A worker's part of one run. `name` is the worker's, in the timings of its experiments."""
+    """A worker's part in one run. `name` is the worker's name in the timings of its experiments."""
 
     folder: Path
     name: str
@@ -96,13 +96,15 @@ class Host:
     _idle: list[_Child] = field(default_factory=list)
     _orders: "queue.Queue[queue.Queue[_Child | Exception]]" = field(default_factory=queue.Queue)
     _lock: threading.Lock = field(default_factory=threading.Lock)
-    _ended: bool = False  # no process is lent any more
+    _ended: bool = False  # if set, no process is started or reused
     _leaving: bool = False
     _gone: threading.Event = field(default_factory=threading.Event)
 
     @classmethod
     def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """A host for the bundle `data` in a new folder of `place`; MutatorError if it is damaged."""
+        """Make a host for the bundle `data` in a new folder of `place`; MutatorError if the bundle is
+        damaged.
+        """
         with raising_disk_full(Path(place)):
             Path(place).mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
@@ -115,7 +117,7 @@ class Host:
         return cls(folder, name, patience_s)
 
     def attend(self, wanted: Wanted) -> None:
-        """Start processes on request until the host is no longer wanted; then end all."""
+        """Start processes on request until the host is no longer wanted, then end all of them."""
         try:
             while wanted() and not self._leaving:
                 with suppress(queue.Empty):
@@ -140,7 +142,7 @@ class Host:
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted once nobody waits for it; MutatorError if it is damaged."""
+        """Run a piece. NotWanted once nobody waits for it; MutatorError if the piece is damaged."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()
@@ -160,7 +162,7 @@ class Host:
                 child.end()
 
     def _borrowed(self) -> _Child:
-        """An idle process, or a new one; NotWanted once none are started."""
+        """An idle process or a new one; NotWanted if the host has ended."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()
@@ -175,7 +177,7 @@ class Host:
         raise NotWanted
 
     def _started(self) -> _Child:
-        """A new process, which dies with this thread."""
+        """Start a process that dies with this thread."""
         ours, its = socket.socketpair()
         try:
             words = ["-m", _CHILD, str(its.fileno()), str(self.folder), self.name]
@@ -183,7 +185,7 @@ class Host:
                 [*dying_python(os.getpid()), *words],
                 pass_fds=[its.fileno()],
                 stdin=subprocess.DEVNULL,
-                start_new_session=True,  # a signal to the worker's terminal is for the worker
+                start_new_session=True,  # signals from the worker's terminal are for the worker only
             )
         except BaseException:
             ours.close()

@@ -1,4 +1,4 @@
-"""Write results of workers into the run folder."""
+"""Write the results of workers into the run folder."""
 
 import json
 from pathlib import Path
@@ -20,9 +20,9 @@ from mutator.verification import equivalence
 
 
 class Intake:
-    """Appends results to the run folder, like a worker on this machine. `name` makes its files its own.
+    """Appends results to the run folder, like a worker on this machine. `name` makes its file names unique.
 
-    Results are trusted: a worker that might compute differently gets no work.
+    Results are trusted, because a worker that might compute differently gets no work.
     """
 
     def __init__(self, folder: RunFolder, manifest: TargetManifest, name: str) -> None:
@@ -58,7 +58,7 @@ class Intake:
         self._records.extend(result.records)
 
     def give_up(self, piece: Piece, why: str) -> None:
-        """Note that the experiment of a piece has no result, and why."""
+        """Note that the experiment of a piece has no result, with the reason."""
         writer = self._records if piece.kind is Kind.RUN else self._proof_writer()
         for name in piece.lines:
             record = without_outcome(name, Status.HARNESS_ERROR, why)
@@ -81,7 +81,7 @@ class Intake:
         return self._proofs
 
     def _sync_blocks(self) -> None:
-        """Sync before records, since a stored record names patches that must survive a power cut."""
+        """Sync blocks before records, because a stored record names patches that must survive a power cut."""
         self._patches.sync()
         if self._series is not None:
             self._series.sync()

@@ -1,4 +1,4 @@
-"""Parcels: named bytes packed together, and verified when opened."""
+"""Parcels: named bytes packed together, and verified when unpacked."""
 
 import json
 from collections.abc import Mapping
@@ -10,14 +10,14 @@ _MARK, _DIGEST, _LENGTH = b"FIP1", 32, 4
 
 
 def pack(parts: Mapping[str, bytes]) -> bytes:
-    """Pack parts: the same bytes for the same parts in the same order."""
+    """Pack parts. The same parts in the same order result in the same bytes."""
     head = json.dumps([[name, len(data)] for name, data in parts.items()]).encode()
     body = b"".join((len(head).to_bytes(_LENGTH, "little"), head, *parts.values()))
     return b"".join((_MARK, sha256(body).digest(), body))
 
 
 def unpack(data: bytes) -> dict[str, bytes]:
-    """The parts of a parcel; MutatorError if it is damaged."""
+    """Unpack a parcel; MutatorError if it is damaged."""
     begin = len(_MARK) + _DIGEST
     view = memoryview(data)
     if data[: len(_MARK)] != _MARK or sha256(view[begin:]).digest() != data[len(_MARK) : begin]:

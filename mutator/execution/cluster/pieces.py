@@ -15,7 +15,7 @@ class Kind(StrEnum):
     """What to do with the experiments of a piece."""
 
     RUN = "run"
-    PROVE = "prove"  # run them on the reference engine, for the proof
+    PROVE = "prove"  # run them on the reference engine for the proof
 
 
 class Ending(StrEnum):
@@ -23,17 +23,17 @@ class Ending(StrEnum):
 
     DONE = "done"
     UNLIKE = "unlike"  # the worker's golden run differs from the campaign's
-    UNFIT = "unfit"  # it lacks room, memory, files, processes, or something that the target needs
-    DIED = "died"  # the process that runs pieces ended during it
-    FAILED = "failed"  # by a defect of the harness
+    UNFIT = "unfit"  # the worker lacks room, memory, files, processes, or something that the target needs
+    DIED = "died"  # the process that ran the piece ended
+    FAILED = "failed"  # a defect of the harness
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Piece:
-    """Experiments for one worker, most of them with the golden run `golden`.
+    """Experiments for one worker, usually with the golden run `golden`.
 
-    `lines` are those of the plan, by experiment id, in plan order; `faults` the lines of their faults. A
-    shared run stays in one piece.
+    `lines` are plan lines by experiment id, in plan order. `faults` are the lines of their faults.
+    Experiments that share a run stay in one piece.
     """
 
     number: int
@@ -41,22 +41,22 @@ class Piece:
     golden: str
     lines: Mapping[str, bytes]
     faults: tuple[bytes, ...]
-    runs: int = 1  # of its experiments: several may share one
-    died_at: tuple[str, ...] = ()  # workers that it killed
+    runs: int = 1  # runs in this piece; several experiments may share one
+    died_at: tuple[str, ...] = ()  # workers that this piece killed
 
     @property
     def ids(self) -> tuple[str, ...]:
         return tuple(self.lines)
 
     def packed(self) -> bytes:
-        """The bytes for the worker."""
+        """The bytes to send to the worker."""
         head = {"number": self.number, "kind": self.kind, "golden": self.golden, "ids": self.ids}
         parts = {"head": json.dumps(head).encode(), "plan": b"\n".join(self.lines.values())}
         return pack(parts | {"faults": b"\n".join(self.faults)})
 
     @classmethod
     def of(cls, data: bytes) -> "Piece":
-        """Unpack a piece; MutatorError if damaged."""
+        """Unpack a piece; MutatorError if it is damaged."""
         parts = unpack(data)
         head = json.loads(parts["head"])
         return cls(
@@ -68,16 +68,17 @@ class Piece:
         )
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """Its experiments; MutatorError for a line that does not match its id."""
+        """The piece's experiments; MutatorError if a line does not match its id."""
         faults = {fault.id: fault for fault in (plan_file.fault_from(json.loads(f)) for f in self.faults)}
         return tuple(plan_file.experiment_from(json.loads(line), faults) for line in self.lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The result of a piece. `text` says why it is not done, and `at` which experiment was running.
+    """The result of a piece. If it is not done, `text` says why, and `at` names the experiment that was
+    running.
 
-    `records` and `timings` are lines of the run folder's files without checksums; `patches` and `series` are
+    `records` and `timings` are lines of the run folder's files without checksums. `patches` and `series` are
     blocks of its files.
     """
 
@@ -96,14 +97,14 @@ class Result:
     _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 
     def packed(self) -> bytes:
-        """The bytes for the command."""
+        """The bytes to send to the command."""
         head = {name: getattr(self, name) for name in self._HEAD}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
         return pack(parts | {"records": _joined(self.records), "timings": _joined(self.timings)})
 
     @classmethod
     def of(cls, data: bytes) -> "Result":
-        """Unpack a result; MutatorError if damaged."""
+        """Unpack a result; MutatorError if it is damaged."""
         parts = unpack(data)
         head: dict[str, Any] = json.loads(parts["head"])
         return cls(

@@ -1,7 +1,7 @@
-"""`WHERE` of a run on a cluster, and the Dask client for it.
+"""Parse `WHERE` of a run on a cluster, and open a Dask client for it.
 
-`parse` is fast and does not import Dask. Users write the address of a scheduler, the file that it wrote,
-`local:N`, or a cluster file that says what to start.
+`parse` is fast and does not import Dask. `WHERE` is a scheduler's address, the file that a scheduler wrote,
+`local:N`, or a cluster file.
 """
 
 import json
@@ -32,17 +32,18 @@ _LOCAL = re.compile(r"local:(\d{1,4})")
 
 
 class Where(Protocol):
-    """A usable cluster. `open` returns an asynchronous Dask client, in a running event loop.
+    """A usable cluster. `open` returns an asynchronous Dask client and needs a running event loop.
 
-    What `open` starts ends with it; an existing scheduler stays. MutatorError if there is no such cluster,
-    the extra is not installed, or, unless `insecure`, others on the network can reach it.
+    On exit, `open` ends what it started; an existing scheduler keeps running. Raises MutatorError if the
+    cluster does not exist or the extra is not installed. Unless `insecure`, it also raises it if others on
+    the network can reach the cluster.
     """
 
     def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
 
 
 def parse(text: str) -> Where:
-    """The meaning of `WHERE`; MutatorError for an invalid text or file."""
+    """Parse `WHERE`; MutatorError for an invalid text or file."""
     if "://" in text:
         return Scheduler(address=checked_address(text))
     if match := _LOCAL.fullmatch(text):
@@ -84,7 +85,7 @@ def _scheduler_file(path: Path) -> "Scheduler":
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheduler:
-    """A running scheduler; `file` is where its address was read."""
+    """A running scheduler. `file` is the file that its address was read from."""
 
     address: str
     file: Path | None = None
@@ -104,7 +105,7 @@ class Scheduler:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Local:
-    """Worker processes of one thread each on this machine, with their own scheduler."""
+    """Worker processes on this machine, of one thread each, with their own scheduler."""
 
     workers: int
 
