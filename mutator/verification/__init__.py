@@ -1,2 +1,4 @@
-"""The conditions for valid results: preflight, equivalence check, library check, doctor. Changes no
-result."""
+"""The conditions for valid results: preflight, equivalence check, library check, doctor.
+
+This package changes no result.
+"""

@@ -1,7 +1,7 @@
-"""Audits a run folder: does everything in it follow from its content? Nothing is executed.
+"""Audit a run folder: check that everything in it follows from its content. Executes nothing.
 
-Digests and checksums come first, then content: ids and plan, golden runs, sources, trees and patches,
-verdicts, proof, tables. Each step lists all differences.
+Digests and checksums are checked first, then the content: ids and plan, golden runs, sources, trees and
+patches, verdicts, proof, tables. Each step lists all differences.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One step of an audit: what must hold, the number of items, and the differences."""
+    """One step of an audit: what must hold, the number of items checked, and the differences."""
 
     what: str
     count: int
@@ -42,7 +42,7 @@ class Check:
 
     @classmethod
     def of(cls, what: str, count: int, problems: Problems) -> "Check":
-        """A check with all problems found; a raised one comes last."""
+        """Collect all problems in a check. If `problems` raises an error, it comes last."""
         found = []
         try:
             for problem in problems:
@@ -55,14 +55,17 @@ class Check:
             TypeError,
             ValueError,
             AttributeError,
-        ) as err:  # damage
+        ) as err:  # damaged data
             found.append(MutatorError(f"{what}: cannot be checked ({type(err).__name__}: {err})"))
         return cls(what=what, count=count, differences=tuple(found))
 
 
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
-    """Audit a complete run folder. Without a `workspace`, or with other sources than the run's, trees and
-    patches cannot be compared, which is also a difference."""
+    """Audit a complete run folder.
+
+    Trees and patches are compared only with the run's own sources. If `workspace` is None or has other
+    sources, that is also a difference.
+    """
     head = folder.head
     here = Check.of("sources that are those of the run", len(head["sources"]), _sources(folder, workspace))
     manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
@@ -94,7 +97,7 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
 
 
 def _files(folder: RunFolder) -> int:
-    """The number of files with digests."""
+    """Check the files that have digests; return their number and the problems."""
     try:
         return len(digests.read(folder.path).names) if folder.verifiable else 0
     except MutatorError:
@@ -118,7 +121,9 @@ def _content(folder: RunFolder) -> Problems:
 
 
 def _plan(folder: RunFolder) -> Problems:
-    """Ids follow from the plan's lines, the digest from the ids, run.json and plan.csv from all."""
+    """Check that ids follow from the plan's lines, the digest from the ids, and run.json and plan.csv from
+    both.
+    """
     run, head = folder.path, folder.head
     yield from plan_file.problems(run)
     plan = load_plan(folder)
@@ -142,9 +147,9 @@ def _plan(folder: RunFolder) -> Problems:
 
 
 def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
-    """Every check passed, and the golden runs are the ones checked."""
+    """Check that every check passed, and that the golden runs are the ones checked."""
     path = folder.path / CHECKS
-    if not path.exists():  # not run yet
+    if not path.exists():  # no experiment has run yet
         return
     checks = read_json(path, CHECKS_SCHEMA)
     for result in checks["results"]:
@@ -159,7 +164,7 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
-    """Target, manifest, templates and scenarios are those of the plan."""
+    """Check that target, manifest, templates and scenarios are those of the plan."""
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(

@@ -1,4 +1,4 @@
-"""Audits records: do trees, patches and verdicts follow from the rest of the run?"""
+"""Audit records: check that trees, patches and verdicts follow from the rest of the run."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Recorded:
     record: Record
 
     def difference(self, got: str, expected: str) -> MutatorError:
-        """An inconsistency."""
+        """The error for an inconsistent record."""
         name = self.record.experiment_id
         return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
 
@@ -51,7 +51,7 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
                 KeyError,
                 TypeError,
                 ValueError,
-            ):  # a head, or damage reported elsewhere
+            ):  # a head, or damage that is reported elsewhere
                 continue
             if record.status is not Status.HARNESS_ERROR:
                 found.append(Recorded(path, number, record))
@@ -61,8 +61,10 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
 def mutants(
     folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
-    """Trees and patches that do not match mutants rebuilt for comparison; stored patches that are missing,
-    different, or belong to no experiment."""
+    """Yield trees and patches of records that differ from those of the rebuilt mutants.
+
+    Also yields stored patches that are missing, differ, or belong to no experiment.
+    """
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
@@ -91,7 +93,7 @@ def mutants(
 
 
 def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
-    """Digests of tree and patch of a mutant; empty for one that cannot be built."""
+    """Digests of a mutant's tree and patch; empty if the mutant cannot be built."""
     try:
         mutant = build(manifest, models, fault, trigger)
     except InvalidMutant:
@@ -102,7 +104,7 @@ def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger:
 def verdicts(
     head: Mapping[str, Any], records: Sequence[Recorded], manifest: TargetManifest | None
 ) -> Iterator[MutatorError]:
-    """Contradictory fields of records."""
+    """Yield fields of records that contradict each other, the head of the run, or the manifest."""
     tolerances = {channel.name: channel.tolerance for channel in manifest.compared} if manifest else {}
     for one in records:
         flaws = _flaws_of_end(one.record) if one.record.status is Status.OK else _flaws_of_bad_end(one.record)
@@ -151,7 +153,9 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
 
 
 def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
-    """Hazards and channels must be the target's, and differences beyond the tolerance must be manifested."""
+    """Hazards or channels that the target does not have, and differences beyond the tolerance without a
+    manifestation.
+    """
     strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
     if strangers:
         yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
@@ -167,8 +171,11 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
 
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
-    """Channels that left golden must be the target's and not after the drive; the first actuator among them
-    gives the manifestation time."""
+    """Flaws of the times at which channels left golden.
+
+    The channels must be the target's, and the times before the drive ended. The first actuator to leave
+    golden gives the manifestation time.
+    """
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY
@@ -196,7 +203,9 @@ def _in_order(events: Events, activation: Activation | None) -> bool:
 def proof(
     folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
 ) -> Iterator[MutatorError]:
-    """Records of the proof that differ from the run's or are not in its sample, and missing ones."""
+    """Yield problems of the proof: records that differ from the run's or are not in its sample, and missing
+    ones.
+    """
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}

@@ -1,4 +1,4 @@
-"""Audits series: are their files unchanged? No result depends on them."""
+"""Audit series: check that their files are unchanged. No result depends on them."""
 
 from collections.abc import Iterator
 
@@ -10,8 +10,10 @@ from mutator.store.series_packing import segments
 
 
 def series(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of series files, and their problems: damaged files, and missing ones that others need. A
-    folder without series is valid."""
+    """The number of series files, and their problems: damaged files, and missing files that others need.
+
+    A folder without series is valid.
+    """
     there = SeriesFolder(folder.path)
     return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there)
 
@@ -32,7 +34,7 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
 
 
 def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
-    """The problems of the index and the chunks."""
+    """Yield the problems of the index and the chunks."""
     run, path = folder.path, there.path / f"{INDEX}.js"
     try:
         index = there.index
@@ -40,7 +42,8 @@ def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
         yield err
         return
     if index is None:
-        if any(there.path.glob("*.js")) and not segments(run):  # else killed before the index was written
+        # otherwise, the run was killed before the index was written
+        if any(there.path.glob("*.js")) and not segments(run):
             what = "the index of the chunks beside it"
             yield MutatorError("missing", where=path, expected=what, remedy=putting_aside(run))
         return
@@ -63,7 +66,7 @@ def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:
 
 
 def _users(index: Index, chunk: str) -> list[str]:
-    """The experiments that need a chunk for their series or their golden run's."""
+    """The experiments that need a chunk for their own series or for the series of their golden run."""
     inside = {number for number, (name, _) in enumerate(index.places) if name == chunk}
     goldens = {key for key, number in index.goldens.items() if number in inside}
     return [

@@ -1,4 +1,4 @@
-"""Audits tables: rebuilds them from plan, records and timings, and compares."""
+"""Audit tables: rebuild them from plan, records and timings, and compare."""
 
 from collections.abc import Iterator
 from itertools import zip_longest
@@ -15,7 +15,10 @@ _REMEDY = "`mutator report` rebuilds it"
 
 
 def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of tables, and their differences. Missing tables are built when needed."""
+    """The number of tables, and their differences.
+
+    Missing tables are no difference, because they are built when needed.
+    """
     there = [name for name in results.TABLES if (folder.path / name).is_file()]
     return len(there), _differences(folder, there)
 
@@ -35,7 +38,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
 
 
 def _cells(path: Path, made: Path) -> Iterator[MutatorError]:
-    """The lines that differ, each with its first differing cell."""
+    """Yield the lines that differ, each with its first differing cell."""
     with _opened(path) as found, _opened(made) as wanted:
         for number, (got, expected) in enumerate(zip_longest(found, wanted), start=1):
             if got is None or expected is None:

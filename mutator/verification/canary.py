@@ -1,4 +1,6 @@
-"""The canary: a fault known to be harmful. It counts as harmless only after all of its values were tried."""
+"""The canary: a fault known to be harmful. It counts as harmless only if every value of its variant is
+harmless.
+"""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -43,16 +45,15 @@ def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) 
 def judge(
     experiments: Iterable[Experiment], run: Callable[[Experiment], CheckRun], hazard: str
 ) -> tuple[str, str]:
-    """The problem of a canary (empty: none) and the success message. Runs the experiments until one does
-    harm."""
+    """Run the experiments until one does harm; return the problem (empty: none) and the success message."""
     harmless: list[str] = []
     for experiment in experiments:
         value = fault_label("", experiment.fault.value, experiment.fault.unit).strip()
         try:
             result = run(experiment)
-            if result.problem:  # perhaps an outside cause: the message must not depend on it
+            if result.problem:  # retry, because the cause may lie outside; the message must not depend on it
                 result = run(experiment)
-        except MutatorError as error:  # this value does not build a mutant
+        except MutatorError as error:  # no mutant can be built with this value
             result = CheckRun(problem=error.got)
         if not result.problem and hazard in dict(result.hazards):
             others = f" with {value}, and not with {', '.join(harmless)}" if harmless else ""

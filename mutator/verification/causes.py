@@ -1,4 +1,4 @@
-"""Likely reasons why a target is not deterministic: lines observed in a run or found in the source."""
+"""Likely reasons why a target is not deterministic: lines noted in a run or found in the source."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -24,9 +24,9 @@ _UNKNOWN = (
 
 
 def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: bool) -> tuple[list[Place], str]:
-    """The most suspicious lines, likeliest first, and remedies.
+    """The most suspicious lines, likeliest first, and the remedies.
 
-    `by_hash` says that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
+    `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise. This points to set order
     or hashes. `watched` has the notes of a watched run.
     """
     noted = watched.get("noted", [])
@@ -42,7 +42,7 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
 
 
 def sets(manifest: TargetManifest) -> list[Place]:
-    """Where target files depend on the order of a set; files that may have faults first."""
+    """Lines of target files that depend on the order of a set. Files that may have faults come first."""
     found = []
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):
@@ -58,7 +58,7 @@ def of_kind(watched: Mapping[str, Any], kind: str) -> list[Place]:
 
 
 def place_of(noted: Mapping[str, Any]) -> Place:
-    """A line that a watched run noted."""
+    """The place of a line that a watched run noted."""
     via = f" by {noted['via']}" if noted["via"] else ""
     what = f"in {noted['function']}{via}: {noted['what']}"
     return Place(file=noted["file"], line=noted["line"], what=what)

@@ -1,4 +1,4 @@
-"""Finds where two supposedly identical runs first differ."""
+"""Find where two runs that should be identical first differ."""
 
 import json
 from pathlib import Path
@@ -13,8 +13,10 @@ from mutator.targets.manifest import TargetManifest
 
 
 def first_difference(manifest: TargetManifest, one: Path, other: Path) -> str:
-    """Channel, step, time and both values of the first difference between the traces in two output folders,
-    else the difference of the files; empty if there is none."""
+    """Describe the first difference between two output folders; empty if there is none.
+
+    For traces: channel, step, time and both values. If the traces agree, the difference of the files.
+    """
     for name in manifest.outputs:
         if no_pipe(one / name).read_bytes() != no_pipe(other / name).read_bytes():
             in_trace = name == manifest.trace_file

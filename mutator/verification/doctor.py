@@ -1,4 +1,4 @@
-"""Checks whether this machine can run campaigns, with one finding for each requirement."""
+"""Check whether this machine can run campaigns, with one finding for each requirement."""
 
 import fcntl
 import importlib.metadata
@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from mutator.workspace import Workspace
 
 OLDEST_PYTHON = (3, 11)
-LITTLE_DISK = 200e6  # bytes: about a hundred experiments with traces
-LITTLE_MEMORY = 1e9  # bytes: two controllers with their solvers, and the runner
+LITTLE_DISK = 200e6  # bytes; about a hundred experiments with traces
+LITTLE_MEMORY = 1e9  # bytes; two controllers with their solvers, and the runner
 
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
-    """Check interpreter, packages, machine, current folder, child processes, library and target. The target
-    is loaded to see whether it can be forked.
+    """Check interpreter, packages, machine, current folder, child processes, library and targets.
 
-    `workspace` may be the error from looking for it, which becomes a finding.
+    Each target is loaded to see whether it can be forked. `workspace` may be the error from looking for it,
+    which becomes a finding.
     """
     findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
     if isinstance(workspace, MutatorError):
@@ -53,7 +53,7 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Each package that mutator requires (not its extras), present in an allowed version."""
+    """Check that each package that mutator requires (extras excluded) is present in an allowed version."""
     for line in importlib.metadata.requires("mutator") or ():
         wanted = Requirement(line)
         if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
@@ -90,7 +90,7 @@ def _disk() -> Finding:
 
 
 def _folder() -> Finding:
-    """Run folders must be writable, on a file system with locks."""
+    """Check that run folders are writable, and that their file system supports locks."""
     here = Path.cwd()
     try:
         with tempfile.TemporaryFile(dir=here) as file:

@@ -1,4 +1,4 @@
-"""Finds unused draws: faults that differ only in name, and parameters without effect."""
+"""Find unused draws, whose faults differ only in name, and parameters without effect."""
 
 from collections.abc import Iterator
 
@@ -15,7 +15,7 @@ _NAME = "draws"
 
 
 def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
-    """Draws and fault-model parameters that nothing uses."""
+    """The finding about draws and fault-model parameters that nothing uses."""
     places = [*_of_specs(specs, models), *_of_models(models)]
     if not places:
         return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
@@ -49,15 +49,15 @@ def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
 
 
 def _of_models(models: FaultModels) -> Iterator[Place]:
-    """Parameters that a model's template does not mention."""
+    """Parameters that the template of their model does not mention."""
     environment = ImmutableSandboxedEnvironment()
     for model in models:
         try:
             used = find_undeclared_variables(environment.parse(model.template))
-        except TemplateError:  # reported when it is rendered
+        except TemplateError:  # reported when the template is rendered
             continue
         if model.kind is SnippetKind.VALUE:
-            used.add("target")  # what is changed at a statement; the template calls it `original`
+            used.add("target")  # the expression to change, which the template calls `original`
         for param in model.params:
             if param.name not in used:
                 what = f"parameter '{param.name}' of model {model.name}: its template does not use it"

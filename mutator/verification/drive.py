@@ -1,8 +1,8 @@
-"""Checks a target by running it: `mutator check --drive`.
+"""Check a target by running it: `mutator check --drive`.
 
-Each scenario runs twice without a fault, with two hash seeds. In the second run a probe counts executions of
-every statement with faults, and calls that prevent determinism are noted. If the runs differ, further runs
-without the probe and with either hash seed show the cause.
+Each scenario runs twice without a fault, with two hash seeds. In the second run, a probe counts how often
+each statement with faults executes, and calls that prevent determinism are noted. If the runs differ, further
+runs without the probe and with both hash seeds show the cause.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,9 +43,10 @@ _MOST = 20  # places listed in a finding
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
     """The findings from golden runs of the scenarios (default: those of the library's campaigns, or all).
 
-    They cover: determinism and likely causes of its absence; obstacles to forking; statements with faults
-    that never run; triggers that never hold; harmless canaries. MutatorError for an unknown scenario or a
-    mistake in the library; `check_library` reports such mistakes in full.
+    They cover determinism, obstacles to forking, statements with faults that never run, triggers that never
+    hold, and harmless canaries. For a target that is not deterministic, they name likely causes. Raises
+    MutatorError for an unknown scenario or a mistake in the library; `check_library` reports all such
+    mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
         return _Drive(workspace, target, scenarios, scratch).findings()
@@ -53,8 +54,11 @@ def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()
 
 @dataclass(frozen=True)
 class _Golden:
-    """The runs of a scenario: the pristine target, the counting mutant with another hash seed, and the
-    pristine target with that seed (the counting run again if it is not needed)."""
+    """The runs of a scenario.
+
+    `first` runs the pristine target, and `watched` the counting mutant with another hash seed. `again` runs
+    the pristine target with that seed, or is `watched` if no third run is needed.
+    """
 
     first: Execution
     watched: Execution
@@ -110,13 +114,13 @@ class _Drive:
         yield self._counting(scenario, self.setting)
 
     def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
-        """The runs of a scenario; the third runs only if the first two differ."""
+        """The runs of a scenario. The third runs only if the first two differ."""
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         one, other = self._look(first), self._look(watched)
         if one.problem or (one.digest == other.digest and not other.problem):
             return _Golden(first, watched, watched)
         again = replace(self._job("again", scenario, self.setting), hash_seed=_OTHER_HASH_SEED)
-        if other.problem:  # perhaps caused by watching
+        if other.problem:  # watching may be the cause
             counting = self._counting(scenario, self.setting)
             watched = self._run(replace(counting, name=f"unwatched-{scenario}", watch=False))
         return _Golden(first, watched, self._run(again))
@@ -146,7 +150,7 @@ class _Drive:
     # Determinism
 
     def _determinism(self, scenario: str, golden: _Golden) -> Finding:
-        """The runs must give the same bytes and reach no hazard."""
+        """Check that the runs give the same bytes and reach no hazard."""
         name = f"golden {scenario}"
         first, watched, again = (self._look(one) for one in (golden.first, golden.watched, golden.again))
         problem = judge_golden(first, again)
@@ -160,7 +164,7 @@ class _Drive:
         return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
 
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
-        """Where the runs first differ, and the likely causes."""
+        """Report where the runs first differ, and the likely causes."""
         where = first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
         which = "with two hash seeds, and not with one, they" if by_hash else "they"
@@ -185,7 +189,7 @@ class _Drive:
         return {**golden.watched.watched, "noted": noted}
 
     def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
-        """A deterministic target may read clocks: this is only a note."""
+        """Report where a deterministic target reads clocks. This is only a note."""
         noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
         if not noted:
             return []
@@ -197,8 +201,11 @@ class _Drive:
     # Fast engines
 
     def _forking(self, goldens: Mapping[str, _Golden], *, well: bool) -> Finding:
-        """Whether a golden run can be forked at its steps. Tries a fast one that is `well`; for others only
-        threads are checked."""
+        """Whether a golden run can be forked between its steps.
+
+        This is tried only if the run is fast and `well`, that is, deterministic. Otherwise only threads are
+        checked.
+        """
         scenario, golden = next(iter(goldens.items()))
         tried = well and golden.first.wall_s <= _BRIEF_S
         refusal = forkable.unfit(self.manifest)
@@ -235,7 +242,7 @@ class _Drive:
         self.reach.take(scenario, changes, execution.probe, execution.watched.get("seen", ()))
 
     def _reach_more(self) -> None:
-        """Run with the changes that faults and campaigns make, as long as something is left to reach."""
+        """Run with the changes that faults and campaigns make, as long as something has not been reached."""
         own = list(dict.fromkeys(one.changes for one in self.reach.unexecuted if one.changes))
         for changes in own:
             for scenario in self.scenarios:
@@ -254,7 +261,7 @@ class _Drive:
     # Canaries
 
     def _canaries(self) -> list[tuple[str, Experiment, str]]:
-        """Campaign, canary and hazard; canaries that differ only in their setting are tried once."""
+        """Campaign, canary and hazard. Canaries that differ only in their setting are tried once."""
         found: dict[object, tuple[str, Experiment, str]] = {}
         for campaign in sorted(self.campaigns, key=lambda one: len(_setting(self.workspace, one))):
             reading = _reading(self.workspace, campaign)
@@ -281,7 +288,7 @@ class _Drive:
 
 
 def _threads(watched: Execution) -> Refused | None:
-    """The obstacles from the threads of a watched run."""
+    """Why the threads of a watched run prevent forking; None if they do not."""
     others = watched.watched.get("threads", [])
     return Refused(too_many(others), turned_off(others)) if others else None
 
@@ -296,6 +303,6 @@ def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
 
 
 def _own_line(data: bytes, line: int) -> int:
-    """Map a line of a mutant's file to the target's own line."""
+    """Convert a line number in a mutant's file to the one in the target's own file."""
     tags = map(tag_of, data.splitlines()[: line - 1])
     return line - sum(tag is not None and tag.was is None for tag in tags)

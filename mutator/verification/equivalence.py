@@ -1,9 +1,9 @@
-"""The equivalence check of a campaign's engine: a sample of its experiments, rerun on the reference engine.
+"""The equivalence check: rerun a sample of a campaign's experiments on the reference engine.
 
-Every record of the sample must be the same, trace digest included; a difference fails the campaign. The
-check's runs are independent: they use nothing from other runs (`entry.independent` of the manifest), so that
-sharing is checked together with the engine. `proof/` of the run folder has their records. If no experiment
-was forked, no check is needed and the folder is removed.
+Every record of the sample must be the same, including the trace digest. A difference fails the campaign. The
+check's runs are independent: they use nothing from other runs (`entry.independent` of the manifest), so the
+check also covers what runs share. Their records are in `proof/` of the run folder. If no experiment was
+forked, no check is needed and the folder is removed.
 """
 
 from collections import Counter
@@ -25,7 +25,7 @@ from mutator.store.run_folder import RunFolder
 
 FOLDER = "proof"
 _LEAST = 20
-_SHARE = 100  # one experiment in so many
+_SHARE = 100  # one experiment in this many
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +38,11 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """The state of a run's equivalence check: experiments in the sample, those with the same result, and
-    harness errors of its own runs (experiment id, detail)."""
+    """The state of a run's equivalence check.
+
+    It has the number of experiments in the sample, the number with the same result, and the harness errors of
+    the check's own runs (experiment id, detail).
+    """
 
     sampled: int
     same: int
@@ -60,7 +63,7 @@ def begin(run: Path) -> None:
 
 
 def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ...]:
-    """One in a hundred, at least 20, covering every fault type and scenario."""
+    """Choose one experiment in a hundred, at least 20, with every fault type and every scenario."""
     count = max(_LEAST, -(-len(experiments) // _SHARE))
     chosen = list(pick(experiments, count, seed))
     seen = {mark for experiment in chosen for mark in _marks(experiment)}
@@ -72,12 +75,15 @@ def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ..
 
 
 def _sample_of(folder: RunFolder) -> set[str]:
-    """Ids of a plan's sample. With several seeds each has its own part, one in a hundred; the first seed's
-    part is chosen as in a campaign with one seed."""
+    """Ids of a plan's sample.
+
+    With several seeds, the first seed's part is chosen as in a campaign with one seed. Each other seed adds
+    one experiment in a hundred.
+    """
     return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
 
 
-@lru_cache(maxsize=4)  # a session asks several times, and the plan is frozen
+@lru_cache(maxsize=4)  # cached, because a session asks several times and the plan is frozen
 def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     if seeds == 1:
         head = RunFolder.unverified(run).head
@@ -98,7 +104,7 @@ def _marks(experiment: Experiment) -> Iterator[tuple[str, ...]]:
 def needless(folder: RunFolder) -> str | None:
     """The most frequent reason why no experiment was forked; None if one was or still may be.
 
-    Each shard is checked, because merged shards must all have a proof or none.
+    Always None for a shard, because merged shards must all have a proof or none.
     """
     if folder.shard is not None:
         return None
@@ -106,7 +112,7 @@ def needless(folder: RunFolder) -> str | None:
     done = {one.experiment_id for one in endings(folder.records()) if one.counts}
     reasons = Counter[str]()
     for name in folder.share():
-        if name not in done:  # not run yet: the timing is from an earlier session
+        if name not in done:  # not run yet; any timing is from an earlier session
             return None
         line = told.get(name, {})
         if line.get("engine", "unknown") not in (RunMode.REFERENCE.value, None):
@@ -116,7 +122,7 @@ def needless(folder: RunFolder) -> str | None:
 
 
 def drop(folder: RunFolder) -> None:
-    """Remove an unneeded proof; some of its runs may be older than that knowledge."""
+    """Remove a proof that is no longer needed. Some of its runs may be older than that knowledge."""
     gone = {name: None for name in digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
     with digests.rewriting(folder.path, gone):
         remove_folder(folder.path / FOLDER)
@@ -140,8 +146,9 @@ def sampled(folder: RunFolder) -> list[str]:
 
 
 def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
-    """The state of the check, None if none is needed; CheckFailed if a record differs on the reference
-    engine."""
+    """The state of the check; None if none is needed. CheckFailed if a record differs on the reference
+    engine.
+    """
     if not (folder.path / FOLDER).is_dir():
         return None
     found = folder.records(FOLDER)

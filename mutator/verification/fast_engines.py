@@ -1,4 +1,4 @@
-"""Reports before a campaign why a target or its faults cannot use the forking engines."""
+"""Report before a campaign why the forking engines cannot run a target or its faults."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ _LISTED = 3  # reasons
 
 
 def loading(manifest: TargetManifest) -> Finding:
-    """Whether the target can be forked once loaded; tries it by importing its modules."""
+    """Import the target's modules, and report whether it can then be forked."""
     with ScratchFolder("mutator-check-") as scratch:
         base = prepare_base(manifest, scratch / "base")
         told = finding(not_loadable(manifest, base, scratch / "server"))
@@ -28,7 +28,7 @@ def loading(manifest: TargetManifest) -> Finding:
 
 
 def finding(refusal: Refused | None) -> Finding:
-    """The finding for a target that cannot be forked, or that can (None)."""
+    """The finding for a target that can be forked (`refusal` None) or cannot."""
     if refusal is None:
         return Finding(name=NAME, level=Level.OK, found="runs can be forked")
     return Finding(
@@ -40,7 +40,7 @@ def finding(refusal: Refused | None) -> Finding:
 
 
 def variants(workspace: Workspace, manifest: TargetManifest) -> Finding:
-    """The variants whose mutants cannot be put into a loaded program."""
+    """The finding about variants whose mutants cannot be put into a loaded program."""
     models = workspace.fault_models()
     faults = [f for spec in workspace.specs() for f in expand(spec, 0, models=models, manifest=manifest)]
     count = len({fault.spec for fault in faults})

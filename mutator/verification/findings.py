@@ -14,14 +14,14 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """A line that a finding is about, and what is there; `file` may be relative to the target's root."""
+    """A line that a finding is about, and what is there. `file` may be relative to the target's root."""
 
     file: str
     line: int | None
     what: str
 
     def __str__(self) -> str:
-        """`pkg/driver.py:12 in Driver.drive: time.monotonic() reads the clock`."""
+        """Text such as `pkg/driver.py:12 in Driver.drive: time.monotonic() reads the clock`."""
         return f"{self.file}{'' if self.line is None else f':{self.line}'} {self.what}"
 
 

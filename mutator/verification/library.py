@@ -1,4 +1,4 @@
-"""Checks that everything in the library is usable, for `mutator check`."""
+"""Check that everything in the library is usable, for `mutator check`."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -35,10 +35,13 @@ T = TypeVar("T")
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
     """Every problem of library, templates and target, in file order; empty if there is none.
 
-    Checks that no placeholder is left; that manifests, models, specs, hazards and context tables load; that
-    the models' examples hold; that every spec expands in every reading; that every anchor matches the target
-    exactly once; that one mutant of every shape compiles and un-splices; that campaigns load and their
-    studies find valid data; and that a hazard analysis, if any, has no gap.
+    * No placeholder may be left.
+    * Manifests, models, specs, hazards and context tables must load.
+    * The models' examples must hold.
+    * Every spec must expand in every reading, and every anchor match the target exactly once.
+    * One mutant of every shape must compile and un-splice.
+    * Campaigns must load, and their studies find valid data.
+    * A hazard analysis, if any, must have no gap.
     """
     found = _Found()
     found.problems += unfilled(workspace.library)
@@ -72,8 +75,10 @@ def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
 def check_campaigns(
     workspace: Workspace, readings: Readings, manifest: TargetManifest | None = None
 ) -> list[MutatorError]:
-    """Problems of the library's campaigns, and those that their studies find in its data. With a `manifest`,
-    also triggers that this target does not observe."""
+    """Problems of the library's campaigns, and those that their studies find in its data.
+
+    With a `manifest`, also triggers that use values which this target does not observe.
+    """
     found, asked = _Found(), set[str]()
     for name in workspace.campaigns:
         campaign = found.tried(partial(load_campaign, workspace.campaign(name)))
@@ -91,12 +96,12 @@ def check_campaigns(
 
 
 def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
-    """MutatorError for a listed trigger of a campaign that its target does not know."""
+    """Raise MutatorError for a campaign's listed trigger that uses a value unknown to the target."""
     listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 
 def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
-    """A study's problem; located at the campaign that asks for the study if it names no file."""
+    """A study's problem. If it names no file, it is located at the campaign that uses the study."""
     if problem.where:
         return problem
     return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
@@ -109,7 +114,7 @@ class _Found:
         self.problems: list[MutatorError] = []
 
     def tried(self, make: Callable[[], T]) -> T | None:
-        """Return the result of `make`; on failure store the problem and return None."""
+        """Return the result of `make`. If that fails, store the problem and return None."""
         try:
             return make()
         except MutatorError as error:
@@ -135,7 +140,7 @@ def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -
 def _unbuildable(
     spec: FaultSpec, variant: Variant, fault: Fault, models: FaultModels, manifest: TargetManifest
 ) -> Iterator[MutatorError]:
-    """Why a fault of a variant cannot be built, located at the first responsible injection, if any."""
+    """Why a fault of a variant cannot be built, located at the first injection that causes it, if any."""
     keys: Keys = (*variant.keys, fault.reading)
     try:
         for i, injection in enumerate(fault.injections):
@@ -151,7 +156,7 @@ def _unbuildable(
 
 
 def _where(error: MutatorError, manifest: TargetManifest) -> str:
-    """The place of an error in the target, as specs name its files: ` (pkg/sonar.py:28)`."""
+    """The place of an error in the target, with the file named as in specs: ` (pkg/sonar.py:28)`."""
     if not error.where:
         return ""
     path = manifest.tree.named(error.where)
@@ -196,7 +201,7 @@ def check_examples(models: FaultModels) -> Iterator[MutatorError]:
 
 
 def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
-    """The example's `before` with its injection spliced in (tag `example`); it must also un-splice."""
+    """Splice the example's injection into its `before` (tag `example`); the result must also un-splice."""
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)

@@ -41,10 +41,10 @@ from mutator.workspace import Workspace
 def run_checks(
     workspace: Workspace, folder: RunFolder, *, workers: int = 1, notify: Notify | None = None
 ) -> tuple[CheckResult, ...]:
-    """Run the checks, unless they have passed for these sources in this folder or in another on this machine;
-    results are stored in checks.json.
+    """Run the checks, and store the results in checks.json and the golden runs in the folder.
 
-    Also leaves the golden runs in the folder. CheckFailed (after all ran) if any fails.
+    Nothing runs if the checks have passed for these sources, in this folder or in another on this machine.
+    Raises CheckFailed if any check fails, after all have run.
     """
     checks = _Checks(workspace, folder)
     known = checks.known()
@@ -66,8 +66,10 @@ def run_checks(
 
 
 def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
-    """Remarks on the plan's triggers that no golden run reaches; empty unless the golden runs just ran or
-    were cached."""
+    """Remarks on triggers of the plan that no golden run reaches.
+
+    Empty unless the golden runs just ran or were cached.
+    """
     experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
@@ -82,7 +84,7 @@ def are_there(folder: RunFolder) -> bool:
 
 
 def _kept(folder: RunFolder) -> Path:
-    """Where golden runs are kept until they are accepted; their observations stay there."""
+    """The folder that keeps golden runs until they are accepted. Their observations stay there."""
     return folder.work / "kept"
 
 
@@ -112,8 +114,10 @@ class _Checks:
         self.digest = digest([*content, places])
 
     def known(self) -> tuple[CheckResult, ...] | None:
-        """Earlier results from this or another folder, if all passed and the golden runs are unchanged;
-        copies them here."""
+        """Earlier results from this or another folder, which are copied here.
+
+        None unless all checks passed and the golden runs are unchanged.
+        """
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
         copy = self.kept
@@ -142,7 +146,7 @@ class _Checks:
 
     def run(self, workers: int, notify: Notify) -> Iterator[CheckResult]:
         anchors = self._anchors()
-        if not anchors.passed:  # skip minutes of runs
+        if not anchors.passed:  # the runs would take minutes
             yield anchors
             return
         driver = CheckDriver(
@@ -165,7 +169,7 @@ class _Checks:
         yield from results
 
     def _install(self, checks: bytes) -> None:
-        """Install the kept golden runs and these results in the run folder."""
+        """Put the kept golden runs and these results into the run folder."""
         run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}
@@ -181,7 +185,10 @@ class _Checks:
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
-        """A run with records must not continue with different golden runs (from another processor, say)."""
+        """Raise CheckFailed if a run that has records would continue with different golden runs.
+
+        They differ on another processor, for example.
+        """
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
         known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
         other = [key for key in goldens if known[key] not in ("", goldens[key])]
@@ -210,7 +217,7 @@ class _Checks:
         yield from self._judge_same(runs)
 
     def _judge_same(self, runs: Runs) -> Iterator[CheckResult]:
-        """Scenarios that a change makes equal, according to the manifest, must give the same bytes."""
+        """Check that scenarios which a change makes equal, according to the manifest, give the same bytes."""
         same: dict[GoldenRun, dict[str, CheckRun]] = {}
         for one in self.keys:
             if one.scenario in same_in(self.manifest, one.changes):
@@ -220,8 +227,10 @@ class _Checks:
             yield _result(f"same {name}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
-        """Each variant of the plan must find its statements (failure to compile is a result, reported
-        later)."""
+        """Check that each variant of the plan finds its statements.
+
+        A mutant that does not compile is a result, which is reported later.
+        """
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:

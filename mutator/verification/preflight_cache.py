@@ -1,4 +1,4 @@
-"""Caches passed checks and their golden runs on this machine for other run folders with the same sources."""
+"""Cache passed checks and their golden runs on this machine for other run folders with the same sources."""
 
 import platform
 import shutil
@@ -10,14 +10,19 @@ from mutator.verification.unreached import FOLDER
 
 
 def entry(key: str) -> Path:
-    """The place for checks with this digest. Machines with a shared home folder have separate entries,
-    because the digest may not cover everything that changes last digits."""
+    """The path for checks with this digest.
+
+    Machines with a shared home folder have separate entries, because the digest may not cover everything that
+    changes last digits.
+    """
     return caches.of_checks() / digest([key, platform.node()])
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
-    """Store a run folder's golden runs and check results (`file`) at `place`, with what is `observed`; an
-    unwritable cache is ignored."""
+    """Store a run folder's golden runs, check results (`file`) and observations at `place`.
+
+    If the cache is not writable, do nothing.
+    """
 
     def fill(made: Path) -> None:
         shutil.copytree(run / "golden", made / "golden")

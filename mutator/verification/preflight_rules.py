@@ -1,4 +1,4 @@
-"""The conditions on the runs before a campaign."""
+"""The conditions that the runs before a campaign must meet."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,8 +17,11 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
-    """What checks need from a run: its problem, digests of all outputs and of its trace, hazards, alerts,
-    trigger seen, and third-party top-level modules imported."""
+    """What the checks need from a run.
+
+    That is: its problem, digests of all outputs and of its trace, hazards, alerts, whether its trigger was
+    seen, and the third-party top-level modules that it imported.
+    """
 
     problem: str
     digest: str = ""
@@ -31,10 +34,10 @@ class CheckRun:
 
 
 def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
-    """What checks need from a finished run."""
+    """Extract what the checks need from a finished run."""
     if execution.status is not Status.OK:
         log = execution.log.strip()
-        # the last printed line explains why a run was killed; an exception has a message
+        # the last printed line explains why a run was killed; an exception has its own message
         last = f" ({log.splitlines()[-1]})" if log and execution.raised is None else ""
         return CheckRun(problem=f"{execution.status.value}: {execution.detail}{last}")
     try:
@@ -83,8 +86,7 @@ def judge_null(first: CheckRun, null: CheckRun) -> str:
 
 
 def judge_same(goldens: Mapping[str, CheckRun]) -> str:
-    """The problem of golden runs, by scenario, that must be equal according to the manifest; empty if there
-    is none."""
+    """The problem of golden runs, by scenario, that the manifest says are equal; empty if there is none."""
     (first, reference), *others = goldens.items()
     for name, run in others:
         if run.problem or reference.problem:

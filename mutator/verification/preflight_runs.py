@@ -25,12 +25,12 @@ _CANARY = "canary"
 _OTHER_HASH_SEED = 4242
 
 Notify = Callable[[Progress], None]
-Runs = dict[tuple[str, Any], CheckRun]  # by kind of run, and `GoldenRun`
+Runs = dict[tuple[str, Any], CheckRun]  # kind of run, and `GoldenRun`
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckDriver:
-    """Executes the runs that checks judge. Golden runs and their observations stay in `kept`."""
+    """Executes the runs that the checks judge. Golden runs and their observations stay in `kept`."""
 
     workspace: Workspace
     folder: RunFolder
@@ -38,7 +38,7 @@ class CheckDriver:
     kept: Path
 
     def drive(self, workers: int, notify: Notify) -> tuple[Runs, tuple[str, str]]:
-        """All runs of all checks, `workers` at a time, and the result of `canary.judge`."""
+        """Do all runs of all checks, `workers` at a time. Return them with the result of `canary.judge`."""
         work = self.folder.work / "checks"
         for scratch in (work, self.kept):
             remove_folder(scratch)
@@ -59,7 +59,7 @@ class CheckDriver:
             remove_folder(work)
 
     def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
-        """See `canary.judge`."""
+        """Run and judge the canary; see `canary.judge`."""
 
         def run(experiment: Experiment) -> CheckRun:
             return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))

@@ -1,7 +1,7 @@
-"""Which statements with faults, and which triggers, golden runs reach.
+"""Find which statements with faults, and which triggers, golden runs reach.
 
-One mutant counts all statements at once, with a probe call at each that only counts. So a statement is
-counted exactly when a fault in it would be active with its trigger always on.
+One mutant has a probe call at each of these statements, which only counts. A statement is therefore counted
+exactly when a fault in it would be active if its trigger always held.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ class Wanted:
 
 @dataclass(frozen=True, kw_only=True)
 class Awaited:
-    """A trigger of a context table or of a campaign's list, as campaigns arm it."""
+    """A trigger of a context table or of a campaign's list, armed as in campaigns."""
 
     trigger: Trigger
     place: Place  # in the table or the campaign
@@ -65,7 +65,7 @@ class Reach:
     ) -> None:
         """Remove what a run of the counting mutant reached, from its probe's report and its observations.
 
-        A statement counts only with the changes of its own fault.
+        A statement is removed only if the run had the changes that its fault needs.
         """
         self._driven.append("+".join((scenario, *changes)))
         counts = (probe or {}).get("injections", {})
@@ -79,7 +79,7 @@ class Reach:
         self.untriggered = [one for one in self.untriggered if not holds(self._armings[one.trigger], rows)]
 
     def findings(self) -> list[Finding]:
-        """What none of the runs reached."""
+        """Findings about statements and triggers that no run reached."""
         return [
             self._finding(
                 "statement",
@@ -124,7 +124,7 @@ def _statements(workspace: Workspace, manifest: TargetManifest) -> Iterator[Want
 def _counting(
     workspace: Workspace, manifest: TargetManifest, locations: Iterable[FaultLocation]
 ) -> tuple[Mutant, Mapping[str, FaultLocation]]:
-    """The mutant that counts at all these places, and the location of each id."""
+    """The mutant that counts at all these places, and the location of each injection id."""
     models, once = workspace.fault_models(), list(dict.fromkeys(locations))
     injections = tuple(Injection(location=location, model=_COUNT) for location in once)
     fault = Fault(_COUNT, _COUNT, _COUNT, _COUNT, None, "", "", injections)
@@ -133,7 +133,7 @@ def _counting(
 
 
 def _with_count(models: FaultModels) -> FaultModels:
-    """The models, plus one that only counts."""
+    """The fault models, and one more that only counts."""
     some = next(iter(models))
     count = FaultModel(
         name=_COUNT,
@@ -152,8 +152,10 @@ def _with_count(models: FaultModels) -> FaultModels:
 def _triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
 ) -> Iterator[Awaited]:
-    """The triggers that campaigns use, each armed as early as in any campaign, and the latest random times;
-    without campaigns the rows of all tables."""
+    """The triggers that campaigns use, each armed as early as in any campaign, and the latest random times.
+
+    Without campaigns, the triggers of all context tables.
+    """
     armed: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)

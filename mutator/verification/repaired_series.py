@@ -1,7 +1,7 @@
-"""Sets aside damaged series of a run folder, so that the rest can be read.
+"""Set aside damaged series of a run folder, so that the others can be read.
 
-A chunk of golden runs is rebuilt from them if that gives the same bytes. An experiment's series returns when
-it is rerun.
+A chunk of golden series is rebuilt from the golden runs if that gives the same bytes. An experiment's series
+is made again when the experiment is rerun.
 """
 
 import os
@@ -22,12 +22,14 @@ from mutator.workspace import Workspace
 def repair_series(
     folder: RunFolder, workspace: Workspace | None, put_aside: Callable[[str], None]
 ) -> Iterator[str]:
-    """Set aside damaged series and yield a sentence for each action. `put_aside` copies a file of the run
-    folder. Golden runs can be read only with a `workspace`."""
+    """Set aside damaged series, and yield a sentence for each action.
+
+    `put_aside` copies a file of the run folder. Golden runs can be read only with a `workspace`.
+    """
     run, there = folder.path, SeriesFolder(folder.path)
     paths = {Path(problem.where) for problem in series(folder)[1] if problem.where}
     index = None
-    if there.path / f"{INDEX}.js" in paths:  # the chunks' content is unknown
+    if there.path / f"{INDEX}.js" in paths:  # the content of the chunks is unknown
         paths |= {*there.path.glob("*.js")}
     elif paths:
         index = there.index
@@ -48,7 +50,7 @@ def repair_series(
 
 
 def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
-    """The rebuilt content of a chunk of golden runs; None if that is no longer possible."""
+    """The rebuilt content of a chunk of golden series; None if that is no longer possible."""
     keys = {number: key for key, number in index.goldens.items()}
     numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:

@@ -1,7 +1,7 @@
-"""Sets aside damaged parts of a run folder, so that the same `run` fills the gaps.
+"""Set aside damaged parts of a run folder, so that the same `run` fills the gaps.
 
 Intact lines of a segment stay. Files that cannot be rebuilt (run.json, campaign.yaml, the plan) are not
-touched: only a copy of the folder has them.
+touched, because only a copy of the folder can replace them.
 """
 
 import os
@@ -29,16 +29,16 @@ from mutator.verification.audited_records import recorded
 from mutator.verification.repaired_series import repair_series
 from mutator.workspace import Workspace
 
-ASIDE = "damaged"  # folder of what was set aside
+ASIDE = "damaged"  # folder for what is set aside
 SCHEMAS = {"records": SCHEMA, "proof": SCHEMA, "timings": TIMINGS_SCHEMA}
 _Change = tuple[str, bytes | None, str]  # a file, its new content (None: removed), and a sentence
 
 
 def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
-    """Move damaged files, lines, patches and series of a run folder to `damaged/`, and return a sentence for
-    each action. With a `workspace`, golden series are rebuilt.
+    """Move damaged files, lines, patches and series to `damaged/`; return a sentence for each action.
 
-    MutatorError if a command works in the folder, if its schema is older, or if the plan is damaged.
+    With a `workspace`, golden series are rebuilt. Raises MutatorError if a command works in the folder, its
+    schema is older, or the plan is damaged.
     """
     if not folder.verifiable:
         raise MutatorError(
@@ -64,7 +64,7 @@ def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
 
 
 def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
-    """A new ledger of the current files, if the ledger itself is damaged."""
+    """If the ledger itself is damaged, write a new one from the current files."""
     run = folder.path
     try:
         digests.read(run)
@@ -78,7 +78,7 @@ def _renewed_ledger(folder: RunFolder) -> Iterator[str]:
 
 
 def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
-    """Files that can be rebuilt, and those that do not belong here."""
+    """Damaged files, rebuilt or set aside, and files that do not belong in the folder."""
     run = folder.path
     for name, known in ledger.files.items():
         if known.lines is not None or name in integrity.WHOLE or known.is_of(Digest.of_file(run / name)):
@@ -94,7 +94,7 @@ def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
 
 
 def _lost_patches(folder: RunFolder) -> list[str]:
-    """Experiments whose stored patch does not match their record."""
+    """Experiments with a stored patch that does not match the record."""
     lost = []
     for one in recorded(folder, "records"):
         try:
@@ -105,8 +105,11 @@ def _lost_patches(folder: RunFolder) -> list[str]:
 
 
 def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
-    """Set aside these patches' files and those with damaged blocks (which are reported); their other patches
-    stay."""
+    """Set aside the files of these patches, and files with damaged blocks; return a sentence for each of the
+    latter.
+
+    Other patches in these files stay.
+    """
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
         old = patches.old_file(one)
@@ -130,7 +133,7 @@ def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
 
 
 def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Iterator[_Change]:
-    """Segments with invalid lines, and their remaining content."""
+    """Segments with invalid lines, and the content that stays."""
     run, planned = folder.path, folder.share()
     strangers = set(integrity.strangers(run, ledger)) if ledger.finished else set()
     for kind, schema in SCHEMAS.items():
@@ -155,7 +158,7 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
 
 
 def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) -> bool:
-    """Whether a segment is in its place and unchanged since it was closed."""
+    """Whether a segment has a valid head, and is unchanged since it was closed."""
     try:
         segment.check_head(schema)
     except MutatorError:
@@ -164,10 +167,10 @@ def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) 
 
 
 def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[str, Any]]:
-    """The content of the intact lines after the head.
+    """The content of the trustworthy lines after the head.
 
-    If all checksums match although the file differs from the one that was closed, the checksums were
-    recomputed: lines are trusted only in a file that was cut or extended.
+    If all checksums match although the file differs from the one that was closed, somebody recomputed the
+    checksums. Then lines are trusted only if the file was extended, up to the closed length.
     """
     numbers = list(segment.lines)
     whole = segment.damaged or known is None or known.is_of(Digest.of(data))
@@ -181,7 +184,10 @@ def _trusted(segment: Segment, known: Digest | None, data: bytes) -> list[dict[s
 def _kept(
     lines: list[dict[str, Any]], planned: Collection[str], lost: Collection[str], done: set[str]
 ) -> Iterator[dict[str, Any]]:
-    """Lines of planned experiments, one final record of each; `done` has those of earlier lines."""
+    """Yield lines of planned experiments that are not lost, with one final record each.
+
+    `done` has the experiments with a final record in earlier lines.
+    """
     for line in lines:
         name = str(line.get("experiment_id"))
         final = line.get("status") not in (None, Status.HARNESS_ERROR.value)
@@ -192,7 +198,7 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to a free name in `damaged/`; move anything that is not a file."""
+    """Copy a file to a free name in `damaged/`. Move anything that is not a file."""
     if not os.path.lexists(run / name):
         return
     place = run / ASIDE / name
@@ -208,7 +214,7 @@ def _put_aside(run: Path, name: str) -> None:
 
 
 def _carry_out(run: Path, changes: list[_Change], ledger: Ledger) -> None:
-    """Apply the changes. The run is no longer finished, unless only plan.csv was rebuilt."""
+    """Apply the changes. The run is then no longer finished, unless only plan.csv was rebuilt."""
     coming = {
         name: None
         if data is None

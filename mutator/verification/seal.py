@@ -1,9 +1,9 @@
-"""The seal of a finished run: one digest of its complete content, independent of who computed it on how many
-machines.
+"""The seal of a finished run: one digest of its results and everything that determines them.
 
-It covers the plan, the choices that made it, the sources, the versions of mutator, Python and packages, the
-checks and golden runs, and each record with its patch. It excludes costs, hosts, processors, the git commit,
-and the division into sessions, workers and shards.
+It does not depend on who computed the run, or on how many machines. It covers the plan, the choices that made
+it, the sources, the versions of mutator, Python and packages, the checks and golden runs, and each record
+with its patch. It excludes costs, hosts, processors, the git commit, and the division into sessions, workers
+and shards.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "seal/1"
-# The parts of run.json about results, which reports repeat.
+# The parts of run.json that concern results. Reports print them.
 _HEAD = (
     *("plan", "campaign_digest", "study", "seed", "reading", "runs"),
     *("hazards", "compared", "sources", "target_files"),
@@ -27,8 +27,10 @@ _HEAD = (
 
 
 def seal_of(folder: RunFolder) -> str | None:
-    """The seal of a run folder, computed from its content: 64 hex digits. None if the run is not finished or
-    not verifiable."""
+    """The seal of a run folder, computed from its content: 64 hex digits.
+
+    None if the run is not finished or not verifiable.
+    """
     if not folder.finished:
         return None
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
@@ -56,7 +58,7 @@ def seal_or_why_not(folder: RunFolder) -> str:
 
 
 def not_verifiable(folder: RunFolder) -> str:
-    """The message for a run folder of an older schema."""
+    """The message for a run folder with an older schema."""
     return f"not verifiable, because {folder.head['schema']} has no digests"
 
 
@@ -76,7 +78,7 @@ def _versions(folder: RunFolder) -> list[str]:
 
 
 def _records(folder: RunFolder, kind: str) -> dict[str, str]:
-    """Digest of each valid record, by experiment id: of its line, without the checksum."""
+    """Digest of each valid record's line without its checksum, by experiment id."""
     found = {}
     for path in sorted((folder.path / kind).glob("*.jsonl")):
         segment = bare_segment(path, checksums=True)

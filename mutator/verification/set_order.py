@@ -1,7 +1,7 @@
-"""Finds where source depends on the order of a set, which for strings follows PYTHONHASHSEED.
+"""Find where source code depends on the order of a set, which for strings varies with PYTHONHASHSEED.
 
-Works on source, so it finds only sets that are recognizable in place: literals, calls of `set`, and names of
-the same function or attributes of `self` assigned from one.
+It reads only the source, so it finds only sets that are recognizable there: literals, calls of `set`, and
+names of the same function or attributes of `self` that are assigned a set.
 """
 
 import ast
@@ -11,9 +11,10 @@ from dataclasses import dataclass
 _MAKING = ("set", "frozenset")
 _KEEPING = ("union", "intersection", "difference", "symmetric_difference", "copy")
 _ORDERED = ("list", "tuple", "iter", "enumerate", "zip", "map", "filter", "sum", "reversed", "next")
-_UNORDERED = ("sorted", "min", "max", "any", "all", "len", *_MAKING)  # order does not matter
+# functions whose result does not depend on the order
+_UNORDERED = ("sorted", "min", "max", "any", "all", "len", *_MAKING)
 _METHODS = (".join", ".extend", ".fromkeys")
-_SHORT = 60  # characters of an expression
+_SHORT = 60  # longest shown expression, in characters
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -26,7 +27,7 @@ class SetOrder:
 
 
 def places(source: bytes) -> list[SetOrder]:
-    """All such places of a Python file, in order; empty if it is not Python."""
+    """All such places of a Python file, in order; empty if the source is not valid Python."""
     try:
         tree = ast.parse(source)
     except (SyntaxError, ValueError, RecursionError):
@@ -44,7 +45,7 @@ class _Scope:
         self._own = list(_own(node))
         self._orderless = self._to_be_ordered()
         self.sets = outer
-        for _ in range(2):  # a name may hold what another held
+        for _ in range(2):  # twice, because a name may be assigned from another
             self.sets |= frozenset(self._assigned())
 
     def places(self) -> Iterator[SetOrder]:
@@ -57,7 +58,7 @@ class _Scope:
                 yield SetOrder(line=line, function=self.name, what=_text(used))
 
     def _assigned(self) -> Iterator[str]:
-        """Names and attributes of `self` that are assigned a set; for a class those of all methods."""
+        """Names and attributes of `self` that are assigned a set. For a class, those of all methods."""
         within = ast.walk(self._node) if isinstance(self._node, ast.ClassDef) else self._own
         for node in within:
             targets: list[ast.expr] = []
@@ -104,7 +105,7 @@ class _Scope:
 
 
 def _own(node: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a scope without those of nested scopes, of which only the head is included."""
+    """The nodes of a scope. Of a nested function or class, only its own node is included."""
     for child in ast.iter_child_nodes(node):
         yield child
         if not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):

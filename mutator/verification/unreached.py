@@ -1,7 +1,7 @@
-"""Finds triggers that no golden run reaches.
+"""Find triggers that no golden run reaches.
 
-Until it is active, a faulty run equals the golden run: a trigger that never holds there never fires. Null
-mutants, whose runs are equal, record what golden runs observe.
+A faulty run equals the golden run until its fault is active. A trigger that never holds in the golden run
+therefore never fires. Null mutants equal their golden runs, and record what these observe.
 """
 
 from collections import Counter
@@ -31,12 +31,12 @@ Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
     """Store what the golden run `key` observed in `folder`."""
     path = folder / FOLDER / f"{key}.npy"
-    path.parent.mkdir(parents=True, exist_ok=True)  # scenarios may be in folders
+    path.parent.mkdir(parents=True, exist_ok=True)  # scenario names may contain folders
     np.save(path, np.array(list(seen), dtype=float))
 
 
 def read_observed(folder: Path) -> dict[str, Observed]:
-    """The golden runs' observations by key; only those stored in `folder`."""
+    """The observations of golden runs that are stored in `folder`, by key."""
     base = folder / FOLDER
     found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
     return {name.removesuffix(".npy"): np.load(path) for name, path in found.items()}
@@ -56,8 +56,10 @@ def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
 
 
 def _fits(trigger: Arming, observed: Observed) -> bool:
-    """Whether the condition's arguments match the observations: older templates also ask for derived
-    values."""
+    """Whether the condition has one argument for each observed column.
+
+    Older templates also ask for derived values.
+    """
     return len(signature(trigger[1]).parameters) == len(observed.T)
 
 
@@ -67,7 +69,7 @@ def remarks(
     experiments: Iterable[tuple[str, Experiment]],
     observed: Mapping[str, Observed],
 ) -> list[str]:
-    """Remarks on experiments, each with the key of its golden run, whose triggers never hold."""
+    """Remarks on triggers that never hold. Each experiment comes with its golden run's key."""
     late, never = Counter[str](), Counter[str]()
     armings: dict[Trigger, Arming] = {}
     known: dict[tuple[str, Trigger], bool] = {}
