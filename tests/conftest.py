@@ -83,7 +83,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
-    """Report what tests have recorded, in whichever process they ran."""
+    """Report what tests have recorded, in any process."""
     reports = [*terminalreporter.getreports("passed"), *terminalreporter.getreports("failed")]
     told = [text for report in reports for name, text in report.user_properties if name == "tally"]
     for text in told:
@@ -118,9 +118,7 @@ def _cache(
 
 @pytest.fixture
 def kept_checks(_cache: Path, _caches: Path) -> None:
-    """Reuse checks that passed in an earlier test of the same sources: they take as long as a small
-    campaign.
-    """
+    """Reuse checks that passed in an earlier test of the same sources, because they take long."""
     kept = _caches / "mutator" / "checks"
     kept.mkdir(parents=True, exist_ok=True)
     (_cache / "mutator").mkdir()
@@ -188,7 +186,7 @@ def pole(tmp_path: Path) -> Workspace:
 
 @pytest.fixture
 def experiment() -> Callable[..., Experiment]:
-    """Build an experiment with the given fields; the rest are defaults."""
+    """Build an experiment with the given fields. The other fields have defaults."""
 
     def make(
         value: float = 1.0,
@@ -229,8 +227,9 @@ def experiment() -> Callable[..., Experiment]:
 
 @pytest.fixture(scope="session")
 def record() -> Callable[..., Record]:
-    """Build the record of a successful experiment with a masked fault; the given fields replace the
-    defaults.
+    """Build the record of a successful experiment with a masked fault.
+
+    The given fields replace the defaults.
     """
 
     def make(experiment_id: str = "e" * 16, **given: Any) -> Record:
@@ -267,7 +266,7 @@ def put_patches() -> Callable[[Path, Mapping[str, bytes | None]], None]:
 
 @pytest.fixture(scope="session")
 def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
-    """Create a run folder with made-up records, without running anything."""
+    """Create a run folder with synthetic records without running anything."""
 
     def write(
         workspace: Workspace,
@@ -277,7 +276,7 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         changed: Callable[[Plan], Plan] = lambda plan: plan,
         **choices: Any,
     ) -> Path:
-        """`became` holds each record's own fields; None means the experiment was not run.
+        """`became` holds each record's own fields. None means that the experiment was not run.
 
         `changed` alters the campaign's plan.
         """
@@ -298,8 +297,10 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Turn a plan into one of operators' mutants: each operation of a file with its sign changed, in the
-    drives of the plan's first experiments (the second of them with a permanent fault).
+    """Turn a plan into one of mutants from operators.
+
+    Each operation of a file has its sign changed, in the scenarios of the plan's first experiments. The
+    second one has a permanent fault.
     """
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
@@ -342,7 +343,7 @@ def operator_faults(file: ParsedFile) -> Iterator[Fault]:
 
 @pytest.fixture(scope="session")
 def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
-    """Create a finished run folder with made-up records, patches, checks, golden runs and proof."""
+    """Create a finished run folder with synthetic records, patches, checks, golden runs and proof."""
 
     def write(workspace: Workspace, out: Path, **given: Any) -> Path:
         patch = b"diff --git a/a.py b/a.py\n"
@@ -376,8 +377,9 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def reseal() -> Callable[..., None]:
-    """Recompute every checksum and digest of a run folder, as a careful forger would; the folder itself then
-    shows no trace.
+    """Recompute every checksum and digest of a run folder, as a careful forger would.
+
+    The folder then shows no trace of the forgery.
     """
 
     def compute(run: Path, finished: bool | None = None) -> None:

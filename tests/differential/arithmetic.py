@@ -1,7 +1,7 @@
-"""Digests of everything that a run's bytes depend on: frames, detections in them, and traces.
+"""Digests of everything that a run's bytes depend on: frames, detections and traces.
 
-`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor,
-with the compiled code in FOLDER, if given.
+`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor.
+If FOLDER is given, it uses the compiled code there.
 """
 
 import json
@@ -41,7 +41,7 @@ MOMENTS = [Moment(1.5 + 0.05 * k, 40.0 + 1.34 * k, 26.8) for k in range(20)]
 
 
 def digests() -> Iterator[tuple[str, str]]:
-    """Names and digests."""
+    """Return names and digests."""
     yield from ((name, digest(picture)) for name, picture in roads().items())
     for detector in DETECTORS:
         for level in (4, 9):
@@ -57,7 +57,7 @@ def digests() -> Iterator[tuple[str, str]]:
 
 
 def roads() -> dict[str, np.ndarray]:
-    """Rendered roads, and one seen from another pose."""
+    """Return rendered roads, one of them seen from another pose."""
     model = CameraModel()
     found = {
         name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
@@ -71,7 +71,7 @@ def roads() -> dict[str, np.ndarray]:
 
 
 def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
-    """What a detector sees through each effect, up to that level, and the frames themselves."""
+    """Return what a detector sees through each effect up to that level, and the frames themselves."""
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]

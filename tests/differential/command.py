@@ -1,4 +1,4 @@
-"""A campaign command in a separate process, to be signalled and inspected from outside."""
+"""A campaign command in a separate process that tests can signal and inspect."""
 
 import os
 import signal
@@ -17,14 +17,14 @@ Bytes = dict[str, bytes]
 
 
 def results(out: Path) -> Bytes:
-    """The results tables and the packed series of a run folder, as bytes."""
+    """Return the results tables and the packed series of a run folder as bytes."""
     series = {path.name: path.read_bytes() for path in (out / "series").iterdir()}
     assert "index.js" in series
     return series | {name: (out / name).read_bytes() for name in DERIVED}
 
 
 def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
-    """A campaign as a user of pytest starts it."""
+    """Return the words with which a user of pytest starts a campaign."""
     plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
     return [*plain, "--campaign", str(campaign), "--campaign-out", str(out), "-n", str(workers)]
 
@@ -79,12 +79,12 @@ class Command:
                 continue
 
     def workers(self) -> list[int]:
-        """Its living xdist workers."""
+        """Return the command's living xdist workers."""
         registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
     def end(self, *, longest_s: float = 600.0) -> str:
-        """Wait until it and everything it started have ended; return its output."""
+        """Wait until the command and everything it started have ended, and return its output."""
         printed = self.process.communicate(timeout=longest_s)[0]
         deadline = time.monotonic() + LINGER_S
         while left := list(self.others()):
@@ -93,7 +93,7 @@ class Command:
         return printed
 
     def kill(self) -> None:
-        """Kill it and everything it started, unconditionally."""
+        """Kill the command and everything it started, unconditionally."""
         self.process.kill()
         self.process.wait()
         while left := list(self.others()):

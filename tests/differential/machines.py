@@ -15,7 +15,7 @@ _QUIET = {"DASK_LOGGING__DISTRIBUTED": "error"}
 
 @dataclass
 class Machines:
-    """A scheduler, started at once, and workers, started on request."""
+    """A scheduler, which starts at once, and workers, which start on request."""
 
     folder: Path
     nanny: bool = True  # restarts a worker that died
@@ -28,7 +28,7 @@ class Machines:
         self.start_scheduler()
 
     def start_scheduler(self) -> None:
-        """Start it at a free loopback port and wait until it has written its file."""
+        """Start the scheduler at a free loopback port and wait until it has written its file."""
         self.file.unlink(missing_ok=True)
         words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(self.file)]
         self.scheduler = self._started("scheduler", words)
@@ -50,7 +50,7 @@ class Machines:
             os.kill(pid, number)
 
     def processes(self, name: str) -> list[int]:
-        """The process that does a worker's work; none while its nanny restarts it."""
+        """Return the process that does a worker's work, or none while its nanny restarts it."""
         process = self.workers[name]
         if not self.nanny:
             return [process.pid]
@@ -65,7 +65,7 @@ class Machines:
         return found
 
     def children(self) -> list[int]:
-        """Processes that run pieces of work, for any worker."""
+        """Return the processes that run pieces of work for any worker."""
         found = []
         for path in Path("/proc").glob("[0-9]*"):
             try:
@@ -78,7 +78,7 @@ class Machines:
         return found
 
     def end(self) -> None:
-        """Kill all of them and everything they started."""
+        """Kill all processes and everything they started."""
         for process in (*self.workers.values(), self.scheduler):
             for number in (signal.SIGCONT, signal.SIGKILL):
                 try:

@@ -1,6 +1,4 @@
-"""Frames, detections and traces have the same bytes on every Python, on processors with narrower vectors, and
-with or without compiled code.
-"""
+"""Frames, detections and traces have the same bytes on every Python, processor, and with compiled code."""
 
 import json
 import os
@@ -25,7 +23,7 @@ PROCESSORS = {
 @pytest.mark.parametrize("processor", PROCESSORS)
 @pytest.mark.parametrize("code", ["plain", "compiled"])
 def test_bytes_are_those_that_were_recorded(processor: str, code: str, tmp_path: Path) -> None:
-    """The digests are the recorded ones.
+    """The digests equal the recorded ones.
 
     After an intended change of results, record them with `python tests/differential/arithmetic.py`.
     """

@@ -1,4 +1,4 @@
-"""Every engine gives the same reason, to the letter, why a run did not end well."""
+"""Every engine gives exactly the same reason why a run did not end well."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -180,7 +180,7 @@ MODELS = {  # line of the template, more in the YAML
 
 
 def prepare(toy: Workspace) -> None:
-    """The toy with those moods, and with fault models that inject raising lines."""
+    """Build the toy with these misbehaviours and with fault models that inject raising lines."""
     tree = toy.library.parent / "tree" / "toycar"
     (tree / "moods.py").write_text(MOODS)
     for name, pairs in EDITS.items():
@@ -210,7 +210,7 @@ def at(anchor: Anchor) -> FaultLocation:
 
 
 def sensed(mood: str | None) -> Fault:
-    """The sensor returns this instead of a distance."""
+    """Return what the sensor returns instead of a distance."""
     return at_gap("stuck", value=mood)
 
 
@@ -263,7 +263,7 @@ class Blamed:
         return reference
 
     def line(self, fault: Fault, place: str) -> str:
-        """The line at that place in the mutant."""
+        """Return the line of the mutant at that place."""
         path, _, number = place.partition(":")
         files = build(self.manifest, self.models, fault, FROM_2_S).files
         data = files.get(path) or self.manifest.tree.files[path]
@@ -295,8 +295,9 @@ def blamed(
     ],
 )
 def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, place: str | None) -> None:
-    """An exception in the target after the activation, an exit or the interpreter's end is the target's
-    crash; the record keeps type, text and place of an exception.
+    """If the target raises, exits or ends the interpreter after the activation, the target has crashed.
+
+    The record keeps type, text and place of an exception.
     """
     record = blamed.record(sensed(mood))
     assert record.status is Status.CRASHED
@@ -311,7 +312,7 @@ def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, 
 
 
 def test_a_guarded_statement_raises(blamed: Blamed) -> None:
-    """A guarded statement still belongs to the target: an exception in it after the activation is a crash."""
+    """A guarded statement belongs to the target, so an exception in it after the activation is a crash."""
     left_out = fault(Injection(location=at(SEEN), model="omission"))
     record = blamed.record(left_out, IN_ONE_STEP)
     assert record.status is Status.CRASHED
@@ -340,7 +341,7 @@ WORLD = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="offset")
 def test_an_injected_line_raises(
     blamed: Blamed, injected: Fault, scenario: str, code: str, error: str
 ) -> None:
-    """An exception in an injected line makes the mutant invalid, and the line is named."""
+    """If an injected line raises, the mutant is invalid and the line is named."""
     record = blamed.record(injected, scenario=scenario)
     assert record.status is Status.INVALID_MUTANT
     named, _, rest = record.detail.partition(": the injected ")
@@ -363,8 +364,9 @@ def test_a_model_that_raises(blamed: Blamed) -> None:
 def test_a_statement_of_the_target_raises_once_more(
     blamed: Blamed, model: str, params: tuple[tuple[str, Value], ...], kind: str
 ) -> None:
-    """A repeated statement still belongs to the target: an exception at its second execution is a crash, as
-    is one that a model raises on purpose.
+    """A repeated statement belongs to the target, so an exception at its second execution is a crash.
+
+    An exception that a model raises on purpose is also a crash.
     """
     seen = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="self.seen")
     record = blamed.record(fault(Injection(location=at(seen), model=model, params=params)))
@@ -415,7 +417,7 @@ def test_a_mutant_overwrites_its_probe(blamed: Blamed, mood: str, detail: str) -
 
 
 def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
-    """A damaged report costs one experiment; those before and after it keep their results."""
+    """A damaged report costs one experiment. Those before and after it keep their results."""
     experiments = [blamed.experiment(f) for f in (at_gap("offset", by=1.0), sensed("damage_the_counts"))]
     experiments.append(blamed.experiment(at_gap("offset", by=2.0)))
     for engine in blamed.engines:
@@ -425,8 +427,9 @@ def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
 
 @pytest.mark.parametrize("mood", ["stop_the_time", "observe_again_and_hide_it", "lose_the_lead"])
 def test_what_cannot_be_observed(blamed: Blamed, mood: str) -> None:
-    """Observing twice at one time, or a failed observation, is a probe error that names the place, even if
-    the target catches it.
+    """Observing twice at one time, or a failed observation, is a probe error that names the place.
+
+    This holds even if the target catches the error.
     """
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR

@@ -47,7 +47,7 @@ def test_every_engine_gives_the_same_tables(
 def test_killed_again_and_again(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], victim: str
 ) -> None:
-    """Killing servers or workers in mid-campaign only costs time: the tables are the same."""
+    """If servers or workers are killed during a campaign, the tables stay the same."""
     out = tmp_path / "run"
     for _ in range(3):
         process = _begun(toy, out)
@@ -68,7 +68,7 @@ def test_killed_again_and_again(
 
 @pytest.mark.slow
 def test_a_proof_goes_on_after_kills(toy: Workspace, tmp_path: Path, expected: dict[str, bytes]) -> None:
-    """A campaign killed during its proof resumes with the remaining experiments and proves none twice."""
+    """A campaign killed during its equivalence check resumes with the rest and checks none twice."""
     out, proved = tmp_path / "run", 0
     for _ in range(3):
         process = _begun(toy, out)
@@ -98,7 +98,7 @@ def _begun(toy: Workspace, out: Path) -> "subprocess.Popen[bytes]":
 
 
 def _proved(out: Path) -> list[str]:
-    """The lines of the proof, without the headers of their files."""
+    """Return the lines of the proof without the headers of their files."""
     files = (out / "proof").glob("*.jsonl")
     return [line for path in files for line in path.read_text().splitlines()[1:]]
 

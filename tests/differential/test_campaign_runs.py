@@ -33,7 +33,7 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
-    """The small campaign, run in one process without a break; no test may write to its folder."""
+    """The small campaign, run in one process without a break. No test may write to its folder."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
@@ -49,7 +49,7 @@ def undisturbed(whole: Path) -> Bytes:
 
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int) -> None:
-    """One or two xdist workers give the bytes of a run without workers."""
+    """One or two xdist workers give the same bytes as a run without workers."""
     summary = run_campaign(toy, "small", tmp_path / "run", workers=workers)
     assert summary.exit_code == 0
     assert len(list((tmp_path / "run" / "records").iterdir())) == workers
@@ -59,7 +59,7 @@ def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Byte
 def test_any_order_in_any_number_of_sessions(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run that stops after every two chunks, in shuffled order, and resumes gives the same bytes."""
+    """A run with shuffled chunks that stops after every two chunks and resumes gives the same bytes."""
     prepare, draw = Session.prepare, random.Random(3)
     taken: list[int] = []
 
@@ -82,9 +82,10 @@ def test_any_order_in_any_number_of_sessions(
 def test_lost_records_run_again(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes, closed: bool
 ) -> None:
-    """Only records lost at the end of a file are run again.
+    """If records at the end of a file are lost, only these are run again.
 
-    A file that a session has closed cannot lose records in a kill: it is refused until it is repaired.
+    A kill cannot lose records of a file that a session has closed. Such a file is refused until it is
+    repaired.
     """
     out = shutil.copytree(whole, tmp_path / "run")
     [path] = (out / "records").iterdir()
@@ -120,7 +121,7 @@ def test_derived_files_can_be_made_again(
 def test_killed_and_resumed(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:
-    """A command killed half-way leaves no process; repeated, it completes to the same bytes."""
+    """A killed command leaves no process. The same command then completes to the same bytes."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(4)
@@ -139,10 +140,10 @@ def test_killed_and_resumed(
 
 @pytest.mark.slow
 def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """After a kill, pytest resumes what `mutator run` began and reaches the same bytes; no process or
-    registration of a killed worker is left.
+    """After a kill, pytest resumes what `mutator run` began and reaches the same bytes.
 
-    The killed worker below shows that `mutator run` resumes what pytest left.
+    No process or registration of a killed worker is left. The killed worker below shows that `mutator run`
+    resumes what pytest left.
     """
     out = tmp_path / "run"
     command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
@@ -172,8 +173,9 @@ def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed
 
 
 def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A killed worker costs its chunk; the rest is run, the exit code is 3, and a resume completes the
-    campaign.
+    """A killed worker loses its chunk, the rest is run and the exit code is 3.
+
+    A resume completes the campaign.
     """
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
@@ -195,7 +197,7 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
 def test_a_worker_dies_with_its_command_from_its_first_moment(
     toy: Workspace, tmp_path: Path, words: list[str] | None
 ) -> None:
-    """A worker that is stopped before it has read anything ends when its command is killed."""
+    """If the command is killed, a worker that was stopped before it read anything ends."""
     out = tmp_path / "run"
     command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
     while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):
@@ -214,7 +216,7 @@ def test_a_worker_dies_with_its_command_from_its_first_moment(
 
 
 def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A second command in a folder in use is refused with the name of the owner, and disturbs nothing."""
+    """A second command in a folder in use is refused with the owner's name and disturbs nothing."""
     out = tmp_path / "run"
     first = Command(toy, out, *pytest_words(out, workers=0))
     first.wait_for_records(1)
@@ -241,9 +243,7 @@ def clone() -> Workspace:
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", ["as_described", "as_coded"])
 def test_the_controller_that_ships(clone: Workspace, tmp_path: Path, reading: str) -> None:
-    """The shipped controller gives the same bytes with one worker, with two, and after TERM, KILL and a
-    resume.
-    """
+    """The shipped controller gives the same bytes with one worker, two, and after TERM, KILL and a resume."""
     text = clone.campaign("quickstart").read_text()
     for old, new in (
         ("scenarios: [S1, S2, S3, S4, S5]", "scenarios: [S2]"),

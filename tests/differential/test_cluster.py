@@ -1,4 +1,4 @@
-"""A campaign on a Dask cluster gives the bytes of a local run, whichever processes die."""
+"""A campaign on a Dask cluster gives the bytes of a local run, even if processes die."""
 
 import os
 import random
@@ -35,7 +35,7 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
-    """The small campaign's results with the fork engine and two local workers, and its seal."""
+    """The small campaign's results and seal with the fork engine and two local workers."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run", workers=2, engine="fork")
     assert (summary.exit_code, summary.done) == (0, 12)
@@ -45,7 +45,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToyca
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A scheduler with two workers that no test may harm."""
+    """A scheduler with two workers. No test may harm them."""
     machines = Machines(tmp_path_factory.mktemp("two") / "machines", nanny=False)
     machines.add("alpha")
     machines.add("beta")
@@ -103,8 +103,9 @@ def test_pytest_deals_out_to_a_cluster(
 def test_a_worker_that_computes_otherwise_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If no worker reproduces the campaign's golden run, each is named with its versions and the campaign
-    ends with the reason.
+    """If no worker reproduces the golden run, the campaign ends with the reason.
+
+    Each worker is named with its versions.
     """
     real = bundle.read_json
     monkeypatch.setattr(
@@ -122,7 +123,7 @@ def test_a_worker_that_computes_otherwise_is_refused(
 def test_a_worker_with_another_version_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A worker with packages that could not resume the run is refused by name, with the difference."""
+    """A worker with packages that cannot resume the run is refused by name, with the difference."""
     real = machine.versions
     monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
@@ -140,8 +141,9 @@ def test_a_dead_command_leaves_nothing_at_work(
     number: signal.Signals,
     code: int,
 ) -> None:
-    """When the command is killed or interrupted, all processes of the workers' work end within 10 s; the rest
-    then runs to the same bytes.
+    """When the command is killed or interrupted, all processes of the workers' work end within 10 s.
+
+    The rest then runs to the same bytes.
     """
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "small", "--out", str(out)]
@@ -233,8 +235,9 @@ _OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n
 def test_a_refused_worker_is_told_and_the_others_do_its_work(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str], code: str, why: str
 ) -> None:
-    """A worker with other arithmetic or another version is refused by name, and the others complete the
-    campaign.
+    """A worker with other arithmetic or another version is refused by name.
+
+    The others complete the campaign.
     """
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text(code)
@@ -254,8 +257,9 @@ def test_a_refused_worker_is_told_and_the_others_do_its_work(
 def test_the_scheduler_dies(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str]
 ) -> None:
-    """When the scheduler dies, the command ends and says what to do; with a new scheduler, the same command
-    repeats nothing and reaches the same bytes.
+    """If the scheduler dies, the command ends and says what to do.
+
+    With a new scheduler, the same command repeats nothing and reaches the same bytes.
     """
     machines.add("alpha")
     out = tmp_path / "run"

@@ -1,4 +1,4 @@
-"""Campaigns on a foreign target, from the first command to the table, as a user meets them."""
+"""Campaigns on a foreign target, from the first command to the table, as a user runs them."""
 
 import csv
 import os
@@ -127,7 +127,7 @@ def test_a_run_leaves_what_it_should(finished_once: Finished) -> None:
 
 
 def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path) -> None:
-    """The next command deletes half-written files wherever the harness writes, and touches nothing else."""
+    """The next command deletes half-written files wherever the harness writes, and no other file."""
     places = (".run.json.7", "plan/.faults.jsonl.7", "report/tables/.a.csv.7", "series/.index.js.7")
     left = [finished / place for place in places]
     mine = finished / "report" / "tables" / ".notes"
@@ -140,7 +140,7 @@ def test_what_a_kill_left_half_written_is_cleared(toy: Workspace, finished: Path
 
 @pytest.mark.skipif(shutil.which("patch") is None, reason="needs the program patch")
 def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """A stored patch applied to the target gives, byte for byte, the files of the mutant that ran."""
+    """A stored patch applied to the target gives the files of the mutant that ran, byte for byte."""
     row = next(row for row in rows_of(finished) if row["outcome"] == "sdc")
     name = row["experiment_id"]
     tree = tmp_path / "patched"
@@ -157,7 +157,7 @@ def test_a_patch_is_the_mutant(toy: Workspace, finished: Path, tmp_path: Path) -
 def test_rerun_gives_the_same_record_and_a_trace(
     toy: Workspace, finished: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """Any experiment can be rerun exactly and its trace kept; a changed record is noticed."""
+    """A rerun reproduces any experiment exactly and can keep its trace. It notices a changed record."""
     for row in rows_of(finished)[:3]:
         single, same = rerun(toy, finished, row["experiment_id"][:8])
         assert same
@@ -172,7 +172,7 @@ def test_rerun_gives_the_same_record_and_a_trace(
 
 
 def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_path: Path) -> None:
-    """A workspace alone is enough to run an experiment and its golden run."""
+    """A workspace alone can run an experiment and its golden run."""
     experiment = plan_file.read_all(finished)[0]
     single = run_single(toy, toy.manifest("toycar"), experiment, tmp_path / "alone")
     assert single.record.status is Status.OK
@@ -191,7 +191,7 @@ def test_one_experiment_without_a_campaign(toy: Workspace, finished: Path, tmp_p
 def test_harness_errors_are_tried_again(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Harness errors give exit code 3 and no outcome; the same command runs only those experiments again."""
+    """Harness errors have exit code 3 and no outcome. The same command repeats only those experiments."""
     execute, hit = ReferenceEngine.execute, []
 
     def flaky(self: ReferenceEngine, job: Job, folder: Path) -> Execution:
@@ -217,7 +217,7 @@ def test_harness_errors_are_tried_again(
 def test_a_defect_in_a_worker_is_told(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A chunk that a harness defect ends is reported, and the others complete."""
+    """If a harness defect ends a chunk, the defect is reported and the other chunks complete."""
     run, seen = Worker.run, []
 
     def broken(self: Worker, pending: Pending) -> list[tuple[str, str]]:
@@ -236,7 +236,7 @@ def test_a_defect_in_a_worker_is_told(
 def test_the_users_pytest_is_another_matter(
     toy: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The user's pytest settings do not reach the campaign, and stay in the environment."""
+    """The user's pytest settings do not reach the campaign and remain in the environment."""
     told = {"PYTEST_ADDOPTS": "--no-such-option", "PYTEST_PLUGINS": "no_such_plugin"}
     for name, value in told.items():
         monkeypatch.setenv(name, value)
@@ -256,7 +256,7 @@ def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) ->
 
 
 def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path) -> None:
-    """A mistake in the campaign, or a missing approval, leaves no folder; an existing folder stays."""
+    """A mistake in the campaign, or a missing approval, creates no folder. An existing folder stays."""
     (tmp_path / "old").mkdir()
     for out in (tmp_path / "new", tmp_path / "old"):
         with pytest.raises(MutatorError, match="no campaign"):
@@ -267,7 +267,7 @@ def test_what_cannot_be_planned_leaves_no_folder(toy: Workspace, tmp_path: Path)
 
 
 def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
-    """A run resumes without repeating its options; other options, or other text, are refused."""
+    """A run resumes without its options repeated. Other options or texts are refused."""
     assert run_campaign(toy, "small", finished, choices=Choices(seed=3)).exit_code == 0
     for choices in (
         Choices(seed=4),
@@ -284,7 +284,7 @@ def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
 
 
 def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
-    """A finished run is refused if its target was edited since."""
+    """A finished run is refused if its target was edited afterwards."""
     with (toy.library.parent / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("# edited\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -325,8 +325,10 @@ os.write(1, (out / "results.csv").read_bytes())
 
 @pytest.mark.parametrize("workers", [pytest.param(0, marks=pytest.mark.slow), 2])
 def test_a_full_disk(toy: Workspace, finished: Path, tmp_path: Path, workers: int) -> None:
-    """A full disk stops the campaign with a clear error; with space again the same command completes it to
-    the same table and repeats no finished experiment.
+    """A full disk stops the campaign with a clear error.
+
+    Once there is space, the same command completes the run with the same table and repeats no finished
+    experiment.
     """
     disk = tmp_path / "disk"
     disk.mkdir()

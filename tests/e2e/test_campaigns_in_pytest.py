@@ -1,4 +1,4 @@
-"""Campaigns as pytest sessions, as a user of pytest meets them."""
+"""Campaigns as pytest sessions, as a user of pytest runs them."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def pytest_campaign(toy: Workspace, *words: object) -> "subprocess.CompletedProc
     ],
 )
 def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int, told: str) -> None:
-    """Under pytest a mistake gets a clear error and the exit code of its kind, without a traceback."""
+    """Under pytest, a mistake has a clear error and the exit code of its kind, without a traceback."""
     root = toy.library.parent
     (root / "newer").mkdir()
     (root / "newer" / "run.json").write_text(json.dumps({"schema": "run/99"}))
@@ -58,7 +58,7 @@ def test_pytest_answers_wrong_input(toy: Workspace, words: list[str], code: int,
 
 
 def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
-    """The plugin does nothing, and imports none of the harness, unless a campaign is requested."""
+    """Unless a campaign is requested, the plugin does nothing and imports no other part of the harness."""
     test = "import sys\n\ndef test_it():\n    assert 'mutator.execution.session' not in sys.modules\n"
     (toy.library.parent / "test_it.py").write_text(test)
     answer = pytest_campaign(toy, "test_it.py")
@@ -67,7 +67,10 @@ def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
 
 
 def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
-    """Without xdist the same items run in the command's process; a finished run has nothing to do."""
+    """Without xdist, the same items run in the command's process.
+
+    For a finished run there is nothing to do.
+    """
     words = ("--campaign", "small", "--campaign-out", tmp_path / "run")
     answer = pytest_campaign(toy, *words)
     assert answer.returncode == 0, answer.stdout
@@ -82,7 +85,7 @@ def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("given", "used"), [("loadfile", "load"), ("load", "load"), ("no", "no")])
 def test_work_is_dealt_out_piece_by_piece(tmp_path: Path, given: str, used: str) -> None:
-    """All chunks belong to one file, but `--dist loadfile` must not give all of them to one worker."""
+    """All chunks belong to one file, but `--dist loadfile` does not give all of them to one worker."""
     registered: list[object] = []
     manager = SimpleNamespace(get_plugins=lambda: (), register=registered.append)
     config: Any = SimpleNamespace(option=SimpleNamespace(dist=given), pluginmanager=manager)

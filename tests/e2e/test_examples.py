@@ -1,4 +1,4 @@
-"""The examples: third-party controllers, each from its installed package. Extra `examples`."""
+"""The examples: third-party controllers, each from its installed package (extra `examples`)."""
 
 import csv
 import re
@@ -52,14 +52,14 @@ def rows(run: Path) -> list[dict[str, str]]:
 
 
 def test_nothing_is_left_to_do(workspace: Workspace) -> None:
-    """`mutator check` finds nothing: every placeholder is filled, and each fault finds its statement."""
+    """`mutator check` reports nothing: every placeholder is filled, and each fault finds its statement."""
     assert mutator.check_library(workspace) == []
 
 
 def test_every_experiment_ends_well(run: Path) -> None:
-    """No experiment ends in a harness error or timeout; crashes are the controller's.
+    """No experiment is a harness error or timeout, and crashes are the controller's.
 
-    Some faults do harm, some do not.
+    Some faults do harm and some do not.
     """
     statuses = Counter(row["status"] for row in rows(run))
     assert sum(statuses.values()) >= 40
@@ -82,8 +82,9 @@ def test_nearly_all_are_forked(run: Path) -> None:
 
 
 def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
-    """The reference engine, with a fresh interpreter for each experiment, gives the same bytes; the
-    campaign's own proof agrees.
+    """The reference engine, with a fresh interpreter for each experiment, gives the same bytes.
+
+    The campaign's own equivalence check agrees.
     """
     assert run_campaign(workspace, "first", tmp_path / "run", workers=2, engine="reference").exit_code == 0
     for name in ("results.csv", "plan.csv"):
@@ -91,12 +92,12 @@ def test_engines_agree(run: Path, workspace: Workspace, tmp_path: Path) -> None:
 
 
 def own_lines(folder: Path, suffix: str) -> Counter[str]:
-    """Lines of the files of a kind, without comments and empty lines."""
+    """Return the lines of the files of a kind, without comments and empty lines."""
     return counted("\n".join(path.read_text() for path in sorted(folder.rglob(f"*{suffix}"))))
 
 
 def scene_lines(folder: Path) -> Counter[str]:
-    """Lines of the manifest's scene."""
+    """Return the lines of the manifest's scene."""
     (manifest,) = folder.glob("fault_library/targets/*.yaml")
     (scene,) = re.findall(r"(?m)^scene:.*\n(?:[ #].*\n?)+", manifest.read_text())
     return counted(scene)
@@ -109,8 +110,9 @@ def counted(text: str) -> Counter[str]:
 
 @pytest.mark.parametrize(("suffix", "most"), [(".py", MOST_GLUE), (".yaml", MOST_YAML)])
 def test_few_lines_are_written_by_hand(example: str, suffix: str, most: int, tmp_path: Path) -> None:
-    """An example adds few lines to those that `mutator init` writes; the scene, which does not affect
-    results, is short as well.
+    """An example adds few lines to those that `mutator init` writes.
+
+    The scene, which does not affect results, is short as well.
     """
     mutator.init_library(tmp_path / "new", target=f"installed:{INSTALLED[example]}")
     own = own_lines(EXAMPLES / example, suffix) - own_lines(tmp_path / "new", suffix)

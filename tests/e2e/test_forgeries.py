@@ -1,6 +1,6 @@
-"""Ten forgeries of a finished run, each tried twice: plain, and with every digest recomputed.
+"""Ten forgeries of a finished run, each with stale digests and with every digest recomputed.
 
-Every reader finds a plain forgery. The seal reveals one with matching digests.
+Every reader finds a forgery with stale digests. Only the seal reveals the other kind.
 """
 
 import json
@@ -44,7 +44,7 @@ def genuine(
     tmp_path_factory: pytest.TempPathFactory,
     copy_toycar: Callable[[Path], Workspace],
 ) -> tuple[Workspace, Path]:
-    """A finished forked campaign, so it has a proof; no test writes into it."""
+    """A finished campaign on the fork engine with its equivalence check. No test writes into it."""
     place = tmp_path_factory.mktemp("genuine")
     is_toy = request.param == "toy"
     workspace = copy_toycar(place) if is_toy else Workspace.find(root=CLONE)
@@ -56,12 +56,12 @@ def genuine(
 
 @pytest.fixture
 def run(genuine: tuple[Workspace, Path], tmp_path: Path) -> Path:
-    """A copy to forge, with a plot so that `show` runs nothing."""
+    """A copy of the run for a forgery. It has a plot, so `show` runs nothing."""
     return Path(shutil.copytree(genuine[1], tmp_path / "run"))
 
 
 def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
-    """The record of a hazard: its segment, its line from 0, its content."""
+    """Return the record of a hazard: its segment, its line (from 0) and its content."""
     for path in sorted((run / "records").iterdir()):
         for place, line in enumerate(path.read_text().splitlines()):
             record = json.loads(line)
@@ -71,13 +71,13 @@ def hazardous(run: Path) -> tuple[Path, int, dict[str, Any]]:
 
 
 def rewrite(path: Path, place: int, *lines: str) -> None:
-    """Replace a line by these lines."""
+    """Replace a line by the given lines."""
     old = path.read_text().splitlines()
     path.write_text("".join(f"{line}\n" for line in [*old[:place], *lines, *old[place + 1 :]]))
 
 
 def change(run: Path, **values: Any) -> str:
-    """Change fields of the record of a hazard; return its id."""
+    """Change fields of the record of a hazard and return its id."""
     path, place, record = hazardous(run)
     rewrite(path, place, canonical(record | values))
     return str(record["experiment_id"])
@@ -174,7 +174,7 @@ def a_plan_condition(run: Path, deep: bool) -> None:
 
 
 def replan(run: Path, changed: Callable[[list[Experiment]], list[Experiment]]) -> None:
-    """Replace the plan by one of other experiments, with matching run.json and plan.csv."""
+    """Replace the plan by a plan of other experiments, with matching run.json and plan.csv."""
     plan = load_plan(RunFolder.unverified(run))
     old = list(plan.experiments)
     new = tuple(changed(old))
@@ -237,7 +237,7 @@ forged = pytest.mark.parametrize("forge", FORGERIES, ids=lambda forge: forge.__n
 def cli(
     genuine: tuple[Workspace, Path], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> Callable[..., tuple[int, str]]:
-    """Run `mutator WORDS...` in the genuine run's workspace; return exit code and errors."""
+    """Run `mutator WORDS...` in the genuine run's workspace and return exit code and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(genuine[0].library.parent))
 
     def answer(*words: object) -> tuple[int, str]:
@@ -253,7 +253,7 @@ EDITED = "results.csv: does not match plan and records; rebuilt"
 
 
 def readers(run: Path, genuine: Path) -> dict[str, tuple[object, ...]]:
-    """Command lines that read a run folder."""
+    """Return command lines that read a run folder."""
     campaign = RunFolder.unverified(genuine).head["campaign"]
     name = hazardous(genuine)[2]["experiment_id"]
     out = run.parent
@@ -278,8 +278,9 @@ BLIND = {the_table: ("show", "rerun", "compare", "merge")}
 def test_a_plain_forgery_is_found_by_every_reader(
     genuine: tuple[Workspace, Path], run: Path, cli: Cli, forge: Callable[[Path, bool], None]
 ) -> None:
-    """The reader exits with an error that names the forged file; a forged table is only rebuilt, with a
-    warning.
+    """Each reader exits with an error that names the forged file.
+
+    If only the table is forged, it is rebuilt with a warning.
     """
     forge(run, False)
     for reader, words in readers(run, genuine[1]).items():
@@ -299,7 +300,7 @@ def test_a_plain_forgery_is_found_by_every_reader(
 def test_a_plain_forgery_is_found_by_the_api(
     genuine: tuple[Workspace, Path], run: Path, forge: Callable[[Path, bool], None]
 ) -> None:
-    """The Python API finds it, too; a change made only in the table does not reach the frame."""
+    """The Python API finds the forgery, too. A change in the table alone does not reach the frame."""
     name = hazardous(genuine[1])[2]["experiment_id"]
     forge(run, False)
     if forge is the_table:
@@ -314,7 +315,7 @@ def test_a_plain_forgery_is_found_by_the_api(
 
 
 def test_the_genuine_run_passes(genuine: tuple[Workspace, Path], run: Path, cli: Cli, tmp_path: Path) -> None:
-    """The genuine run passes, also as a read-only copy elsewhere, and its seal is the printed one."""
+    """The genuine run passes, also as a read-only copy elsewhere. Its seal is the printed one."""
     known = seal_of(RunFolder.open(genuine[1]))
     for path in [run, *run.rglob("*")]:
         path.chmod(0o555 if path.is_dir() else 0o444)
@@ -336,7 +337,7 @@ def test_a_forgery_whose_digests_all_fit_is_found_by_the_seal(
 ) -> None:
     """A consistent forgery opens like any other run, but its seal differs from the printed one.
 
-    An edited table follows from no record.
+    An edited table does not match the records.
     """
     known = seal_of(RunFolder.open(genuine[1]))
     forge(run, True)

@@ -1,4 +1,4 @@
-"""A killed server: its jobs leave no processes and no half-written files, and the run folder verifies."""
+"""Killing the server leaves no job's processes and no half-written files, and the run folder verifies."""
 
 import http.client
 import json
@@ -36,7 +36,7 @@ class Server:
         return cls(folder, root, *started(folder, root))
 
     def restart(self) -> None:
-        """Start another server after this one has ended."""
+        """Start another server once this one has ended."""
         self.process, self.address = started(self.folder, self.root)
 
     @property
@@ -48,7 +48,7 @@ class Server:
         return self.address.partition("token=")[2]
 
     def ask(self, path: str, body: Any = None) -> Any:
-        """The server's response for one of its own pages."""
+        """Return the server's response for one of its own pages."""
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
         headers = {"Cookie": f"mutator-{self.port}={self.token}", "Content-Type": "application/json"}
         headers |= {"Origin": f"http://127.0.0.1:{self.port}"}
@@ -59,7 +59,7 @@ class Server:
         return json.loads(answer)
 
     def wait_for(self, what: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Wait until this holds for the newest job."""
+        """Wait until the condition holds for the newest job."""
         deadline = time.monotonic() + 120
         while time.monotonic() < deadline:
             [job, *_] = self.ask("/api/jobs")["jobs"]
@@ -70,7 +70,7 @@ class Server:
 
 
 def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
-    """Start a server; return it and the address that it prints."""
+    """Start a server and return it with the address that it prints."""
     with (folder / "stderr").open("a") as errors:
         process = subprocess.Popen(
             [sys.executable, "-m", "mutator", "serve", "runs", "--no-browser", "--root", str(root)],
@@ -84,7 +84,7 @@ def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
 
 
 def descendants(pid: int) -> set[int]:
-    """All descendants of a process, in any session."""
+    """Return all descendants of a process, in any session."""
     parents = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -99,7 +99,7 @@ def descendants(pid: int) -> set[int]:
 
 
 def living(pids: set[int]) -> set[int]:
-    """The processes that are still alive."""
+    """Return the processes that are still alive."""
     return {pid for pid in pids if Path(f"/proc/{pid}").exists() and _state(pid) != "Z"}
 
 
@@ -124,7 +124,7 @@ def mutator(server: Server, *words: str) -> subprocess.CompletedProcess[str]:
 
 
 def check_left(server: Server, run: str) -> None:
-    """No file of the run folder is half-written, and the whole folder verifies."""
+    """Check that no file of the run folder is half-written and that the whole folder verifies."""
     folder = server.folder / "runs" / run
     assert not [path for path in folder.rglob("*") if is_half_written(path.name)]
     if (folder / "digests.json").exists():
@@ -133,7 +133,10 @@ def check_left(server: Server, run: str) -> None:
 
 
 def kill(server: Server, number: int) -> int:
-    """End the server by a signal and wait until its jobs' processes are gone; return how many there were."""
+    """End the server by a signal and wait until the processes of its jobs are gone.
+
+    Return the number of these processes.
+    """
     pids = descendants(server.process.pid)
     server.process.send_signal(number)
     server.process.wait()
@@ -144,7 +147,7 @@ def kill(server: Server, number: int) -> int:
 
 @pytest.fixture
 def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Server]:
-    """A server of the toy, without any run."""
+    """A server of the toy without any run."""
     shutil.rmtree(toycar.library / "faults" / "hostile")
     (tmp_path / "runs").mkdir()
     started = Server.start(tmp_path, toycar.library.parent)
@@ -157,7 +160,7 @@ def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Ser
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("stage", ["planning", "experiments", "tables"])
 def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int) -> None:
-    """A campaign ends with its server at any stage and signal; the same campaign then completes."""
+    """A campaign ends with its server at any stage and signal. The same campaign then completes."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith(stage) or bool(job["ended"]))
     assert kill(server, number)
@@ -170,7 +173,7 @@ def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["plot", "film", "still", "report", "rerun"])
 def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) -> None:
-    """A server killed at any moment of such a job leaves the run folder unchanged or complete."""
+    """If the server is killed during such a job, the run folder stays unchanged or is complete."""
     done = mutator(server, "run", "toy", "--out", "runs/new", "--limit", "6", "-n", "2")
     assert done.returncode == 0, done.stdout + done.stderr
     ids = [line.split(",")[0] for line in (server.folder / "runs/new/plan.csv").read_text().splitlines()[1:]]
@@ -194,9 +197,7 @@ def test_what_is_made_of_a_run_is_whole_or_missing(server: Server, kind: str) ->
 
 @pytest.mark.slow
 def test_a_cancelled_job_leaves_nothing_running(server: Server) -> None:
-    """All processes of a cancelled job are gone before it is reported as ended, and the server continues with
-    the next one.
-    """
+    """All processes of a cancelled job are gone before it is reported as ended. The next job then runs."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith("experiments"))
     pids = descendants(server.process.pid)

@@ -1,5 +1,6 @@
-"""A command killed between any two writes leaves a folder that opens, and the same command finishes it as if
-undisturbed.
+"""A command that is killed between two writes leaves a folder that opens.
+
+The same command finishes the run.
 """
 
 import shutil
@@ -21,11 +22,11 @@ RENAMES = ((Path, "replace"), (Path, "rename"), (shutil, "rmtree"))
 
 
 class Killed(BaseException):
-    """Stands for the end of the process."""
+    """Raised in place of the end of the process."""
 
 
 class Death:
-    """Allow this many renames in a run folder, and fail all later ones: files appear by being renamed.
+    """Allow this many renames in a run folder and fail all later ones. Files appear by being renamed.
 
     Renames of scratch files do not count.
     """
@@ -49,14 +50,14 @@ class Death:
 
 
 def run(workspace: Workspace, out: Path) -> str | None:
-    """Run two experiments of the toy campaign, or resume them; return the seal."""
+    """Run two experiments of the toy campaign, or resume them, and return the seal."""
     summary = run_campaign(workspace, "small", out, choices=CHOICES, engine="reference")
     assert summary.exit_code == 0
     return summary.seal
 
 
 def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str | None, bytes]) -> bool:
-    """Kill a run after this many renames, check the folder and resume; return whether it was killed."""
+    """Kill a run after this many renames, check the folder and resume. Return whether the run was killed."""
     with pytest.MonkeyPatch.context() as patch:
         death = Death(out, after, patch)
         with suppress(Killed, AssertionError):
@@ -69,7 +70,7 @@ def check_kill(workspace: Workspace, out: Path, after: int, expected: tuple[str 
 
 @pytest.fixture
 def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
-    """Seal and table of an undisturbed run. Its checks are then cached."""
+    """The seal and table of an undisturbed run, which also caches the checks."""
     out = tmp_path / "undisturbed"
     found = run(toy, out)
     assert found == seal_of(RunFolder.open(out)) is not None
@@ -79,7 +80,7 @@ def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
 def test_kills_between_two_writes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
 ) -> None:
-    """Kills during planning, while checks are installed, and while the run is finished."""
+    """Kills during planning, while checks are installed and while the run is finished do no harm."""
     for after in (5, 8, 12):
         assert check_kill(toy, tmp_path / str(after), after, undisturbed)
 
@@ -88,7 +89,7 @@ def test_kills_between_two_writes(
 def test_every_kill_between_two_writes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
 ) -> None:
-    """Kills before the first write, before the second, and so on."""
+    """Kills before the first write, before the second and so on do no harm."""
     after = 0
     while check_kill(toy, tmp_path / str(after), after, undisturbed):
         after += 1

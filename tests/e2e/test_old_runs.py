@@ -1,4 +1,4 @@
-"""Run folders of earlier versions: they open, compare, export, report and show, but do not resume.
+"""Run folders of earlier versions open, compare, export, report and show, but do not resume.
 
 tests/fixtures/ has one folder for each run-folder schema, with the library and target that made it.
 """
@@ -30,14 +30,14 @@ Cli = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture(scope="module", params=FIXTURES, ids=lambda path: path.name)
 def fixture(request: pytest.FixtureRequest) -> Path:
-    """A fixture; no test may write to it."""
+    """A fixture. No test may write to it."""
     path: Path = request.param
     return path
 
 
 @pytest.fixture(scope="module")
 def place(fixture: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of a fixture: `toy/` and the run folder `small/`, which tests may add to."""
+    """A copy of a fixture, `toy/` and the run folder `small/`. Tests may add files to it."""
     return shutil.copytree(fixture, tmp_path_factory.mktemp("old") / fixture.name)
 
 
@@ -52,7 +52,7 @@ def fresh(place: Path) -> Path:
 
 @pytest.fixture
 def cli(place: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...` with the fixture's library; return exit code, output and errors."""
+    """Run `mutator WORDS...` with the fixture's library and return exit code, output and errors."""
     monkeypatch.chdir(place)
     monkeypatch.setenv("MUTATOR_ROOT", str(place / "toy"))
 
@@ -68,7 +68,10 @@ LATER = {"fault_tolerant_time", "manifest_to_hazard"}  # columns that old runs l
 
 
 def assert_same_cells(new: Path, old: Path) -> None:
-    """Equal tables, except newer columns and the car columns that version 0.1 left empty for this target."""
+    """Check that tables are equal.
+
+    Newer columns do not count, nor do the car columns that version 0.1 left empty for this target.
+    """
     today, then = (pd.read_csv(path, dtype=str, keep_default_na=False) for path in (new, old))
     assert {*today.columns} - {*then.columns} <= LATER
     shared = [column for column in today.columns if column in then.columns or column not in LATER]
@@ -85,7 +88,7 @@ def test_there_is_one_for_each_schema() -> None:
 
 
 def test_it_opens_and_its_ids_are_those_of_today(place: Path) -> None:
-    """Plan, records, results and patches can be read, and each id still follows from its content."""
+    """Plan, records, results and patches can be read. Each id still follows from its content."""
     run = load_run(place / "small", workspace=place / "toy")
     assert [*run.experiments] == [*plan_file.ids(run.path)]
     assert {e.fault.id for e in run.experiments.values()} == {*run.faults}
@@ -107,7 +110,7 @@ def test_a_fresh_run_is_the_same(place: Path, fresh: Path) -> None:
 
 
 def test_it_says_whether_it_can_be_verified(cli: Cli, place: Path) -> None:
-    """Runs from before digests are marked wherever they are shown; later ones have a seal."""
+    """Runs from before digests are marked wherever they are shown. Later ones have a seal."""
     old = is_old(place / "small")
     run = load_run(place / "small")
     assert (run.verifiable, run.seal is None, "not verifiable" in repr(run)) == (not old, old, old)
@@ -126,7 +129,7 @@ def is_old(run: Path) -> bool:
 
 
 def test_it_compares(cli: Cli, fresh: Path) -> None:
-    """Compared with itself and with a fresh run, in either order, nothing changed."""
+    """Compared with itself or with a fresh run, in either order, nothing has changed."""
     for one, other in (("small", "small"), ("small", "fresh"), ("fresh", "small")):
         code, out, err = cli("compare", one, other, "--fail-on", "worse,new-hazard,unmatched")
         assert code == 0, err
@@ -135,7 +138,7 @@ def test_it_compares(cli: Cli, fresh: Path) -> None:
 
 @pytest.mark.parametrize("format", list(Format))
 def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> None:
-    """Every format is written with every experiment; MCAP with those that have series or traces."""
+    """Every format contains every experiment. MCAP contains those that have series or traces."""
     file = place / f"export-{format.value}"
     code, _, err = cli("export", "small", "--format", format.value, "--out", file)
     assert code == 0, err
@@ -155,7 +158,7 @@ def test_it_exports(cli: Cli, place: Path, fixture: Path, format: Format) -> Non
 
 
 def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
-    """The report is written and the results are rebuilt from the records, cell for cell."""
+    """The report is written. The results rebuilt from the records are equal, cell for cell."""
     shutil.copytree(place / "small", copy := place / "reported")
     for derived in ("results.csv", "results.parquet", "timings.parquet"):
         (copy / derived).unlink()
@@ -167,7 +170,7 @@ def test_it_is_reported(cli: Cli, place: Path, fixture: Path) -> None:
 
 
 def test_an_experiment_is_shown(cli: Cli, place: Path) -> None:
-    """Diff, verdict and plot are the stored ones; nothing is run."""
+    """Diff, verdict and plot are the stored ones, and nothing is run."""
     code, out, err = cli("show", KEPT, "--run", "small", "--json")
     assert code == 0, err
     shown = json.loads(out)
@@ -184,7 +187,7 @@ def test_its_approvals_are_read(cli: Cli, place: Path) -> None:
 
 
 def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Another mutator version or other sources are refused by name, and nothing is written."""
+    """Another mutator version or other sources are refused by name. Nothing is written."""
     shutil.copytree(place / "small", copy := place / "resumed")
     shutil.copytree(place / "toy", library := place / "changed")
     before = sorted((path, path.stat().st_mtime_ns) for path in copy.rglob("*") if path.name != "owner.lock")
@@ -207,7 +210,7 @@ def test_it_is_not_run_on(cli: Cli, place: Path, monkeypatch: pytest.MonkeyPatch
 
 
 def damages(data: bytes, draw: random.Random) -> Iterator[bytes]:
-    """Damage to a file: a flipped bit, a lost end, zero bytes, dropped, doubled or swapped lines."""
+    """Return damages to a file: a flipped bit, a lost end, zero bytes, dropped, doubled or swapped lines."""
     place = draw.randrange(len(data) or 1)
     yield data[:place] + bytes([(data[place] if data else 0) ^ 1 << draw.randrange(8)]) + data[place + 1 :]
     yield data[:place]
@@ -225,7 +228,7 @@ READ = ("*.json", "*.jsonl", "*.yaml", "*.csv", "*.parquet", "*.npz", "*.patch",
 
 
 def test_a_damaged_one_never_ends_in_a_traceback(cli: Cli, place: Path) -> None:
-    """Readers of a damaged folder give a clear error or correct output, never a traceback."""
+    """For a damaged folder, readers give a clear error or correct output, never a traceback."""
     shutil.copytree(place / "small", copy := place / "damaged")
     draw = random.Random(place.name)
     files = sorted({path for pattern in READ for path in copy.rglob(pattern) if "report" not in path.parts})

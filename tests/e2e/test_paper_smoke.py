@@ -1,4 +1,4 @@
-"""One per cent of the paper's campaign, on the shipped controller."""
+"""One per cent of the paper's campaign on the shipped controller."""
 
 import csv
 from pathlib import Path
@@ -12,9 +12,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_a_hundredth_of_the_paper(tmp_path: Path) -> None:
-    """All 113 experiments end as results, in every scenario and by both methods; a second run
-    repeats none.
-    """
+    """All 113 experiments have results, in every scenario and for both methods. A second run repeats none."""
     workspace, out = Workspace.find(root=Path(__file__).parents[2]), tmp_path / "run"
     summary = run_campaign(workspace, "paper_smoke", out, workers=2)
     assert (summary.exit_code, summary.done, summary.planned) == (0, 113, 113)

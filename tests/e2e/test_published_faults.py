@@ -34,7 +34,7 @@ ORIGINAL = {
 
 @pytest.fixture(scope="module")
 def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, str]]]:
-    """Rows of the results table by variant."""
+    """Return rows of the results table by variant."""
     out = tmp_path_factory.mktemp("published") / "run"
     workspace = Workspace.find(root=Path(__file__).parents[2])
     summary = run_campaign(workspace, "published_s1", out, workers=2, choices=Choices(only=MEASURED))
@@ -49,8 +49,9 @@ def rows(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, s
 def test_hazards_and_alerts_are_those_of_the_original(
     rows: dict[str, list[dict[str, str]]], variant: str
 ) -> None:
-    """The kinds of hazards and alerts are the same; hazard counts differ by at most two, since the values are
-    drawn again.
+    """The kinds of hazards and alerts are the same as the original's.
+
+    Hazard counts differ by at most two, because the values are drawn again.
     """
     runs, hazards, kind, alerts, t_alert = ORIGINAL[variant]
     found = rows[variant]

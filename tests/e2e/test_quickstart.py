@@ -1,4 +1,4 @@
-"""The whole quickstart on the shipped controller, and the results that it must show."""
+"""The whole quickstart on the shipped controller and the results that it must show."""
 
 import csv
 from collections import Counter
@@ -25,7 +25,7 @@ def workspace() -> Workspace:
 
 @pytest.fixture(scope="module")
 def quickstart(workspace: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run folder of the quickstart, run by two workers."""
+    """The run folder of the quickstart, run with two workers."""
     out = tmp_path_factory.mktemp("quickstart") / "run"
     summary = run_campaign(workspace, "quickstart", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 60)
@@ -38,7 +38,10 @@ def rows(quickstart: Path) -> list[Row]:
 
 
 def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
-    """60 runs, all ok: hazards of all three kinds, silent corruption, masked and never activated faults."""
+    """All 60 runs are ok.
+
+    They show hazards of all three kinds, silent corruption, masked and unactivated faults.
+    """
     assert Counter(row["status"] for row in rows) == {"ok": 60}
     assert {row["outcome"] for row in rows} == {"hazard", "sdc", "masked", "not_activated"}
     assert all(any(row[name] == "1" for row in rows) for name in ("h1", "h2", "h3"))
@@ -49,7 +52,7 @@ def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
     [("jamming", {"can_error", "radar_error"}), ("camera_unavailable", {"model_error"})],
 )
 def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts: set[str]) -> None:
-    """Without radar or camera data the controller raises an alert within 0.6 s of the activation."""
+    """Without radar or camera data, the controller raises an alert within 0.6 s of activation."""
     active = [row for row in rows if row["fault_type"] == fault_type and row["activated"] == "1"]
     assert active
     for row in active:
@@ -58,9 +61,9 @@ def test_lost_data_are_noticed_at_once(rows: list[Row], fault_type: str, alerts:
 
 
 def test_distance_in_the_camera_alone_changes_little(rows: list[Row]) -> None:
-    """A wrong radar distance reaches the actuators; a wrong camera distance alone does not.
+    """A wrong radar distance reaches the actuators. A wrong camera distance alone does not.
 
-    `test_published_faults` compares the number of hazards, value by value, with the original's.
+    `test_published_faults` compares the number of hazards with the original's, value by value.
     """
 
     def manifested(module: str, fault_type: str) -> list[str]:
@@ -75,7 +78,7 @@ def test_distance_in_the_camera_alone_changes_little(rows: list[Row]) -> None:
 
 
 def test_times_are_in_order(rows: list[Row]) -> None:
-    """No event precedes the activation, and reaction times are positive or missing."""
+    """No event precedes the activation. Reaction times are positive or missing."""
     for row in rows:
         for name in ("t_manifest", "t_h1", "t_h2", "t_h3", "t_alert"):
             assert not row[name] or float(row[name]) >= float(row["t_activation"])
@@ -84,7 +87,7 @@ def test_times_are_in_order(rows: list[Row]) -> None:
 
 @pytest.mark.parametrize("scenario", sorted(CONTEXTS))
 def test_contexts_that_fault_free_runs_reach(quickstart: Path, workspace: Workspace, scenario: str) -> None:
-    """The golden runs reach as many contexts of the table as the original's."""
+    """The golden runs reach as many contexts of the table as the original's runs."""
     manifest = workspace.manifest("openpilot")
     trace = load_trace(manifest, quickstart / "golden" / scenario)
     table = workspace.context_table("accelerate_decelerate")

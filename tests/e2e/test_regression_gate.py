@@ -1,4 +1,4 @@
-"""The gate of the how-to refuses a worse controller version and passes the same one."""
+"""The gate in the how-to page refuses a worse controller version and passes an equal one."""
 
 import os
 import re
@@ -53,7 +53,7 @@ def gate(root: Path, base: str, new: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_a_worse_version_is_refused(root: Path) -> None:
-    """The gate names the newly hazardous faults and exits with 1; the same version passes."""
+    """The gate names the faults that became hazardous and exits with 1. The same version passes."""
     refused = gate(root, "tree", "worse")
     assert refused.returncode == 1, refused.stderr
     named = [line for line in refused.stderr.splitlines() if line.startswith("error: ")]

@@ -1,4 +1,4 @@
-"""A run resumes with the Python and packages it began with, or reports the difference."""
+"""A run resumes with the Python and packages that it started with, or reports the difference."""
 
 import json
 import os
@@ -31,7 +31,7 @@ PYTHONS = "CPython 3.11.7, here CPython 3.12.1"
 
 
 class OnePiece:
-    """A distributor that is interrupted after one piece of the work."""
+    """A distributor that is interrupted after one piece of work."""
 
     def run(self, session: Session) -> None:
         name = session.worker_name("mine")
@@ -45,7 +45,7 @@ class OnePiece:
 
 @pytest.fixture
 def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> Cli:
-    """Run `mutator WORDS...`; return exit code, output and errors."""
+    """Run `mutator WORDS...` and return exit code, output and errors."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
 
     def run(*words: object) -> tuple[int, str, str]:
@@ -58,7 +58,7 @@ def cli(toy: Workspace, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFi
 
 @pytest.fixture
 def half(toy: Workspace, tmp_path: Path, python: Callable[[str], None]) -> Path:
-    """A run folder in which Python 3.11.7 has run two experiments; the current version is 3.12.1."""
+    """A run folder with two experiments run by Python 3.11.7. The current version is 3.12.1."""
     out = tmp_path / "half"
     python("3.11.7")
     assert run_campaign(toy, "small", out, distributor=OnePiece()).done == 2
@@ -68,13 +68,13 @@ def half(toy: Workspace, tmp_path: Path, python: Callable[[str], None]) -> Path:
 
 @pytest.fixture
 def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Pretends to be a Python of this version."""
+    """Pretend to be a Python of this version."""
     return lambda version: monkeypatch.setattr("platform.python_version", lambda: version)
 
 
 @pytest.fixture
 def driven(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Names of the fault-free runs that are run."""
+    """Return the names of the fault-free runs that are run."""
     names: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -104,7 +104,7 @@ def contents(folder: Path) -> dict[Path, bytes]:
 
 
 def test_another_python_is_refused(cli: Cli, half: Path) -> None:
-    """Exit code 2 with both versions and the remedy; nothing is run or written."""
+    """The exit code is 2, with both versions and the remedy. Nothing is run or written."""
     before = contents(half)
     code, _, err = cli("run", "small", "--out", half, "-n", "0")
     assert code == 2
@@ -115,8 +115,10 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
 def test_another_python_is_accepted_and_noted(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
-    """With the option, the fault-free runs are repeated and agree, and the results are those of an
-    undisturbed run. run.json, the report and `show` say which version ran what.
+    """With the option, the fault-free runs are repeated and agree, and the results equal an undisturbed
+    run's.
+
+    run.json, the report and `show` say which version ran what.
     """
     before = len(driven)
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
@@ -139,7 +141,7 @@ def test_another_python_is_accepted_and_noted(
 
 
 def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the fault-free runs differ, the option does not help, and nothing is written."""
+    """If the fault-free runs differ, the option has no effect and nothing is written."""
     before = contents(half)
     monkeypatch.setattr(ReferenceEngine, "execute", other_digits(ReferenceEngine.execute))
     code, _, err = cli("run", "small", "--out", half, "-n", "0", "--accept-versions")
@@ -150,7 +152,7 @@ def test_accepted_versions_must_compute_alike(cli: Cli, half: Path, monkeypatch:
 def test_pytest_refuses_and_accepts_as_the_command_does(
     toy: Workspace, half: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """Under pytest a session has the same option and exit code."""
+    """Under pytest, a session has the same option and exit code."""
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     plain = ["-c", os.devnull, "-p", "no:cacheprovider", "--noconftest", "--rootdir", str(half)]
     words = [*plain, "--disable-plugin-autoload", "-p", "mutator"]
@@ -191,7 +193,7 @@ Shard = Callable[..., Path]
 def shard(
     toy: Workspace, tmp_path: Path, python: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> Shard:
-    """Run one of two shards on a separate machine, with a Python of this version."""
+    """Run one of two shards on a separate machine with a Python of this version."""
 
     def run(number: int, version: str = "3.11.7") -> Path:
         python(version)
@@ -205,7 +207,10 @@ def shard(
 
 @pytest.mark.slow
 def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: Shard, tmp_path: Path) -> None:
-    """Exit code 2 with the list; if accepted, the merged run keeps and lists the stretches of both."""
+    """Without the option, the exit code is 2 and the versions are listed.
+
+    With the option, the merged run keeps and lists the stretches of both.
+    """
     words = ("merge", shard(1, "3.11.7"), shard(2, "3.12.1"), "--out", tmp_path / "out")
     code, _, err = cli(*words)
     assert code == 2 and "part2: not run as " in err and PYTHONS in err and "--accept-versions" in err
@@ -224,7 +229,7 @@ def test_shards_of_other_versions_are_merged_only_if_accepted(cli: Cli, shard: S
 def test_shards_of_other_machines_are_merged(
     cli: Cli, shard: Shard, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Shards from different processors merge if their fault-free runs agree; a difference is an error."""
+    """Shards from different processors merge if their fault-free runs agree. A difference is an error."""
     one = shard(1)
     assert cli("merge", one, shard(2), "--out", tmp_path / "out")[0] == 0
     shutil.rmtree(tmp_path / "part2")
@@ -235,7 +240,7 @@ def test_shards_of_other_machines_are_merged(
 
 
 def _other_pythons() -> Iterator[str]:
-    """Interpreters of another minor version that can run mutator."""
+    """Return interpreters of another minor version that can run mutator."""
     places = [*map(Path, os.environ["PATH"].split(os.pathsep)), *Path.home().glob(".pyenv/versions/*/bin")]
     for minor in (11, 12, 13):
         name = f"python3.{minor}"
@@ -246,7 +251,7 @@ def _other_pythons() -> Iterator[str]:
 
 @pytest.mark.slow
 def test_two_real_pythons(toy: Workspace, tmp_path: Path) -> None:
-    """Another Python refuses the folder with the list of differences, and resumes it if accepted."""
+    """Another Python refuses the folder with a list of differences and resumes the run if accepted."""
     python = next(_other_pythons(), None)
     if python is None:
         pytest.skip("there is no second Python")

@@ -1,4 +1,4 @@
-"""Disturbed frames in the closed loop: each effect at each level, with either detector."""
+"""Disturbed frames in the closed loop: each effect at each level with either detector."""
 
 import csv
 from collections import Counter
@@ -23,7 +23,10 @@ def workspace() -> Workspace:
 
 
 def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
-    """The number of levels of each fault type that led out of the lane; every run must have ended well."""
+    """Return the number of levels of each fault type at which the car left its lane.
+
+    Every run must have ended well.
+    """
     summary = run_campaign(workspace, f"vision_levels_{detector}", out, workers=2)
     assert (summary.exit_code, summary.done) == (0, 69)
     rows = list(csv.DictReader((out / "results.csv").open()))
@@ -32,8 +35,9 @@ def departures(workspace: Workspace, out: Path, detector: str) -> Counter[str]:
 
 
 def test_levels(workspace: Workspace, tmp_path: Path) -> None:
-    """Rain, snow and contrast mislead the published detector, fog and blur do not; the other detector is more
-    robust.
+    """Rain, snow and contrast mislead the published detector, and fog and blur do not.
+
+    The other detector is more robust.
     """
     paper = departures(workspace, tmp_path / "paper", "paper")
     robust = departures(workspace, tmp_path / "robust", "robust")
@@ -46,7 +50,7 @@ def test_levels(workspace: Workspace, tmp_path: Path) -> None:
 def test_the_cache_of_pictures_changes_nothing(
     workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A campaign gives the same bytes with a cold and a warm cache of frames."""
+    """A campaign gives the same bytes with an empty and a filled cache of frames."""
     cache = tmp_path / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     runs = [tmp_path / "cold", tmp_path / "warm"]

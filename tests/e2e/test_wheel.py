@@ -1,4 +1,4 @@
-"""sdist and wheel, built by the standard front end, installed and used outside a clone."""
+"""The sdist and the wheel, built by the standard front end, installed and used outside a clone."""
 
 import json
 import os
@@ -23,7 +23,7 @@ CHAFF = ("radar/chaff", "--scenario", "S1", "--trigger", "C2", "--value", "40")
 
 
 def call(*words: object, here: Path) -> str:
-    """Run a command in a folder and return its output, which also goes into a failure's message."""
+    """Run a command in a folder and return its output. A failure's message includes the output."""
     settings = ("MUTATOR_", "PYTHONPATH", "PYTHONHOME", "VIRTUAL_ENV")
     kept = {name: value for name, value in os.environ.items() if not name.startswith(settings)}
     done = subprocess.run(
@@ -84,7 +84,7 @@ def elsewhere(tmp_path: Path) -> Path:
 def test_a_wheel_from_the_clone_is_the_one_from_the_sdist(
     clone: Path, built: Path, wheel: Path, tmp_path: Path
 ) -> None:
-    """The sdist has everything that a wheel needs, and leftovers of earlier builds stay out of it."""
+    """The sdist has everything that a wheel needs. Leftovers of earlier builds stay out of it."""
     stale = clone / "build" / "lib" / "mutator" / "stale.py"
     stale.parent.mkdir(parents=True, exist_ok=True)
     stale.touch()
@@ -120,7 +120,7 @@ def test_a_wheel_holds_the_harness_and_what_ships_with_it(wheel: Path) -> None:
 
 
 def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhere: Path) -> None:
-    """`import selfdrive` fails in an environment with the wheel, and use leaves no bytecode of it."""
+    """With the wheel installed, `import selfdrive` fails, and use leaves no bytecode of the controller."""
     code = "import importlib.util; print(importlib.util.find_spec('selfdrive'))"
     assert call(python, "-c", code, here=elsewhere) == "None\n"
     mutator = python.with_name("mutator")
@@ -132,8 +132,9 @@ def test_the_controller_is_neither_importable_nor_compiled(python: Path, elsewhe
 
 
 def test_the_first_commands_in_an_empty_folder(python: Path, elsewhere: Path) -> None:
-    """In an empty folder the library is listed, one fault is tried, and a campaign runs the same experiments
-    as in the clone.
+    """In an empty folder, the library is listed and one fault is tried.
+
+    A campaign runs the same experiments as in the clone.
     """
     mutator, workspace = python.with_name("mutator"), Workspace.find(CLONE)
     listed = json.loads(call(mutator, "list", "--json", here=elsewhere))
