@@ -1,4 +1,4 @@
-"""Judges a run from trace and record: hazards, the end of the drive, and metrics."""
+"""Judges a run from its trace and record: hazards, the end of the drive, and metrics."""
 
 import math
 from collections.abc import Mapping
@@ -23,9 +23,9 @@ _TINY = 1e-9  # s; times are sums of steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """`hazards` are (name, first time); `alerts` are (name, time) of every raise. `t_end` is when a terminal
-    hazard ended the drive, or None. `metrics` are numbers, including margins; metrics without a value are
-    left out. Times are in s."""
+    """The judgement of a run. `hazards` are (name, first time), and `alerts` are (name, time) of every raise.
+    `t_end` is the time at which a terminal hazard ended the drive, or None. `metrics` are numbers and include
+    margins; metrics without a value are left out. Times are in s."""
 
     hazards: tuple[tuple[str, float], ...]
     alerts: tuple[tuple[str, float], ...]
@@ -34,22 +34,22 @@ class Judged:
 
 
 def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
-    """The recorded channels and the judgement of the run in the output folder `out`. BadOutput if trace or
-    record is missing or cannot be judged."""
+    """Load the recorded channels of the run in the output folder `out`, and judge it. Raise BadOutput if
+    trace or record is missing or cannot be judged."""
     trace = load_channels(manifest, out)
     return trace, judge_run(manifest, trace, load_record(manifest, out))
 
 
 def load_channels(manifest: TargetManifest, out: Path) -> Trace:
-    """The manifest's channels that the run in `out` recorded; BadOutput if one needed for the verdict is
-    missing."""
+    """Load the manifest's channels that the run in `out` recorded. Raise BadOutput if a channel that the
+    verdict needs is missing."""
     needed = {*manifest.compared, *manifest.judged}
     others = [channel for channel in manifest.channels if channel not in needed]
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
 
 
 def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any]) -> Judged:
-    """Judge a run. `trace` must have the channels that the manifest judges by."""
+    """Judge a run. `trace` must have the channels that the manifest needs for judging."""
     values = values_of(manifest, trace)
     hazards, metrics = [], []
     ends: dict[str, float] = {}
@@ -79,9 +79,10 @@ def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any])
 
 
 def values_of(manifest: TargetManifest, trace: Trace) -> Values:
-    """The variables of the manifest's formulas, a number for each step: time, channels, derived values.
+    """The variables of the manifest's formulas, with a number for each step: time, channels and derived
+    values.
 
-    A channel with its own times keeps its newest value; before its first it has none (NaN).
+    A channel with its own times keeps its newest value. Before its first value it is NaN.
     """
     time = np.asarray(trace[manifest.time_channel], dtype=float)
     values = {TIME: time}
@@ -104,7 +105,7 @@ def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.
 def _first(
     hazard: Hazard, values: Values, robust: np.ndarray | None, record: Mapping[str, Any]
 ) -> float | None:
-    """The first time of a hazard."""
+    """The time at which a hazard first occurs; None if it does not."""
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
     holds = robust < 0.0 if robust is not None else over_time.holds(hazard.when, values)
@@ -112,7 +113,7 @@ def _first(
 
 
 def _lasting(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
-    """Whether a condition has held for `for_s`."""
+    """For each step, whether a condition has held for `for_s`."""
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))
@@ -126,7 +127,7 @@ def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
 
 
 def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
-    """When a hazard ends the drive; None: it does not."""
+    """The time at which a hazard ends the drive; None if it does not."""
     if hazard.terminal == "True":
         return first
     if not hazard.terminal:
@@ -141,9 +142,9 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
 
 
 def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
-    """A metric's aggregate up to the end of the drive; None without values.
+    """The aggregate of a metric up to the end of the drive; None without values.
 
-    Sums are exact (`fsum`), so they do not depend on the processor.
+    Sums are exact (`fsum`), so that they do not depend on the processor.
     """
     time = values[TIME]
     driven = time <= (math.inf if t_end is None else t_end + _TINY)

@@ -1,9 +1,9 @@
-"""The path of a fault: from the components with the injection along the control structure to the controlled
-process.
+"""Finds the path of a fault along the control structure, from the components with the injection to the
+controlled process.
 
-The path excludes feedback: links out of the process, links of people, and links that are not studied. A
-component that left golden only after the process had counts as changed by feedback, if feedback can have
-reached it no later than the fault along the path.
+The path excludes feedback: links out of the process, links of people, and links that are not studied. If a
+component left golden only after the process, and feedback can have reached it no later than the fault along
+the path, it counts as changed by feedback.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -23,12 +23,12 @@ from mutator.targets.channels import Role
 
 
 class State(StrEnum):
-    """The fault's effect at a component."""
+    """The effect of the fault at a component."""
 
     INJECTED = "injected"
     REACHED = "reached"  # one of its channels left golden
-    PASSED = "passed"  # none of its channels left golden, but a component that only it feeds did
-    FEEDBACK = "feedback"  # one of its channels left golden, but only after the process had
+    PASSED = "passed"  # none of its channels left golden, but those of a component that only it feeds did
+    FEEDBACK = "feedback"  # one of its channels left golden, but only after the process
     HELD = "held"  # it has channels, and none left golden
     UNSEEN = "unseen"  # it has no recorded channels
 
@@ -39,15 +39,15 @@ class Passage(StrEnum):
     THROUGH = "through"
     STOPPED = "stopped"
     UNKNOWN = "unknown"  # the end of the link is not recorded
-    NONE = "none"  # the fault did not reach its start
+    NONE = "none"  # the fault did not reach the start of the link
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stage:
     """A component on a path, and its channels that left golden.
 
-    `t_by` is when (s) a component that only it feeds left golden, if that was before its own channels: by
-    then it had changed, too.
+    `t_by` is the time (s) at which a component that only this one feeds left golden, if that was before this
+    component's own channels did. By then this component had changed, too.
     """
 
     component: str
@@ -57,7 +57,7 @@ class Stage:
 
     @property
     def t_first(self) -> float | None:
-        """When (s) the first of its channels left golden."""
+        """The time (s) at which the first of its channels left golden."""
         return min((first for _, first, _ in self.channels), default=None)
 
 
@@ -73,10 +73,10 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """The stages of a path in causal order, and the fault's passage at each link.
+    """The stages of a path in causal order, and whether the fault got through each link.
 
-    `reached` is the furthest component that left golden. `stopped_at` are the components that held a fault
-    which changed no actuator. Both may be empty.
+    `reached` is the component nearest to the process that left golden. If the fault changed no actuator,
+    `stopped_at` are the components that held it. Both may be empty.
     """
 
     stages: tuple[Stage, ...]
@@ -92,11 +92,11 @@ class Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """The common part of paths that start at the same components, which left golden in the same order:
-    everything except times.
+    """The common part of paths with the same injected components, on which components left golden in the same
+    order: everything except times.
 
-    For each component that changed before its channels show it, `late` has the index of that time in the
-    order of times. `entered` is the link by which the fault reached the first actuator.
+    `late` has the components that changed before their own channels show it, each with the index of the time
+    of that change. `entered` is the link by which the fault reached the first actuator.
     """
 
     states: Mapping[str, State]  # in causal order
@@ -113,8 +113,8 @@ class Course:
 
 
 class Sight(NamedTuple):
-    """The inputs of a course: where the fault was `injected`, the rank of the time at which each component
-    left golden, and whether the fault was masked."""
+    """The inputs that determine a course: the components with the injection, the rank of the time at which
+    each component left golden, and whether the fault was masked."""
 
     injected: frozenset[str]
     order: tuple[tuple[str, int], ...]
@@ -124,9 +124,9 @@ class Sight(NamedTuple):
 class Ways:
     """The paths of faults through a target.
 
-    `channels` are name, unit, role, component and meaning, as in run.json. Without a `structure` the
-    components form a chain: those of internal channels in manifest order, then of actuators, then of the true
-    state. The place of injection in a chain is unknown.
+    `channels` have name, unit, role, component and meaning, as in run.json. Without a `structure`, the
+    components form a chain: those of internal channels in manifest order, then those of actuators, then those
+    of the true state. In a chain, the place of injection is unknown.
     """
 
     def __init__(self, channels: Sequence[Sequence[str]], structure: StructureModel | None) -> None:
@@ -135,7 +135,7 @@ class Ways:
         self._actuators = {component for _, _, role, component, _ in channels if role == Role.ACTUATOR.value}
         self.structure = structure
         self._links = links_of(structure) if structure else {}
-        # from unrecorded components back to those that lead to them
+        # links from unrecorded components back to the components that feed them
         self._back = [(tip, tail) for tail, tip in self._links.values() if tip not in self._roles]
         self._course = lru_cache(maxsize=None)(self._course_of)
         self._where: dict[str, frozenset[str]] = {}  # the components of each fault, by fault id
@@ -148,7 +148,7 @@ class Ways:
         return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
 
     def _injected(self, fault: Fault) -> frozenset[str]:
-        """The components whose files the fault is injected into."""
+        """The components into whose files the fault is injected."""
         if fault.id not in self._where:
             files = {injection.location.path for injection in fault.injections}
             components = self.structure.components if self.structure else {}
@@ -157,8 +157,8 @@ class Ways:
         return self._where[fault.id]
 
     def path(self, experiment: Experiment, record: Record) -> Path | None:
-        """The path of an experiment; None if its fault was not active, ended without an outcome, or is in no
-        known component."""
+        """The path of an experiment. None if the fault was not active, if the run has no outcome, or if the
+        fault is in no known component."""
         course = self.course(experiment.fault, record)
         if course is None:
             return None
@@ -183,16 +183,17 @@ class Ways:
         )
 
     def course(self, fault: Fault, record: Record) -> Course | None:
-        """The course of an experiment, one shared object for equal courses; None as for `path`."""
+        """The course of an experiment; None in the same cases as for `path`. Equal courses are one shared
+        object."""
         sight = self.sight(fault, record)
         return sight and self.course_of(sight)
 
     def course_of(self, sight: Sight) -> Course | None:
-        """The course for a sight."""
+        """The course that a sight determines."""
         return self._course(*sight)
 
     def sight(self, fault: Fault, record: Record) -> Sight | None:
-        """The sight of an experiment; None if the fault was not active or ended without an outcome."""
+        """The sight of an experiment; None if the fault was not active or the run has no outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -207,7 +208,7 @@ class Ways:
     def _course_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
     ) -> Course | None:
-        """See `course_of`."""
+        """The uncached form of `course_of`."""
         way = self._way_of(injected)
         if not way.components:
             return None
@@ -236,8 +237,8 @@ class Ways:
         self, way: Way, shown: Collection[str], left: Mapping[str, float]
     ) -> tuple[dict[str, State], set[str]]:
         """The state of each component of a way, and the components that the fault reached. `left` has the
-        times (s) by which components left golden; those `shown` have channels that show it. An unrecorded
-        component counts as reached if one that feeds it was."""
+        times (s) by which components left golden. Components in `shown` have channels that show it. An
+        unrecorded component counts as reached if a component that feeds it was reached."""
         moved = self._moved(left)
         states: dict[str, State] = {}
         arrived: set[str] = set()
@@ -261,13 +262,13 @@ class Ways:
         return states, arrived
 
     def _moved(self, left: Mapping[str, float]) -> float:
-        """When (s) the process left golden; infinite: never."""
+        """The time (s) at which the process left golden; infinite if it did not."""
         return min((left[name] for name in self.processes if name in left), default=inf)
 
     def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
-        """The times (s) by which components left golden: by a channel of theirs, or of components that only
-        they feed. A component without such a channel passed the fault on, if feedback cannot have reached it
-        yet. If the place of injection is unknown, nothing is inferred."""
+        """The times (s) by which components left golden, according to their own channels or those of
+        components that only they feed. In the second case a component passed the fault on, provided that
+        feedback cannot have reached it yet. If the place of injection is unknown, nothing is inferred."""
         moved, times = self._moved(left), dict(left)
         for name in reversed(way.components if way.injected else ()):
             only = way.feeders(name) | way.fed.get(name, frozenset())
@@ -283,15 +284,15 @@ class Ways:
         return structured(self.structure.components, self._links, self.processes, injected)
 
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
-        """The earliest time (s) of feedback through one of these components: when it, or (if it is not
-        recorded) one that leads to it, left golden; infinite: impossible."""
+        """The earliest time (s) of feedback through one of these components; infinite if there is none. It is
+        the time at which the component left golden or, if the component is not recorded, one that leads to
+        it."""
         unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
 
 def ways_of(head: Head) -> Ways | None:
-    """The ways of a run's target, from its run.json; None if no channel names a component, and for older
-    runs."""
+    """The ways of a run's target, from run.json. None for older runs, and if no channel names a component."""
     if not any(component for *_, component, _ in head.get("channels", ())):
         return None
     try:
@@ -318,8 +319,8 @@ def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collecti
 
 
 def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
-    """The components that held a fault: next to the ones that it reached, or to its entry if it reached
-    none."""
+    """The components that held a fault: those fed by components that it reached or, if it reached none, those
+    at its entry."""
     held = [name for name in way.components if states[name] is State.HELD]
     reached = {name for name in way.components if states[name] is State.REACHED}
     after_reached = [name for name in held if way.feeders(name) & reached]

@@ -1,4 +1,4 @@
-"""How far a fault got: the channels that left golden, with first times and largest deviations."""
+"""Finds the channels that left golden in a run, with first times and largest deviations."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from mutator.outcomes.golden import Trace, deviation, end_of_shorter
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
-Departure = tuple[str, float, float]  # channel, time first (s), largest deviation
+Departure = tuple[str, float, float]  # channel, first time (s), largest deviation
 
 _TINY = 1e-9  # s; times are sums of steps
 COLUMNS = (
@@ -27,10 +27,10 @@ COLUMNS = (
 def departures(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None
 ) -> tuple[Departure, ...]:
-    """Each of `channels` that left golden beyond its tolerance before the end of the drive, in order.
+    """The `channels` that left golden beyond their tolerance before the end of the drive, in order.
 
-    Channels that one run did not record are left out. If the run ended at a different time than golden, all
-    channels left golden there, with the largest deviation over the common time.
+    Channels that one run did not record are left out. If one run ends earlier, all other channels leave
+    golden there at the latest. The largest deviation is over the common time.
     """
     end = np.inf if t_end is None else t_end + _TINY
     ended = end_of_shorter(golden[time], faulty[time])
@@ -45,12 +45,13 @@ def departures(
 
 
 def channel_facts(manifest: TargetManifest) -> list[list[str]]:
-    """Name, unit, role, component and meaning of every channel, as in run.json."""
+    """The name, unit, role, component and meaning of every channel, as in run.json."""
     return [[c.name, c.unit, c.role.value, c.component, c.about] for c in manifest.channels]
 
 
 def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> Mapping[str, list[Any]]:
-    """The columns of propagation.parquet: a row for each channel that left golden, in record order."""
+    """The columns of propagation.parquet, which has a row for each channel that left golden, in record
+    order."""
     facts = {name: (component, role) for name, _, role, component, _ in channels}
     made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
     for record in records:

@@ -1,4 +1,4 @@
-"""Ranks results from worst to best: one order for pages, budgets and the command line."""
+"""Ranks results from worst to best. Pages, budgets and the command line use the same order."""
 
 import math
 from collections.abc import Iterable
@@ -27,10 +27,11 @@ _ENDINGS = (  # worst first
 
 
 def worst(rows: Iterable[Row]) -> list[Row]:
-    """The rows, worst first; input order does not matter.
+    """Sort rows, worst first. The input order does not matter.
 
-    Order: severity class, then delta-v; rows without a class by outcome, then by margin, alternating between
-    hazards because margins in different units are not comparable; finally id.
+    Rows with a severity class come first, by class and then by delta-v. The others follow by outcome and then
+    by margin, alternating between hazards, because margins with different units cannot be compared. Ties are
+    broken by id.
     """
     found = list(rows)
     turns = _turns(found)
@@ -46,7 +47,7 @@ def worst(rows: Iterable[Row]) -> list[Row]:
 
 
 def places(texts: "pd.DataFrame") -> "np.ndarray":
-    """The rank of each row of `Results.texts`, from 0: the order of `worst`, computed by column."""
+    """The rank (from 0) of each row of `Results.texts` in the order of `worst`, computed by column."""
     import numpy as np
     import pandas as pd
 
@@ -71,7 +72,7 @@ def places(texts: "pd.DataFrame") -> "np.ndarray":
 def _turn(
     texts: "pd.DataFrame", ending: "np.ndarray", has_class: "np.ndarray", by_id: "np.ndarray"
 ) -> "np.ndarray":
-    """See `_turns`; infinite for rows without a margin."""
+    """Compute `_turns` by column. The result is infinite for rows without a margin."""
     import numpy as np
     import pandas as pd
 
@@ -91,14 +92,15 @@ def _turn(
 
 
 def worth_of(texts: "pd.DataFrame") -> dict[str, int]:
-    """See `worth`, for a frame from `Results.texts`."""
+    """Compute `worth` for a frame from `Results.texts`."""
     found = places(texts)
     ended = (texts["status"] == Status.OK.value).to_numpy()
     return dict(zip(texts["experiment_id"][ended], found[ended].tolist(), strict=True))
 
 
 def worth(rows: Iterable[Row]) -> dict[str, int]:
-    """The priority of finished experiments when there is no room for all series."""
+    """The rank of each finished experiment (0 is the worst), which decides whose series are kept if there is
+    no room for all."""
     return {row.experiment_id: i for i, row in enumerate(worst(rows)) if row.status is Status.OK}
 
 
@@ -107,8 +109,9 @@ def _has_class(row: Row) -> bool:
 
 
 def _turns(rows: Iterable[Row]) -> dict[str, int]:
-    """The rank of each row without a class within its outcome, by margin to one hazard, least first; with
-    several hazards the best rank. Rows without a margin have none."""
+    """The rank of rows without a severity class among those with the same outcome, by margin to a hazard,
+    least first. A row with margins to several hazards gets its lowest rank number. Rows without a margin are
+    left out."""
     lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
         for hazard, margin in () if _has_class(row) else row.margins:

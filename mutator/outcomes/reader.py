@@ -1,6 +1,7 @@
-"""The only reader of a run's results: rows, pandas frames, and bytes of results.csv and results.parquet.
+"""The only reader of a run's results, as rows, as pandas frames, and as bytes of results.csv and
+results.parquet.
 
-pandas is imported only for frames.
+Only functions that return frames import pandas.
 """
 
 import csv
@@ -47,14 +48,14 @@ _REMEDY = "rebuild it: `mutator report DIR`"
 class Results:
     """A results table: the results.csv at `path`, and the results.parquet next to it.
 
-    Files are read on every access. MutatorError if a file is missing or not a results table.
+    Every access reads the files. Raise MutatorError if a file is missing or not a results table.
     """
 
     path: Path
 
     @classmethod
     def of_run(cls, run: Path) -> "Results":
-        """The table of a run folder as last built."""
+        """The table of a run folder as it was last built."""
         return cls(run / results.CSV)
 
     @classmethod
@@ -107,7 +108,7 @@ class Results:
             raise self._no_table(str(err)) from None
 
     def texts(self) -> "pd.DataFrame":
-        """A frame of the cells as text, '' if empty, in table order."""
+        """A frame of the cells as text ('' if empty), in table order."""
         import pandas as pd
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import csv as arrow_csv
@@ -119,14 +120,14 @@ class Results:
             with self._opened() as file:
                 table = arrow_csv.read_csv(
                     file,
-                    arrow_csv.ReadOptions(use_threads=False),  # as in `_table`
+                    arrow_csv.ReadOptions(use_threads=False),  # for the reason given in `_table`
                     arrow_csv.ParseOptions(newlines_in_values=True),
                     arrow_csv.ConvertOptions(column_types=dict.fromkeys(names, pa.string())),
                 )
         except ValueError as err:
             raise self._no_table(str(err)) from None
         columns = {}
-        for name in names:  # one at a time, to avoid two copies in memory
+        for name in names:  # one column at a time, to avoid two copies in memory
             columns[name] = table.select([name]).combine_chunks().to_pandas(use_threads=False)[name]
             table = table.drop_columns([name])
         return pd.DataFrame(columns)
@@ -139,11 +140,12 @@ class Results:
             raise
 
     def frame(self) -> "pd.DataFrame":
-        """A frame of all columns, typed, by experiment id.
+        """A frame of all columns, typed and indexed by experiment id.
 
-        Names are categories (`outcome` and `status` in their order), flags nullable booleans (NA: the run
-        failed), times floats in simulated seconds (NaN: did not happen). Adds `kind` (`sensor/bias`),
-        `hazard` and `t_hazard` (any, first). `frame.attrs["units"]` has the unit of each number.
+        Names are categories; `outcome` and `status` are ordered. Flags are nullable booleans (NA: the run
+        failed). Times are floats in simulated seconds (NaN: did not happen). Added columns are `kind`
+        (`sensor/bias`), `hazard` (any hazard) and `t_hazard` (the first one). `frame.attrs["units"]` has the
+        unit of each number.
         """
         import pandas as pd
 
@@ -163,17 +165,17 @@ class Results:
         return frame
 
     def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
-        """The units of the target's metrics, from run.json; empty for a table alone."""
+        """The units of the target's metrics, from run.json; empty if the table is not in a run folder."""
         folder = self.path.parent
         metrics = RunFolder.unverified(folder).head.get("metrics", ()) if RunFolder.exists(folder) else ()
         return {name: unit for name, unit, *_ in metrics if name in frame}
 
     def propagation(self) -> "pd.DataFrame":
-        """A frame of propagation.parquet: a row for each channel of an experiment that left golden."""
+        """A frame of propagation.parquet, with a row for each channel of an experiment that left golden."""
         return _frame(self.propagation_parquet())
 
     def propagation_parquet(self) -> bytes:
-        """The bytes of propagation.parquet; MutatorError if the run has none."""
+        """The bytes of propagation.parquet. Raise MutatorError if the run has none."""
         path = self.path.with_name(results.PROPAGATION)
         if not path.exists():
             raise MutatorError(
@@ -185,7 +187,7 @@ class Results:
         return self._read(path)
 
     def timings(self) -> "pd.DataFrame":
-        """A frame of timings.parquet: a row for each experiment that ran."""
+        """A frame of timings.parquet, with a row for each experiment that ran."""
         return _frame(self.timings_parquet())
 
     def timings_parquet(self) -> bytes:
@@ -210,8 +212,8 @@ def row_of(
 
 
 def same_parquet(path: Path, made: Path) -> bool:
-    """Whether the Parquet file at `path` has the rows of a newly built one, perhaps from another version of
-    pyarrow."""
+    """Whether the Parquet file at `path` has the same rows as the newly built one in `made`. Another version
+    of pyarrow may have written it."""
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -232,15 +234,15 @@ def _frame(data: bytes) -> "pd.DataFrame":
 
 
 def _table(source: Path | io.BytesIO) -> Any:
-    """The table of a Parquet file, read in this thread: a pyarrow thread that frees memory during interpreter
-    exit aborts the process."""
+    """Read the table of a Parquet file in this thread, because a pyarrow thread that frees memory at
+    interpreter exit aborts the process."""
     from pyarrow import parquet
 
     return parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:
-    """The unit of each numeric column; `unit` has that of `value` for each row."""
+    """The unit of each numeric column. The unit of `value` is in the column `unit` of each row."""
     numbers = frame.select_dtypes("number").columns
     times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
     times |= {column.name for column in SINCE}

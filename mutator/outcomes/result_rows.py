@@ -16,7 +16,7 @@ from mutator.outcomes.verdicts import reaction_time, severity_of, since_activati
 from mutator.store.run_folder import RunFolder
 from mutator.targets.severity import Scale
 
-_TIME_DIGITS = 6  # of a time in s: finer than any step, within a double's precision
+_TIME_DIGITS = 6  # decimals of a time in s: finer than any step, coarser than a double's precision
 
 
 def row(
@@ -27,10 +27,10 @@ def row(
     ends: bool = False,
     scale: Scale | None = None,
 ) -> dict[str, object]:
-    """One row by column, unordered; without largest differences if the run left no trace.
+    """Build one row, by column name. If the run left no trace, the row has no largest differences.
 
-    `hazards` are those that the target checks; `ends` says that one can end the drive; `scale` classifies
-    delta-v. None is an empty cell; flags are 0 or 1; times are simulated seconds.
+    `hazards` are those that the target checks. `ends` says whether a hazard can end the drive. `scale`
+    classifies delta-v. None stands for an empty cell. Flags are 0 or 1. Times are in simulated seconds.
     """
     cells = plan_row(experiment) | _verdict_cells(record, scale)
     ok, times = record.status is Status.OK, dict(record.hazards)
@@ -48,7 +48,7 @@ def row(
 
 
 def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
-    """The cells that all targets' results have."""
+    """The cells that the results of all targets have."""
     activation = record.activation
     ok = record.status is Status.OK
     return {
@@ -88,7 +88,7 @@ class ResultRows:
         self._names = [column.name for column in self.columns]
 
     def cells(self, experiment: Experiment, record: Record) -> list[object]:
-        """A row in column order."""
+        """The cells of a row in column order."""
         made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
         course = self._ways.course(experiment.fault, record) if self._ways else None
         if course:

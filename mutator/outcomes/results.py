@@ -1,4 +1,5 @@
-"""The results table: a row per experiment, built from plan and records, deterministic."""
+"""Builds the results table from plan and records, with a row for each experiment. Equal inputs give equal
+bytes."""
 
 import gc
 import warnings
@@ -30,7 +31,7 @@ _BATCH = 2_000  # experiments read at a time
 
 
 def ensure(run: Path) -> Path:
-    """Return results.csv of a run folder, rebuilt if any table is out of date."""
+    """Return the path of a run folder's results.csv. Rebuild the tables if any is out of date."""
     folder = RunFolder.unverified(run)
     stamp = _stamp(folder)
     if stamp.get("made_from") == _made_from(folder) and stamp["tables"] == _found(folder):
@@ -39,12 +40,13 @@ def ensure(run: Path) -> Path:
 
 
 def build(run: Path) -> Path:
-    """Write results.csv (returned) and the other tables of a run folder from plan and records. MutatorWarning
-    if a table that was edited by hand is overwritten."""
+    """Write the tables of a run folder from plan and records, and return the path of results.csv. Warn
+    (MutatorWarning) if a table that was edited by hand is overwritten."""
     folder = RunFolder.open(run)
     made_from = _made_from(folder)
     with ExitStack() as stack:
-        paths = {name: folder.path / name for name in reversed(names(folder))}  # the first one is kept first
+        # The stack exits in reverse order, so the first table is replaced first.
+        paths = {name: folder.path / name for name in reversed(names(folder))}
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
@@ -57,15 +59,15 @@ def build(run: Path) -> Path:
 
 
 def names(folder: RunFolder) -> tuple[str, ...]:
-    """The tables of a folder; older runs have no propagation."""
+    """The names of a run folder's tables. Older runs have no table of propagation."""
     return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
     """Write the tables of a run folder, built from plan, records and timings, to the given `paths`.
 
-    Experiments are read in batches: a million needs some hundred MB. Two processes build the batches of a
-    large run.
+    Experiments are read in batches, so that a million needs only some hundred MB. For a large run, two
+    processes build the batches.
     """
     with beside(lambda: _write_timings(folder, paths[TIMINGS_PARQUET]), processes_for(folder.planned)) as end:
         _write_results(folder, paths)
@@ -73,7 +75,7 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    """See `write`; without timings."""
+    """Write all tables except the timings; see `write`."""
     records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
     tells_propagation = PROPAGATION in paths
 
@@ -103,7 +105,7 @@ def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """Disable cyclic garbage collection: rows and records have no cycles, and it took a fifth of the time."""
+    """Disable cyclic garbage collection, which took a fifth of the time. Rows and records have no cycles."""
     was_on = gc.isenabled()
     gc.disable()
     try:
@@ -119,7 +121,7 @@ def _batches(items: Iterable[str]) -> list[list[str]]:
 
 
 def _made_from(folder: RunFolder) -> str:
-    """Digest of all inputs of the tables, including the version of mutator."""
+    """The digest of all inputs of the tables, including the version of mutator."""
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
@@ -132,14 +134,14 @@ def _made_from(folder: RunFolder) -> str:
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    """Digests of the current tables; None for missing ones."""
+    """The digests of the current tables; None for a missing table."""
     known = names(folder)
     found = dict(zip(known, digests.of_files([folder.path / name for name in known]), strict=True))
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 
 def _stamp(folder: RunFolder) -> dict[str, Any]:
-    """The content of results.json; empty values if it is missing or damaged."""
+    """The content of results.json, with empty values if the file is missing or damaged."""
     try:
         known = read_json(folder.path / STAMP, SCHEMA)
         if all(isinstance(known[key], dict) for key in ("tables", "before")):
@@ -150,8 +152,8 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
 
 
 def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
-    """Digests of the tables that a build made; a warning names any others. Older folders without results.json
-    cannot be checked."""
+    """The digests of the tables that a build made. A warning names any other table. Older folders without
+    results.json cannot be checked."""
     stamp = _stamp(folder)
     tells = folder.verifiable or stamp.get("made_from")
     found = {name: one for name, one in _found(folder).items() if one is not None}
@@ -164,7 +166,7 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
 
 
 def _write_timings(folder: RunFolder, path: Path) -> None:
-    """The cost and place of each experiment."""
+    """Write the cost and the worker of each experiment."""
     newest = folder.timings()
 
     def made(batch: Sequence[str]) -> Any:

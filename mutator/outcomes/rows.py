@@ -1,4 +1,4 @@
-"""Typed rows of the results table, one per experiment, and the table of counts."""
+"""Typed rows of the results table, one for each experiment, and the table of counts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,7 +16,8 @@ UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of results.csv, typed. Times are simulated seconds, None: did not happen."""
+    """One line of results.csv, typed. Times are in simulated seconds; None means that the event did not
+    happen."""
 
     experiment_id: str
     module: str
@@ -37,18 +38,18 @@ class Row:
     t_alert: float | None
     reaction_time: float | None
     detail: str
-    severity: str = ""  # of the contact that ended the drive
-    delta_v: float | None = None  # m/s, of that contact
-    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred, else to all
+    severity: str = ""  # class of the contact that ended the drive
+    delta_v: float | None = None  # delta-v of that contact in m/s
+    margins: tuple[tuple[str, float], ...] = ()  # to the hazards that occurred; else to all
 
     @property
     def margin(self) -> float | None:
-        """The least margin, as a number in its hazard's unit."""
+        """The least margin, in the unit of its hazard."""
         return min((margin for _, margin in self.margins), default=None)
 
     @property
     def ending(self) -> str:
-        """The outcome of a successful run, or the status of a failed one."""
+        """The outcome, or the status if the run failed."""
         return self.outcome.value if self.status is Status.OK and self.outcome else self.status.value
 
     @property
@@ -63,7 +64,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Count:
-    """Counts over the usable experiments of one group; `unusable` counts the rest."""
+    """Counts over the usable experiments of one group. `unusable` counts the other experiments."""
 
     group: str
     injected: int
@@ -85,8 +86,8 @@ def by_fault_type(row: Row) -> str:
 def count_table(
     counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
 ) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows of a table of counts; crashes, timeouts and unusable runs only if there are any, and
-    `alerts` only if the target has some."""
+    """A table of counts. It has columns for crashes, timeouts and unusable runs only if there are any, and
+    for alerts only if `alerts` is set."""
     heads = [head, "injected", "activated", "manifested", *hazards]
     heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
     table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
@@ -109,7 +110,7 @@ def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
 
 
 def row_from(line: Mapping[str, str]) -> Row:
-    """Parse a line of results.csv, given by column; KeyError or ValueError if it is invalid."""
+    """Parse a line of results.csv, given by column. Raise KeyError or ValueError if it is invalid."""
     checked = [name for name in hazards_in(line) if line[name.lower()]]
     times = {name: line[f"t_{name.lower()}"] for name in checked}
     hazards = [(name, float(time)) for name, time in times.items() if time]

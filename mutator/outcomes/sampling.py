@@ -1,10 +1,10 @@
-"""Samples a run's channels into its series, with six digits: at most 20 values a second, 10 for the
-controller's beliefs.
+"""Samples a run's channels into its series, with six digits. A channel keeps at most 20 values a second;
+internal channels keep 10.
 
-Each value is the newest at its time, so an event shorter than 50 ms may fall between samples. Therefore each
-channel that differs keeps extra points: the first differing step, those of the largest difference in the
-drive and in the whole run, and the last step of a run that ended early. All channels keep the steps in which
-a hazard first occurred, so that replays show what the hazard was judged by.
+A sample is the newest value at its time, so events shorter than 50 ms may fall between samples. Channels that
+differ therefore keep extra points: the first differing step, the steps of the largest difference in the drive
+and in the whole run, and the last step of a run that ended early. All channels keep the steps in which a
+hazard first occurred, so that replays show the values by which it was judged.
 """
 
 from functools import cached_property
@@ -20,14 +20,14 @@ from mutator.store.series_format import Points, Series, encode
 from mutator.targets.channels import Channel, Role
 from mutator.targets.manifest import TargetManifest
 
-RATE = 20.0  # samples a second, at most
-_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # which samples a channel keeps
-_HALF = np.uint32(8)  # of the lowest kept bit
+RATE = 20.0  # maximum of samples a second
+_EVERY = {Role.ACTUATOR: 1, Role.TRUTH: 1, Role.INTERNAL: 2}  # a channel keeps every n-th sample
+_HALF = np.uint32(8)  # half of the lowest bit that is kept
 _TINY = 1e-9  # s; times are sums of steps
 
 
 class Sampler:
-    """Builds the golden series, and the series of runs with that golden run."""
+    """Builds the series of a golden run, and the series of faulty runs that belong to it."""
 
     def __init__(self, manifest: TargetManifest, golden: Trace) -> None:
         self._channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden]
@@ -70,14 +70,14 @@ class Sampler:
         )
 
     def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
-        """Whether a channel (row) has a sample in a step (column)."""
+        """Whether a channel (row) keeps a step (column) as a sample."""
         if count == len(self._time) and len(at) == len(self._at):
             return self._usual
         return self._marked(count, at)
 
     @cached_property
     def _usual(self) -> np.ndarray:
-        """`_sampled` for a run as long as golden."""
+        """The result of `_sampled` for a run as long as golden."""
         return self._marked(len(self._time), self._at)
 
     def _marked(self, count: int, at: np.ndarray) -> np.ndarray:
@@ -91,7 +91,8 @@ class Sampler:
         return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The union of both runs' step times, and the values of each: NaN after its end."""
+        """The union of the step times of both runs, and the values of each run, which are NaN after its
+        end."""
         rows = min(len(own), len(self._time))
         if np.array_equal(own[:rows], self._time[:rows]):
             time = max(own, self._time, key=len)
@@ -100,7 +101,7 @@ class Sampler:
         return time, self._held(self._values, self._time, time), self._held(self._on(faulty, own), own, time)
 
     def _on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
-        """A row for each channel, a column for each step; missing channels have no values."""
+        """An array with a row for each channel and a column for each step. Missing channels are NaN."""
         rows = np.full((len(self._channels), len(time)), np.nan)
         for row, channel in zip(rows, self._channels, strict=True):
             if channel.name in trace:
@@ -109,14 +110,14 @@ class Sampler:
 
     @staticmethod
     def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Each row's newest value at other times; none before its first and after its last."""
+        """The newest value of each row at other times; NaN before its first and after its last value."""
         place = np.searchsorted(own, time + _TINY, side="right") - 1
         there = (place >= 0) & (time <= own[-1] + _TINY)
         return np.where(there, values[:, np.maximum(place, 0)], np.nan)
 
 
 def _thinned(time: np.ndarray) -> np.ndarray:
-    """The steps to keep: first, last, and at most RATE a second in between."""
+    """The steps to keep: the first, the last, and at most RATE a second in between."""
     kept: list[int] = []
     due = -np.inf
     for place, t in enumerate(time.tolist()):
@@ -136,12 +137,13 @@ def _filled(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _single(values: np.ndarray) -> np.ndarray:
-    """Single precision, rounded to six digits (20 bits): more would add a tenth to the size."""
+    """The values in single precision, rounded to six digits (20 bits). More digits would add a tenth to the
+    size."""
     with np.errstate(over="ignore"):  # overflow becomes infinity
         single = values.astype("<f4")
         words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)
     finite = np.isfinite(single)
-    single[np.isnan(single)] = np.nan  # one bit pattern
+    single[np.isnan(single)] = np.nan  # the same bit pattern for every NaN
     return np.where(finite, words.view("<f4"), single)
 
 
@@ -153,7 +155,8 @@ def _points(
     end: int,
     record: Record,
 ) -> Points:
-    """The steps between the `sampled` ones that each channel keeps; `end` is the last that both runs have."""
+    """The steps that each channel keeps in addition to the `sampled` ones. `end` is the last step that both
+    runs have."""
     golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
     drive = end + 1 if record.t_end is None else _until(time, record.t_end)
     hazards = {_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
@@ -178,8 +181,8 @@ def _until(time: np.ndarray, t: float) -> int:
 
 
 def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """The difference of two runs at each step: 0 if they are equal or both have no value, infinite if only
-    one has none."""
+    """The difference of two runs at each step. It is 0 if they are equal or both have no value, and infinite
+    if only one has no value."""
     with np.errstate(invalid="ignore", over="ignore"):
         gap: np.ndarray = np.abs(faulty - golden)
     odd = np.isnan(gap)
@@ -212,8 +215,8 @@ def _happened(record: Record) -> dict[str, Any]:
 
 
 def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
-    """The runs of a series as traces with the time channel `time`. A channel sampled every second holds its
-    value in between."""
+    """The runs of a series as traces with the time channel `time`. Between its samples, a channel holds its
+    value."""
     names = [str(channel["name"]) for channel in golden.about["channels"]]
 
     def trace(run: Series) -> Trace:

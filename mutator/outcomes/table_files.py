@@ -9,20 +9,20 @@ from typing import Any
 
 from mutator.outcomes.columns import Column
 
-_ROWS = 1 << 20  # of a row group, pyarrow's default; fewer with many columns:
-_CELLS = 1 << 23  # of a row group, which is completely in memory
+_ROWS = 1 << 20  # rows of a row group (pyarrow's default); fewer with many columns:
+_CELLS = 1 << 23  # cells of a row group, because a whole group is in memory
 _TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
 
 
 def csv_lines(rows: Iterable[Sequence[object]]) -> bytes:
-    """CSV lines; None is an empty cell."""
+    """Write rows as CSV lines. None becomes an empty cell."""
     text = io.StringIO(newline="")
     csv.writer(text, lineterminator="\n").writerows(rows)
     return text.getvalue().encode()
 
 
 def record_batch(columns: Sequence[Column], values: Sequence[Sequence[object]]) -> Any:
-    """Parquet rows, given as a sequence of values for each column."""
+    """Make Parquet rows from a sequence of values for each column."""
     import pyarrow as pa  # type: ignore[import-untyped]
 
     schema = _schema(columns)
@@ -55,7 +55,7 @@ class CsvTable:
 
 
 class ParquetTable:
-    """A Parquet file, independent of time, place and batches."""
+    """A Parquet file. Its bytes do not depend on time, place or batches."""
 
     def __init__(self, path: Path, columns: Sequence[Column]) -> None:
         import pyarrow as pa
@@ -66,7 +66,7 @@ class ParquetTable:
         self._writer = parquet.ParquetWriter(path, self._schema, compression="zstd")
         self._group = min(_ROWS, _CELLS // len(columns))
         self._held: list[Any] = []
-        self._count = 0  # rows waiting
+        self._count = 0  # number of rows not yet written
         self._is_empty = True
 
     def __enter__(self) -> "ParquetTable":
@@ -80,7 +80,7 @@ class ParquetTable:
             self._write(self._group)
 
     def _write(self, count: int) -> None:
-        """Write the first waiting rows as a group."""
+        """Write the first `count` waiting rows as a row group."""
         held = self._pa.Table.from_batches(self._held, self._schema)
         self._writer.write_table(held.slice(0, count).combine_chunks(), self._group)
         self._held = held.slice(count).to_batches()

@@ -1,4 +1,5 @@
-"""Reads trace files of runs by suffix: each reader returns the arrays of the requested channels."""
+"""Reads trace files of runs. The suffix selects the reader, which returns the arrays of the requested
+channels."""
 
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -24,18 +25,19 @@ class BadTrace(ValueError):
 
 
 def own_times(name: str) -> str:
-    """The name under which a trace keeps the times of a channel that does not have a value at each step."""
+    """The name under which a trace stores the times of a channel that does not have a value at each step."""
     return f"{name}@"
 
 
 def read(
     path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
 ) -> Arrays:
-    """Channels and time of a trace by manifest name; `own_times` names have the times of channels that lack
-    some steps.
+    """Read channels and time of a trace, by manifest name. `own_times` names have the times of channels that
+    lack some steps.
 
-    Without `channels`: everything, including names not in the manifest. Channels in `also` may be missing.
-    BadTrace, KeyError for another missing channel, and the readers' own errors.
+    Without `channels`, read everything, including names that are not in the manifest. Channels in `also` may
+    be missing. Raise BadTrace for an invalid file and KeyError for any other missing channel. Errors of the
+    readers pass through.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
     if path.suffix == ".mcap":
@@ -47,7 +49,7 @@ def read(
     known = {channel.in_trace for channel in wanted} | {*of_time}
     rest = {name: column for name, column in columns.items() if channels is None and name not in known}
     time = columns[manifest.time_channel]
-    # a table row without the step time belongs to channels with their own times
+    # table rows without a step time belong to channels with their own times
     steps = slice(None) if path.suffix == ".npz" else ~_empty(time)
     values = {name: column[steps] for name, column in rest.items()} | {manifest.time_channel: time[steps]}
     for channel in wanted:
@@ -96,7 +98,7 @@ def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str])
 def _wanted(
     there: Collection[str], names: Iterable[str] | None, may_miss: Collection[str]
 ) -> dict[str, None]:
-    """The names to read from a file that has `there`: these, or all."""
+    """The names to read from a file that contains `there`: `names`, or all if None."""
     if names is None:
         return dict.fromkeys(there)
     return {name: None for name in names if name in there or name not in may_miss}
@@ -110,7 +112,7 @@ _COLUMNS: Mapping[str, Callable[[Path, Iterable[str] | None, Collection[str]], A
 
 
 def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequence[Channel]) -> Arrays:
-    """Read JSON messages: `/topic:field.of.field`. Log times are simulated time in ns."""
+    """Read JSON messages. Channels are named `/topic:field.of.field`. Log times are simulated time in ns."""
     try:
         from mcap.reader import make_reader
     except ImportError:

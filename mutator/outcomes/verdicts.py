@@ -9,9 +9,9 @@ Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
 def first_events(events: Iterable[tuple[str, float]], activation: Activation | None) -> Events:
-    """The first event of each name at or after activation, by time then name; none without activation.
+    """The first event of each name at or after activation, by time and then name; empty without activation.
 
-    Earlier events cannot be caused by the fault.
+    The fault cannot have caused earlier events.
     """
     if activation is None:
         return ()
@@ -23,10 +23,10 @@ def first_events(events: Iterable[tuple[str, float]], activation: Activation | N
 
 
 def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
-    """The outcome of an experiment that ran: not_activated, hazard, sdc or masked, the first that applies.
+    """The outcome of an experiment that ran: the first that applies of not_activated, hazard, sdc and masked.
 
-    `hazards` are those at or after activation. A hazard counts even without an actuator difference: the fault
-    may act on the world directly.
+    `hazards` are those at or after activation. A hazard counts even without an actuator difference, because
+    the fault may act on the world directly.
     """
     if activation is None:
         return Outcome.NOT_ACTIVATED
@@ -36,9 +36,9 @@ def judge(*, activation: Activation | None, t_manifest: float | None, hazards: E
 
 
 def reaction_time(hazards: Events, alerts: Events) -> float | None:
-    """First hazard minus first alert in s: the time a driver would have.
+    """The time (s) from the first alert to the first hazard, which a driver has to react.
 
-    None if either is missing or the alert did not come strictly first.
+    None if either is missing or if the alert did not come before the hazard.
     """
     if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
         return None
@@ -46,22 +46,23 @@ def reaction_time(hazards: Events, alerts: Events) -> float | None:
 
 
 def since_activation(record: Record) -> float | None:
-    """First hazard minus activation in s: the fault-tolerant time. None without a hazard."""
+    """The fault-tolerant time: from activation to the first hazard, in s. None without a hazard."""
     if not record.hazards or record.activation is None:
         return None
     return record.hazards[0][1] - record.activation.first
 
 
 def since_manifestation(record: Record) -> float | None:
-    """First hazard minus manifestation in s; None if either is missing or the hazard came first."""
+    """The time (s) from manifestation to the first hazard. None if either is missing or if the hazard came
+    first."""
     if not record.hazards or record.t_manifest is None or record.t_manifest > record.hazards[0][1]:
         return None
     return record.hazards[0][1] - record.t_manifest
 
 
 def severity_of(record: Record, scale: Scale | None) -> str | None:
-    """The class of the contact that ended the drive; None without a contact, or if it came before the fault
-    was active."""
+    """The class of the contact that ended the drive. None without a contact, or if the contact came before
+    the fault was active."""
     delta_v = dict(record.metrics).get(DELTA_V)
     if scale is None or delta_v is None or record.activation is None or record.t_end is None:
         return None

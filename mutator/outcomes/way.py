@@ -1,4 +1,4 @@
-"""Where faults can go: the components on the way to the controlled process, in causal order."""
+"""Finds where faults can go: the components on the way to the controlled process, in causal order."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -10,26 +10,26 @@ from mutator.targets.channels import Role
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Way:
-    """Where the faults of some components can go: components in causal order, and their links."""
+    """The way that faults of some components can take: components in causal order, and their links."""
 
     components: tuple[str, ...]
     links: Mapping[str, tuple[str, str]]
-    sources: frozenset[str]  # where the fault enters
+    sources: frozenset[str]  # components at which the fault enters
     injected: bool  # whether the sources are known to be the place of injection
-    fed: Mapping[str, frozenset[str]]  # components off the way that lead to a component
-    steps: Mapping[str, int]  # links left to the process
+    fed: Mapping[str, frozenset[str]]  # by component: components off the way that lead to it
+    steps: Mapping[str, int]  # by component: number of links to the process
 
     def feeders(self, component: str) -> set[str]:
-        """The components that feed one."""
+        """The components on the way that feed a component."""
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
 def chained(roles: Mapping[str, str], processes: frozenset[str]) -> Way:
-    """The chain of components by the roles of their channels; the place of injection is unknown."""
+    """The chain of components, ordered by the roles of their channels. The place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
     links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
-    # the observed process may come first
+    # the observed process may also feed the first component
     return Way(
         components=tuple(chain),
         links=links,
@@ -73,7 +73,7 @@ def links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
 
 
 def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
-    """The distance in links from `start` of everything reachable, including `start`."""
+    """The distance from `start`, in links, of everything that is reachable, including `start`."""
     found = dict.fromkeys(start, 0)
     while more := {tip for tail, tip in links if tail in found} - found.keys():
         found |= dict.fromkeys(more, max(found.values()) + 1)
@@ -83,8 +83,8 @@ def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> di
 def _in_causal_order(
     nodes: Sequence[str], links: Mapping[str, tuple[str, str]], steps: Mapping[str, int]
 ) -> tuple[str, ...]:
-    """The nodes, each after all that feed it. Among several, and in cycles, the one with the most `steps` to
-    the process comes first."""
+    """The nodes, each after all nodes that feed it. If several may come next, or in a cycle, the node with
+    the most `steps` to the process comes first."""
     left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []
     while left:
