@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-_LONGEST = 2000  # characters of each part of an error
+_LONGEST = 2000  # longest part of an error, in characters
 EXIT_OK = 0
 EXIT_CHECK_FAILED = 1
 EXIT_WRONG_INPUT = 2
@@ -13,9 +13,10 @@ EXIT_HARNESS_ERRORS = 3
 class MutatorError(Exception):
     """An error that the user can fix, shown without a traceback.
 
-    `where` is the file at fault and `line` its line, if known. `got` is what was found, `expected` what would
-    be valid, `remedy` what to do. For a wrong argument of the API, `argument` names it instead of a file, and
-    `names` in backquotes in the remedy are arguments too; the command line shows the matching options.
+    `where` is the file with the error and `line` the line in it, if known. `got` is the value found,
+    `expected` describes valid values, and `remedy` says what to do. If an argument of the API is wrong,
+    `argument` is its name and `where` is None. Names in backquotes in the remedy are arguments, too; the
+    command line shows the matching options.
     """
 
     exit_code = EXIT_WRONG_INPUT  #: exit code of a command that ends with this error
@@ -31,9 +32,9 @@ class MutatorError(Exception):
         remedy: str | None = None,
     ) -> None:
         self.got = _short(got)  #: what was found
-        self.where = str(where) if where is not None else None  #: the file at fault
+        self.where = str(where) if where is not None else None  #: the file with the error
         self.line = line  #: its line
-        self.argument = argument  #: the argument at fault, where no file is
+        self.argument = argument  #: the name of the wrong argument, if the error is not in a file
         self.expected = _short(expected) if expected else None  #: what is valid
         self.remedy = _short(remedy) if remedy else None  #: what to do
         super().__init__(str(self))

@@ -1,6 +1,7 @@
 """Glue between a controller and the harness: runs the loop step by step and writes the results.
 
-A target's entry module is a class that builds the loop and simulates one step of it, and two lines:
+A target's entry module contains a class that builds the loop and simulates one step, and two lines that
+start it:
 
     from mutator.glue import Run
 
@@ -40,11 +41,11 @@ _OPTIONS = ("scenario", "seed", "out")
 
 
 class GlueError(Exception):
-    """A mistake in how a run is started or written, described for its author."""
+    """A mistake in the code that starts or records a run. The message is for the author of that code."""
 
 
 class Scenario(dict[str, Any]):
-    """The values of a scenario file by key. A missing key is a GlueError that lists the known ones."""
+    """The values of a scenario file by key. A missing key raises GlueError, which lists the known keys."""
 
     def __init__(self, values: dict[str, Any], path: Path) -> None:
         super().__init__(values)
@@ -65,7 +66,7 @@ class Run:
 
     # two underscores keep this class's attributes apart from a subclass's
     def __init__(self, *, step_s: float, duration_s: float) -> None:
-        """A run of `duration_s`, rounded to whole steps; `end` ends it earlier."""
+        """Set up a run of `duration_s`, rounded to whole steps. `end` ends it earlier."""
         self.__channels: tuple[str, ...] = ()
         self.__rows: list[tuple[float, ...]] = []
         self.__duration_s = _length("duration_s", duration_s)
@@ -85,9 +86,9 @@ class Run:
 
     @property
     def step_s(self) -> float:
-        """Length of a step in s. If steps differ, set it in each step before `record`.
+        """Length of a step in s. If steps differ, set it in each step before you call `record`.
 
-        It holds for the current step and those after it, until it is set again.
+        A new length applies from the current step on, until you set another.
         """
         return self.__step_s
 
@@ -101,7 +102,7 @@ class Run:
 
     @property
     def t(self) -> float:
-        """Time in s since the start: that of the current step until `record` is called."""
+        """Time in s since the start. Until you call `record`, it is the time of the current step."""
         return self.__since + (len(self.__rows) - self.__passed) * self.__step_s
 
     @property
@@ -110,13 +111,13 @@ class Run:
         return self.__ended or len(self.__rows) >= self.__steps
 
     def end(self) -> None:
-        """Make this step the last, e.g. after the pole has fallen or the cars have met."""
+        """Make this step the last one, e.g. after the pole has fallen or the cars have collided."""
         self.__ended = True
 
     def record(self, **channels: float) -> None:
         """Record the current step: a number for each channel, with the same channels in each step.
 
-        Call it once, at the end of each step. From then on `t` is the time of the next step.
+        Call it once, at the end of each step. After the call, `t` is the time of the next step.
         """
         if not self.__rows:
             self.__channels = tuple(channels)
@@ -129,14 +130,13 @@ class Run:
         self.__rows.append((self.t, *(_number(at + name, channels[name]) for name in self.__channels)))
 
     def recorded(self) -> dict[str, float]:
-        """The channels of the last recorded step, and its time."""
+        """Return the channels of the last recorded step and its time."""
         return dict(zip((TIME, *self.__channels), self.__rows[-1], strict=True))
 
     def hazard(self, name: str, now: bool) -> None:
-        """Report whether a hazard that the manifest only names is present. Call it in each step, before
-        `record`.
+        """Report whether a hazard is present. Call it in each step, before `record`.
 
-        The time of the first step with the hazard counts.
+        Use it for hazards that the manifest names without a condition. The first step with the hazard counts.
         """
         if self.__hazards.setdefault(name, None) is None and now:
             self.__hazards[name] = self.t
@@ -144,7 +144,7 @@ class Run:
     def alert(self, name: str, now: bool) -> None:
         """Report whether the controller alerts its driver. Call it in each step, before `record`.
 
-        Each start of an alert counts.
+        Each start of an alert is recorded.
         """
         if not now:
             self.__alerting.discard(name)
@@ -153,35 +153,37 @@ class Run:
             self.__alerts.append({"name": name, "t": self.t})
 
     def write(self, out: Path) -> None:
-        """Write the trace, then the record, into the folder `out`; equal runs write equal bytes."""
+        """Write the trace, then the record, to the folder `out`. Equal runs write equal bytes."""
         if not self.__rows:
             raise GlueError("nothing is recorded; expected one step at least: `end` is for a step to call")
         out.mkdir(parents=True, exist_ok=True)
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))
-        unfinished = out / f".{RECORD}"  # a killed run has no record
+        unfinished = out / f".{RECORD}"  # renamed when complete: a killed run leaves no record
         said = {"hazards": self.__hazards, "alerts": self.__alerts}
         unfinished.write_text(json.dumps(said) + "\n", encoding="utf-8")
         unfinished.replace(out / RECORD)
 
     @classmethod
     def open(cls, arguments: Sequence[str]) -> Self:
-        """The run of `--scenario FILE --seed N --out DIR` before its first step: `stepwise` in the
-        manifest.
+        """Return the run for `--scenario FILE --seed N --out DIR` before its first step.
 
-        Any other `--key value` replaces the scenario's value of that key, and `--key` alone means true. So a
-        change of the manifest needs no code.
+        The manifest names this method in `stepwise`. Any other `--key value` replaces the scenario's value of
+        that key, and `--key` alone sets it to true. So changes of a scenario in the manifest need no code.
         """
         given = _options(arguments)
         subclass: Any = cls
         run: Self = subclass(_scenario(given), _seed(given))
         if not hasattr(run, "_Run__rows"):
-            raise GlueError(f"{cls.__name__}.__init__ has no super().__init__(step_s=..., duration_s=...)")
+            raise GlueError(
+                f"{cls.__name__}.__init__ does not call super().__init__; "
+                "add super().__init__(step_s=..., duration_s=...)"
+            )
         return run
 
     @classmethod
     def main(cls, arguments: Sequence[str] | None = None) -> None:
-        """Run from the first step to the last and write the results, as the process's arguments say."""
+        """Run all steps and write the results. `arguments` defaults to the arguments of the process."""
         arguments = sys.argv[1:] if arguments is None else arguments
         run = cls.open(arguments)
         while not run.done:
@@ -242,7 +244,9 @@ def _value(text: str) -> Any:
 
 
 def _options(arguments: Sequence[str]) -> dict[str, str | None]:
-    """Return `--key value`, `--key=value` and `--key` (None) by key, with _ for any further -."""
+    """Return the options `--key value`, `--key=value` and `--key` (None) by key, with `_` for `-` inside a
+    key.
+    """
     found: dict[str, str | None] = {}
     waiting = ""
     for argument in arguments:
@@ -272,11 +276,11 @@ def _seed(given: dict[str, str | None]) -> int:
 
 
 def _scenario(given: dict[str, str | None]) -> Scenario:
-    """The arguments' scenario with the replaced values."""
+    """Read the scenario file and replace the values that other arguments give."""
     scenario = read_scenario(Path(_needed(given, "scenario")))
     for key, value in given.items():
         if key in _OPTIONS:
             continue
-        scenario[key]  # an unknown key is a mistake: KeyError
+        scenario[key]  # raises GlueError for an unknown key
         scenario[key] = True if value is None else _value(value)
     return scenario

@@ -1,6 +1,6 @@
-"""Records that pass from spec to verdict: frozen, comparable, identified by their content.
+"""The data passed from spec to verdict: immutable, comparable, identified by content.
 
-Declare a field that joins one later with `hashing.added`, so that no id changes.
+Declare new fields with `hashing.added`, so that existing ids do not change.
 """
 
 from dataclasses import dataclass
@@ -63,7 +63,7 @@ class Method(StrEnum):
 
 
 class AfterHazard(StrEnum):
-    """What happens to a run after a terminal hazard has ended its drive."""
+    """Whether a run goes on or stops after a terminal hazard has ended its drive."""
 
     GO_ON = "go_on"
     STOP = "stop"
@@ -72,7 +72,7 @@ class AfterHazard(StrEnum):
 class Status(StrEnum):
     """Whether the experiment itself worked; independent of its outcome."""
 
-    OK = "ok"  #: the run ended as it should
+    OK = "ok"  #: the run ended normally
     CRASHED = "crashed"  #: the controller raised an error or died
     TIMEOUT = "timeout"  #: the run reached its limit of time, steps or disk
     INVALID_MUTANT = "invalid_mutant"  #: the mutant does not compile
@@ -95,10 +95,11 @@ class Anchor:
     It is the `nth` match (from 1) of `kind` and `name`; without `nth` there must be exactly one match.
     `which` selects an argument of a call by position (from 1) or keyword. `name` depends on the kind:
 
-    * what is assigned to, called or returned, as in the source: `gap`, `self.angle`, `pose['x']`
+    * assignments, calls, arguments, returns: the name that is assigned, called or returned, as in the source:
+      `gap`, `self.angle`, `pose['x']`
     * `value`, `condition`, `return_value`: the expression
     * `constant`: `LIMIT` or `Class.LIMIT`; `default`: the parameter; neither has an `nth`
-    * empty for `entry`, and where any return or condition will do
+    * empty for `entry`, and to match any return or condition
     """
 
     kind: AnchorKind
@@ -123,8 +124,9 @@ class FaultLocation:
 class Injection:
     """One fault model applied at one location. `params` are sorted (name, value) pairs.
 
-    It acts only while the condition `where`, over names known there, holds. Of those executions, counted from
-    the fault's activation, it acts in number `call` only, or in every one divisible by `every`.
+    With `where`, the injection acts only in executions in which this condition holds. These executions are
+    counted from the fault's activation. With `call`, it acts only in that one of them; with `every`, in every
+    n-th one.
     """
 
     location: FaultLocation
@@ -139,7 +141,7 @@ class Injection:
 class Trigger:
     """When a fault is active. A random time is the condition `t >= T` with hold `to_end`."""
 
-    name: str  #: name of the trigger: a context, `always`, a time
+    name: str  #: name of the trigger: the name of a context, `always`, or a time
     condition: str  #: expression over time `t` and what the target observes
     hold: Hold = Hold.WHILE  #: how long the fault stays active: `while`, `for` or `to_end`
     hold_s: float | None = None  #: how long in s, for the hold `for`
@@ -158,9 +160,9 @@ def fault_label(spec: str, value: Value, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault with its value drawn: what is injected, where, and what it aims at.
+    """A fault with a fixed value: what it injects, where, and the hazard that it aims at.
 
-    `hold` overrides the trigger's if the fault latches by nature.
+    `hold` overrides the trigger's hold, for faults that latch.
     """
 
     spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
@@ -172,7 +174,7 @@ class Fault:
     aim: str  #: the hazard that it aims at
     #: where the source changes, and how; numbers in the unit of the changed variable
     injections: tuple[Injection, ...]
-    hold: Hold | None = None  #: how long it stays active; None: as its trigger says
+    hold: Hold | None = None  #: how long it stays active; None: as long as its trigger specifies
     changes: tuple[str, ...] = ()  #: changes of the scenario that belong to the fault (`alone`)
 
     @cached_property
@@ -238,9 +240,9 @@ class Experiment:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """What one run may use before it is stopped.
+    """Limits of one run, which is stopped when it exceeds one.
 
-    Seconds of CPU and wall time, MiB of address space, observed simulation steps, MiB written.
+    CPU and wall time in s, address space in MiB, observed simulation steps, MiB written to disk.
     """
 
     cpu_s: int = 60
@@ -263,7 +265,8 @@ class Activation:
 class RunError:
     """An exception that ended a run.
 
-    `place` is the innermost target line, `file:line` in the tree that ran; empty if it passed none.
+    `place` is the innermost line of the target in the traceback, `file:line` in the tree that ran; empty if
+    there is none.
     """
 
     kind: str
@@ -291,7 +294,9 @@ class Record:
     error: RunError | None = added(None)  #: the exception that ended the run: `kind`, `message`, `place`
     patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
     t_end: float | None = added(None)  #: when a terminal hazard ended the drive, in s
-    dev: tuple[tuple[str, float], ...] = added(())  #: `max_dev` up to `t_end`; empty without such an end
+    dev: tuple[tuple[str, float], ...] = added(
+        ()
+    )  #: `max_dev` up to `t_end`; empty if no terminal hazard did
     #: metrics of the manifest and margins of its hazards, if they have a value
     metrics: tuple[tuple[str, float], ...] = added(())
     #: (channel, first time in s, largest deviation) of each channel that left golden before the end

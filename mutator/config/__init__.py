@@ -1,4 +1,4 @@
 """Strict YAML files with a line number for each value, units in keys, and places in source code.
 
-What a particular file means (a fault spec, a manifest, a campaign) is defined elsewhere.
+Other packages define the contents of each kind of file, such as fault specs, manifests and campaigns.
 """

@@ -12,9 +12,9 @@ _PLAIN = (
 
 
 def instance_condition(text: str) -> str:
-    """Return the condition in the form in which it is written into a mutant.
+    """Return the condition as it is written into a mutant.
 
-    Only names, attributes, items, constants, comparisons, `and`, `or` and `not` are allowed; else ValueError.
+    ValueError unless it consists of names, attributes, items, constants, comparisons, `and`, `or` and `not`.
     """
     try:
         tree = ast.parse(text.strip(), mode="eval") if len(text) <= _LONGEST else None

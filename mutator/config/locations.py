@@ -15,13 +15,14 @@ PROBE_NAME = "_fi"  # reserved for the probe's module in every mutant (mutants/p
 _NAMELESS = (AnchorKind.ENTRY, AnchorKind.BEFORE_RETURN, AnchorKind.RETURN_VALUE, AnchorKind.CONDITION)
 _ASSIGNMENTS = (AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_ASSIGN)
 
-_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` raises
+_NO_PYTHON = (SyntaxError, ValueError, RecursionError, MemoryError)  # what `ast` raises for invalid source
 
 
 class AtModel(StrictModel, title="A place"):
-    """Give exactly one anchor. It must occur exactly once in the function, in statement position. If it
-    occurs several times, the error lists the places, and `nth` chooses one. Write names as in the source
-    (`gap`, `self.angle`, `frames.extend`)."""
+    """Give exactly one anchor. It must match exactly one place in the function. If it matches several, the
+    error lists them, and `nth` chooses one. Anchors `before_...` and `after_...` match statements, not parts
+    of expressions. Write names as in the source (`gap`, `self.angle`, `frames.extend`).
+    """
 
     file: str = Field(description="A file of the target, relative to its root.")
     function: str | None = Field(
@@ -33,7 +34,8 @@ class AtModel(StrictModel, title="A place"):
     before_assign: str | None = Field(None, description="Before the statement that assigns to this name.")
     after_call: str | None = Field(None, description="After the statement that calls this name.")
     before_call: str | None = Field(
-        None, description="Before the statement that calls this name. A guard leaves out this statement."
+        None,
+        description="Before the statement that calls this name. A model of kind `guard` wraps it.",
     )
     before_return: str | None = Field(
         None, description="Before the `return` of this name; empty for a bare `return`."
@@ -41,15 +43,15 @@ class AtModel(StrictModel, title="A place"):
     entry: bool | None = Field(None, description="`true`: at the start of the function.")
     assigned_value: str | None = Field(
         None,
-        description="The value assigned to this name, in any position (`if a: b = 1`, `:=`).",
+        description="The value assigned to this name, wherever the assignment is (`if a: b = 1`, `:=`).",
     )
     return_value: str | None = Field(
-        None, description="The value of the `return` of this expression; empty for any `return`."
+        None, description="The value of the `return` statement with this expression; empty for any `return`."
     )
     condition: str | None = Field(
         None,
-        description="The condition of an `if`, `while`, `assert`, `x if ... else y` or comprehension; empty "
-        "for any.",
+        description="This condition of an `if`, `while`, `assert`, `x if ... else y` or comprehension; empty "
+        "for any condition.",
     )
     argument: str | None = Field(
         None, description="An argument of the call of this name; `which` chooses one of several."
@@ -69,12 +71,13 @@ class AtModel(StrictModel, title="A place"):
         description="The default of this parameter; the fault sets it while active.",
     )
     which: str | int | None = Field(
-        None, description="For `argument`: its position in the call, from 1, or its keyword."
+        None, description="For `argument`: the argument's position in the call, from 1, or its keyword."
     )
     nth: int | None = Field(
         None,
         ge=1,
-        description="Which of several matches, from 1; heads of blocks count after statements.",
+        description="Which of several matches, counted from 1. Heads of blocks are counted after all "
+        "statements.",
     )
 
     def location(self, source: Source, keys: Keys) -> FaultLocation:
@@ -108,7 +111,7 @@ class AtModel(StrictModel, title="A place"):
             raise source.error(
                 (*keys, "nth"),
                 f"`nth` of a {kind.value}",
-                expected="none: there is one of each name",
+                expected="no `nth`, because each name has only one value",
                 remedy="leave it out",
             )
         function = self._function_of(kind, source, keys)
@@ -116,7 +119,7 @@ class AtModel(StrictModel, title="A place"):
         return FaultLocation(path=self.file, function=function, anchor=anchor)
 
     def _function_of(self, kind: AnchorKind, source: Source, keys: Keys) -> str:
-        """Return the function; empty for a constant."""
+        """Return the function's name, or an empty string for a constant."""
         name = self.function
         if kind is AnchorKind.CONSTANT:
             if name is not None:
@@ -139,7 +142,7 @@ class AtModel(StrictModel, title="A place"):
 
 
 def as_written_at(location: FaultLocation) -> dict[str, Any]:
-    """Return the location as written in a spec at `at`."""
+    """Return the location as the value of `at` in a spec."""
     anchor = location.anchor
     found: dict[str, Any] = {"file": location.path}
     found |= {"function": location.function} if location.function else {}

@@ -1,4 +1,4 @@
-"""Turns pydantic's validation errors into texts: value found, value expected, remedy."""
+"""Turn pydantic's validation errors into texts: value found, value expected, remedy."""
 
 import types
 from collections.abc import Sequence
@@ -49,8 +49,10 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
 
 
 def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
-    """Choose the error to report: a misspelt key before the missing key that it causes. If a value may have
-    several shapes, choose an error about the shape that it has."""
+    """Choose the error to report. An unknown key comes before a missing key, which it may misspell.
+
+    If a value may have several shapes, prefer an error about the shape that it has.
+    """
     shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
     inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}
     apt = [p for p in found if p["loc"] not in shapes or p["loc"][:-1] not in inside]

@@ -1,4 +1,4 @@
-"""Units of numbers in YAML, which stand in the key (`offset_m`, `speed_mph`)."""
+"""Units of numbers in YAML. A key ends in the unit (`offset_m`, `speed_mph`)."""
 
 import math
 from dataclasses import dataclass
@@ -57,7 +57,7 @@ UNITS = {
     )
 }
 KNOWN = ", ".join(UNITS)
-_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # of the longest suffix
+_WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of the longest suffix
 
 
 def split(key: str) -> tuple[str, Unit | None]:

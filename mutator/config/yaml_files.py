@@ -1,4 +1,4 @@
-"""Reads YAML strictly, with a line for every value, so that errors can point at it.
+"""Read YAML strictly, and keep the line of every value for error messages.
 
 The dialect is the core of YAML 1.2: `true`/`false`, `null`, decimal numbers and strings. It excludes tags,
 anchors and aliases (a small file could expand to gigabytes), several documents, and duplicate keys.
@@ -68,7 +68,7 @@ class Source:
 
     @contextmanager
     def placing(self, keys: Keys) -> Iterator[None]:
-        """Make a MutatorError raised inside point at the value at `keys`."""
+        """Make every MutatorError raised in the `with` block point at the value at `keys`."""
         try:
             yield
         except MutatorError as error:
@@ -94,7 +94,7 @@ def load(path: Path) -> Source:
 
 
 def parse(text: str, path: Path) -> Source:
-    """Parse the text of a file like `load`."""
+    """Parse the text of a file as `load` does; `path` is the file that errors name."""
     try:
         _check_events(text, path)
         node = yaml.compose(text, Loader=_Loader)
@@ -133,7 +133,7 @@ def _read_text(path: Path) -> str:
 
 
 def _check_events(text: str, path: Path) -> None:
-    """Reject what the dialect excludes and what would take long to read, before anything is built."""
+    """Reject excluded syntax and files that take too long to read, before building any value."""
     if directive := _DIRECTIVE.search(text):
         raise MutatorError(
             "'%' at the start of a line (a directive)",

@@ -27,12 +27,12 @@ def expand(
     models: FaultModels,
     manifest: TargetManifest,
 ) -> tuple[Fault, ...]:
-    """The faults of `spec` in a reading (None: the library's default), in the order of variants and ranges.
+    """Return the faults of `spec` in `reading` (None: the library's default), by variant and range.
 
     The same seed draws the same values for every reading, trigger, scenario and method. MutatorError
     (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location outside the
-    target or in a forbidden place, a change that the target does not offer. Anchors are resolved when a
-    mutant is built.
+    target or in a forbidden place, and a change that the manifest does not define. Anchors are resolved
+    later, when a mutant is built.
     """
     reading = reading or spec.readings.default
     spec.readings.check(reading)
@@ -41,10 +41,10 @@ def expand(
 
 
 def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
-    """The values of `draw` for `seed`, in its unit: one from each range, or the list as it is.
+    """Return the values of `draw` for `seed`, in the draw's unit: one from each range, or the list unchanged.
 
-    A range's value depends only on seed, key, position and the values before it. Duplicates are drawn again,
-    as equal faults would be one; so is a real 0, which is no fault.
+    The value from a range depends only on seed, key, position and earlier values. A duplicate is drawn again,
+    because equal faults have the same id. A real 0 is also drawn again, because it changes nothing.
     """
     if draw.kind == "list":
         return draw.values
@@ -61,7 +61,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
 
 
 def _value(draw: Draw, index: int, u: float) -> int | float:
-    """The value at `u` (0 to 1) in one range, rounded and capped as the draw says."""
+    """Return the value at the fraction `u` of one range, rounded and capped as the draw specifies."""
     low, high = draw.ranges[index]
     if draw.kind == "integers":
         whole = int(low) + math.floor(u * (int(high) - int(low) + 1))

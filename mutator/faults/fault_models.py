@@ -21,7 +21,7 @@ from mutator.faults.injections import InjectionModel, InjectionSpec
 SCHEMA = "fault_model/1"
 PROBE_TEMPLATE = f"{PROBE_NAME}.py.j2"
 TARGET_UNIT = "target"
-# `variable`: a name known at the anchor; `import`: a name in a module of the target, with the module;
+# `variable`: a name known at the anchor; `import`: the dotted name of something in a module of the target;
 # `constant`: a number, truth value, text or None; `choice`: one of a few terms; `unit`: the suffix of a unit.
 ParamType = Literal[
     "variable", "import", "number", "integer", "boolean", "constant", "choice", "unit", "seed"
@@ -70,13 +70,16 @@ class ParamSchema:
 _TARGET = ParamSchema(
     name="target",
     type="variable",
-    about="the variable that is changed, where that is not what the anchor names",
+    about="the variable to change, if it is not the one that the anchor names",
 )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Example:
-    """A source before and after one injection with the tag `example`: documentation that runs as a test."""
+    """Source code before and after one injection, tagged `example`.
+
+    It is documentation and runs as a test.
+    """
 
     about: str
     injection: InjectionSpec
@@ -89,9 +92,9 @@ class Example:
 class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
-    `raises`: its injected lines raise on purpose, so an exception counts as a crash of the target.
+    `raises`: its injected lines raise on purpose, so an exception in them counts as a crash of the target.
     `expression` is the template of a changed value, or None if the model cannot change an expression. `needs`
-    lists what the templates need, for the kinds of anchors that have it.
+    is what the templates need in addition to their parameters. Not every kind of anchor can provide it.
     """
 
     name: str
@@ -116,7 +119,10 @@ class FaultModel:
         return frozenset(_PARTS.findall(self.expression or ""))
 
     def changes_nothing(self, params: Mapping[str, object]) -> bool:
-        """Whether these values certainly change nothing; a value with a bound may still change something."""
+        """Whether these values certainly change nothing.
+
+        False if an optional bound is set, because a bound can change a value that is otherwise left alone.
+        """
         bounded = any(p.optional and p.type == "number" and p.name in params for p in self.params)
         neutral = (p.neutral is not None and params.get(p.name) == p.neutral for p in self.params)
         return any(neutral) and not bounded
@@ -129,13 +135,15 @@ class FaultModels:
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: str  # of what determines a mutant's text and blame: templates, probe, which models raise
+    digest: (
+        str  # covers templates, probe, and models that raise: a mutant's text and how its exceptions count
+    )
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())
 
     def get(self, name: str) -> FaultModel:
-        """The model `name`; MutatorError that lists the known ones."""
+        """Return the model `name`; MutatorError that lists the known names."""
         if name not in self.models:
             raise MutatorError(
                 f"unknown fault model '{name}'",
@@ -146,62 +154,67 @@ class FaultModels:
 
 
 class _ParamModel(StrictModel, title="A parameter"):
-    """Its name has no unit: a spec writes `by_m` for the parameter `by`."""
+    """The key is the parameter's name without a unit. A spec adds the unit: `by_m` for the parameter `by`."""
 
     type: ParamType = Field(
-        description="The type of a value: a name in the function (`variable`), a dotted name to import "
-        "(`import`), a number, a `constant` (a number, truth value, text or null), a `choice` (one of the "
-        "terms in `choices`), the suffix of a `unit`, or a `seed`, which expansion draws and no spec sets."
+        description="The type of a value. `variable`: a name in the function. `import`: a dotted name to "
+        "import. `number`, `integer`, `boolean`: such a value. `constant`: a number, truth value,"
+        " text or null. `choice`: one of the terms in `choices`. `unit`: the suffix of a unit. "
+        "`seed`: drawn during expansion; a spec cannot set it."
     )
     about: str = Field(description="What the parameter is.")
     unit: str | None = Field(
         None,
-        description="The unit that the template expects, `target` for that of the changed variable; default: "
-        "none.",
+        description="The unit that the template expects, or `target` for the unit of the changed variable. "
+        "Default: no unit.",
     )
-    optional: bool = Field(False, description="Whether it can be left out; the template then gets `none`.")
+    optional: bool = Field(
+        False, description="Whether a spec can omit the parameter. The template then gets `none`."
+    )
     min: float | None = Field(None, description="The minimum, in that unit.")
     max: float | None = Field(None, description="The maximum, in that unit.")
     neutral: float | None = Field(
-        None, description="The value with which a fault changes nothing; plans and `try` warn about it."
+        None, description="The value with which a fault changes nothing. Plans and `try` warn about it."
     )
     choices: list[str] = Field(
-        [], description="The terms that a `choice` allows; the template writes them verbatim."
+        [], description="The terms that a `choice` allows. The template writes them verbatim."
     )
 
 
 class _ExampleModel(StrictModel, title="An example"):
     """Shown on this page, and run as a test: `mutator check` compares the result."""
 
-    about: str = Field(description="What it shows, after *For example*.")
-    injection: InjectionModel = Field(description="An injection, as a spec has it.")
-    before: str = Field(description="A source.")
+    about: str = Field(description="What the example shows. The page prints this after *For example,*.")
+    injection: InjectionModel = Field(description="An injection, written as in a spec.")
+    before: str = Field(description="The source before the injection.")
     after: str = Field(description="The source after the injection, tagged `example`.")
 
 
 class FaultModelModel(StrictModel, title="The file"):
     """Name, parameters and examples of a fault model. Its template is the file next to it."""
 
-    name: str = Field(description="The name, equal to the file's.")
+    name: str = Field(description="The name. It must match the file name without `.yaml`.")
     kind: Literal["insert", "guard", "value"] = Field(
-        description="`insert`: lines before or after the statement; `guard`: the statement is wrapped; "
-        "`value`: the template is one expression over `original`, the value of a variable or an expression."
+        description="`insert`: adds lines before or after the statement. `guard`: wraps the statement. "
+        "`value`: the template is one expression that uses `original`, the value of a variable or"
+        " an expression."
     )
     expression: str | None = Field(
         None,
-        description="Of an `insert`: the template of the same change to an expression's value, `original`.",
+        description="For kind `insert` only: a template that applies the same change to the value of an "
+        "expression, `original`.",
     )
     about: str = Field(description="What the model does, in one sentence.")
     raises: bool = Field(
         False,
-        description="Whether its lines raise on purpose. An exception in them then counts as a crash of the "
-        "target; otherwise the mutant is invalid.",
+        description="Whether the model's lines raise on purpose. An exception in them then counts as a crash "
+        "of the target; otherwise the mutant is invalid.",
     )
     needs: Literal["call", "statement", "next_statement"] | None = Field(
         None,
-        description="What the template needs in addition to its parameters: `call`, an anchored expression "
-        "that is a call, as `called` and its `arguments`; `statement`, the anchored statement on one line; "
-        "`next_statement`, also the statement after it, and a guard then wraps both.",
+        description="What the template needs in addition to its parameters. `call`: the anchored expression "
+        "is a call, passed as `called` and `arguments`. `statement`: the anchored statement on "
+        "one line. `next_statement`: also the statement after it; a guard then wraps both.",
     )
     params: dict[str, _ParamModel] = Field(default_factory=dict, description="Name -> parameter.")
     examples: list[_ExampleModel] = Field(min_length=1, description="At least one.")
@@ -234,8 +247,8 @@ def _load(path: Path) -> FaultModel:
         raise source.error(
             ("expression",),
             f"`expression` with kind {kind.value}",
-            expected="one for kind insert: the template of a `value` is its expression, and a guard has none",
-            remedy="leave it out",
+            expected="`expression` only with kind insert; a value template is one, and a guard has none",
+            remedy="delete `expression`",
         )
     template = _text(template_path)
     params = tuple(_param(name, param, source) for name, param in model.params.items())
@@ -271,13 +284,18 @@ def _param(name: str, model: _ParamModel, source: Source) -> ParamSchema:
         raise source.error(
             keys,
             f"parameter '{name}'",
-            expected=f"a name that templates do not have already: {', '.join(_GIVEN)}",
-            remedy="rename it",
+            expected=f"a name other than these, which templates already use: {', '.join(_GIVEN)}",
+            remedy="rename the parameter",
         )
     if model.unit not in (None, TARGET_UNIT, *units.UNITS):
         raise source.error((*keys, "unit"), f"'{model.unit}'", expected=f"target or one of {units.KNOWN}")
     if (model.type == "choice") != bool(model.choices):
-        raise source.error(keys, f"parameter '{name}'", expected="`choices` for a choice, and for no other")
+        state = "no `choices`" if model.type == "choice" else "`choices`"
+        raise source.error(
+            keys,
+            f"parameter '{name}' of type {model.type} has {state}",
+            expected="`choices` for a choice, and only for a choice",
+        )
     return ParamSchema(name=name, **model.model_dump() | {"choices": tuple(model.choices)})
 
 

@@ -1,4 +1,4 @@
-"""Check names that an injected statement imports: the target must define them."""
+"""Check the names that an injected statement imports: the target must define them."""
 
 import ast
 from collections.abc import Iterator
@@ -10,8 +10,9 @@ from mutator.targets.manifest import TargetManifest
 
 
 def check_import(manifest: TargetManifest, dotted: str) -> None:
-    """Raise MutatorError, without a place, unless `dotted` is a module of the target and a name defined in
-    it.
+    """Raise MutatorError unless `dotted` is a module of the target and a name defined in it.
+
+    The error has no file and line; the caller adds them.
     """
     module, _, name = dotted.rpartition(".")
     base = module.replace(".", "/")
@@ -39,7 +40,7 @@ def _names(path: str, data: bytes, root: Path) -> list[str]:
     except (SyntaxError, ValueError, RecursionError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {message}", where=root / path, line=line, remedy="mend the target"
+            f"not valid Python: {message}", where=root / path, line=line, remedy="correct the target's source"
         ) from None
 
 

@@ -20,9 +20,9 @@ _REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A parameter that takes the drawn value `name`, times `sign`.
+    """A parameter whose value is the drawn value `name`, multiplied by `sign`.
 
-    If a reading says that a number in one unit is read as another, the value is converted by that mistake.
+    With `written_in` and `read_as`, the value is converted to the first unit and then misread as the second.
     """
 
     name: str
@@ -51,7 +51,7 @@ class ParamSpec:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class InjectionSpec:
-    """One injection as written; `unit` is the unit of the changed variable, if the model needs it."""
+    """One injection as written. `unit` is the unit of the changed variable, if the model needs it."""
 
     location: FaultLocation
     model: str
@@ -66,38 +66,39 @@ class InjectionSpec:
 class InjectionModel(StrictModel, title="An injection"):
     """One fault model applied at one place."""
 
-    at: AtModel = Field(description="Where.")
+    at: AtModel = Field(description="The place where the fault is injected.")
     model: str = Field(description="A [fault model](fault-models.md).")
     unit: str | None = Field(
         None,
-        description="The unit of the changed variable in the source: a suffix of the table of units, "
-        "or `'1'` for a plain number. Needed if the model has parameters in that unit.",
+        description="The unit of the changed variable in the source: a suffix from the table of units, or "
+        "`'1'` for a plain number. Required if the model has parameters in that unit.",
     )
     params: dict[str, Any] = Field(
         default_factory=dict,
         description="Parameters of the model, with the unit in the key. A value is a number, a name, a "
-        "constant such as `true`, the draw's name, or `{draw: ..., written_in: ..., read_as: ...}` for a "
-        "number that is written in one unit and read as another.",
+        "constant such as `true`, or the draw's name. For a number that is written in one unit "
+        "and read as another, write `{draw: ..., written_in: ..., read_as: ...}`.",
     )
 
     where: str | None = Field(
         None,
-        description="A condition that selects one instance among several, over names that the function "
-        "knows: `index == 2`, `self.name == 'left'`, `item is self.items[0]`. Names, attributes, items, "
-        "constants, comparisons, `and`, `or`, `not`. It is evaluated only while the fault is active.",
+        description="A condition that selects one instance among several: `index == 2`, `self.name == "
+        "'left'`, `item is self.items[0]`. It may use names that the function knows, attributes, "
+        "items, constants, comparisons, `and`, `or` and `not`. It is evaluated only while the "
+        "fault is active.",
     )
     call: int | None = Field(
         None,
         ge=1,
-        description="The fault acts only in this execution of the place, counted from 1 at each "
-        "activation; with `where`, only executions that satisfy it count.",
+        description="The fault acts only in this execution of the place. Executions are counted from 1 at "
+        "each activation; with `where`, only those that satisfy it count.",
     )
     every: int | None = Field(
-        None, ge=1, description="The fault acts in every n-th execution of the place, counted the same way."
+        None, ge=1, description="The fault acts in every n-th execution of the place, counted as for `call`."
     )
 
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
-        """Check and convert; errors point into `source` at `keys`."""
+        """Check the injection and convert it; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
             raise source.error(
                 (*keys, "unit"),
@@ -131,7 +132,7 @@ class InjectionModel(StrictModel, title="An injection"):
             raise source.error(
                 (*keys, given[0]),
                 f"`{given[0]}` at a {kind.value}",
-                expected="none of these: the value is set for all, once in each step",
+                expected="no `where`, `call` or `every`: the value is set once a step, for all instances",
                 remedy="leave it out, or anchor where the value is used",
             )
         if {"call", "every"} <= set(given):

@@ -1,4 +1,4 @@
-"""Resolve an injection's parameters from the spec's form to the template's, checked against the schema."""
+"""Check an injection's parameters and convert them from the spec's form to the template's."""
 
 from mutator._common.random_streams import generator
 from mutator._common.text import shown, suggestion
@@ -26,10 +26,11 @@ def resolve(
     seed: int = 0,
     key: str = "",
 ) -> Injection:
-    """The injection with `value` (of `draw`) inserted: numbers in the variable's own unit, sorted by name.
+    """Return the injection with `value`, drawn from `draw`, inserted.
 
-    A missing `target` is the name that the anchor assigns to. A `seed` parameter is drawn from (seed, key).
-    MutatorError with file and line for anything that does not fit the model.
+    Parameters are sorted by name, and numbers are in the unit that the template expects. A missing `target`
+    defaults to the name that the anchor assigns. A `seed` parameter is drawn from (seed, key). MutatorError
+    with file and line for anything that does not fit the model.
     """
     resolver = _Resolver(spec, model, source, draw, value)
     params: dict[str, Value] = {}
@@ -84,9 +85,9 @@ class _Resolver:
         self.drawn = value
 
     def schema(self, param: ParamSpec) -> ParamSchema:
-        """The schema of a parameter as written; its unit suffix must have the right dimension.
+        """Return the schema of a parameter as written, after checking the dimension of its unit suffix.
 
-        A constant that is not a number has no unit.
+        A constant that is not a number must have no unit suffix.
         """
         schema = self.model.param(param.name)
         if schema is None or schema.type == "seed":
@@ -110,7 +111,9 @@ class _Resolver:
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Whether it is a constant but not a number: a truth value, None, or a text other than the draw's."""
+        """Whether it is a constant but not a number: a truth value, None, or a text other than the draw's
+        name.
+        """
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
@@ -119,7 +122,7 @@ class _Resolver:
         return drawn is None or self.draw is None or drawn.name != self.draw.name
 
     def keys(self, schema: ParamSchema) -> list[str]:
-        """The keys under which a parameter can be written: one per suffix that fits."""
+        """The keys that a spec can use for a parameter: one for each unit of the right dimension."""
         unit = self.unit(schema)
         if unit is None:
             return [schema.name]
@@ -127,11 +130,11 @@ class _Resolver:
         return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
     def key(self, schema: ParamSchema) -> str:
-        """The key that errors show, in the template's unit: the first of `keys`."""
+        """The key that errors show: the one in the template's unit."""
         return f"`{self.keys(schema)[0]}`"
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
-        """The template's unit for the parameter."""
+        """The template's unit for the parameter; None for a plain number."""
         if schema.unit != TARGET_UNIT:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:
@@ -144,7 +147,7 @@ class _Resolver:
         return None if self.spec.unit == DIMENSIONLESS else units.UNITS[self.spec.unit]
 
     def value(self, param: ParamSpec, schema: ParamSchema) -> Value:
-        """The value in the template's unit, with type and range checked."""
+        """Return the value in the template's unit, after checking its type and range."""
         if schema.type in NAMES:
             fits = dotted_name if schema.type == "import" else assignable
             if not isinstance(param.value, str) or not fits(param.value):
@@ -178,7 +181,9 @@ class _Resolver:
         return number
 
     def _constant(self, param: ParamSpec) -> Value:
-        """The value itself, unless it is a text that resembles the draw's name."""
+        """Return the value; MutatorError if it is a text that resembles the draw's name, a likely
+        misspelling.
+        """
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
             raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that resembles it less")

@@ -1,4 +1,4 @@
-"""Readings: different ways to understand the same written faults, declared by a library."""
+"""Readings: a library's different interpretations of the same faults, e.g. as described and as coded."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ _NAME = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Readings:
-    """The readings of a library, in order. The first is the default, in which every variant is written."""
+    """The readings of a library, in order. The first is the default, which every variant must define."""
 
     names: tuple[str, ...]
     about: tuple[str, ...]  # what each one means
@@ -42,23 +42,25 @@ UNDECLARED = Readings(
         "The injections, as the code that was published with it has them.",
     ),
 )
-"""The readings of a library that declares none, i.e. one that is older than `readings.yaml`."""
+"""The readings of a library without a file `readings.yaml`."""
 
 
 class _DeclaredReadingModel(StrictModel, title="A declared reading"):
-    about: str = Field(description="What it means.")
+    about: str = Field(description="What the reading means.")
 
 
 class ReadingsModel(StrictModel, title="readings.yaml"):
     """The readings of a library."""
 
     readings: dict[str, _DeclaredReadingModel] = Field(
-        min_length=1, description="By name: small letters, digits and `_`. The first is the default."
+        min_length=1,
+        description="Name -> reading. A name consists of small letters, digits and `_`. The first reading is "
+        "the default.",
     )
 
 
 def load_readings(library: Path) -> Readings:
-    """The readings that a library declares, or `UNDECLARED`."""
+    """Return the readings that a library declares, or `UNDECLARED`."""
     path = library / FILE
     if not path.is_file():
         return UNDECLARED

@@ -1,4 +1,4 @@
-"""Fault specs: the faults of one module as a YAML file describes them, values not yet drawn."""
+"""Fault specs: YAML files that describe the faults of one module, before values are drawn."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -25,8 +25,8 @@ _LARGEST = 1e15  # limit of a drawn number: whole numbers up to it are exact
 class Draw:
     """How a variant's values are made: one draw from each range, or a list.
 
-    Values are in `unit` (a suffix; None for plain numbers), the unit in the YAML key. `key` seeds the draw:
-    equal keys and ranges draw equal values.
+    Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` seeds the draw together
+    with the campaign's seed: equal keys and ranges draw equal values.
     """
 
     key: str
@@ -53,9 +53,10 @@ class Draw:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Variant:
-    """One row of the library: injections that share a trigger and a draw, by reading, the default first.
+    """One row of the library: for each reading, injections that share a trigger and a draw.
 
-    `holds` overrides, by reading, how long the fault stays active.
+    `readings` starts with the default reading. `holds` overrides, by reading, how long the fault stays
+    active.
     """
 
     name: str
@@ -68,11 +69,13 @@ class Variant:
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        """The injections under `reading`, or else the default's."""
+        """The injections under `reading`, or under the default if the variant does not define `reading`."""
         return self.readings[self._written(reading)]
 
     def hold(self, reading: str) -> Hold | None:
-        """How long the fault stays active under `reading`, or else the default; None: as its trigger says."""
+        """How long the fault stays active under `reading` or the default; None: as long as its trigger
+        specifies.
+        """
         return self.holds[self._written(reading)]
 
     def _written(self, reading: str) -> str:
@@ -131,7 +134,7 @@ class SweepModel(StrictModel, title="A sweep"):
         return self
 
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """All ranges, (low, high)."""
+        """All ranges as (low, high); ValueError if the sweep is not valid."""
         if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
             raise ValueError("first and last as [low, high]")
         low, high = self.first
@@ -145,42 +148,45 @@ class SweepModel(StrictModel, title="A sweep"):
 
 
 class _DrawModel(StrictModel, title="A draw"):
-    """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters take the drawn value by
-    that name without the unit, optionally with a minus sign: `by_m: -distance`. Exactly one of
-    `integers_from`, `reals_from` and `values` is given. The same seed and key draw the same values.
+    """The key of a draw is a name of your choice and a unit: `distance_m`. Parameters refer to the drawn
+    value by that name without the unit, optionally with a minus sign: `by_m: -distance`. Give exactly one of
+    `integers_from`, `reals_from` and `values`. The same seed and key draw the same values.
     """
 
     integers_from: SweepModel | None = Field(None, description="One whole number from each range of a sweep.")
     reals_from: SweepModel | None = Field(None, description="One number from each range of a sweep.")
     decimals: int | None = Field(
-        None, ge=0, le=12, description="The number of decimals that `reals_from` is rounded to."
+        None, ge=0, le=12, description="The number of decimals to which values of `reals_from` are rounded."
     )
     values: list[float | int] | None = Field(None, description="A list of values, used unchanged.")
-    cap: float | None = Field(None, allow_inf_nan=False, description="The maximum of drawn values.")
+    cap: float | None = Field(
+        None, allow_inf_nan=False, description="The maximum: larger drawn values are reduced to it."
+    )
     key: str | None = Field(
         None,
-        description="The seed of the draw, which variants can share; default: the variant's full name.",
+        description="A name that seeds the draw together with the campaign's seed. Variants can share it. "
+        "Default: the variant's full name.",
     )
 
 
 _LATCHES = (
-    "How long the fault stays active, where it does not follow the trigger: `to_end` for a fault that latches"
+    "How long the fault stays active, if that differs from the trigger: `to_end` for a fault that latches"
 )
 
 
 class _ReadingModel(StrictModel, title="A reading"):
     hold: Literal["while", "to_end"] | None = Field(
-        None, description=f"{_LATCHES} in this reading; default: the variant's."
+        None, description=f"{_LATCHES} in this reading; default: the variant's `hold`."
     )
     injections: list[InjectionModel] = Field(
-        description="At least one; any of them executed while triggered counts as activation."
+        description="At least one. The fault is activated when any of them is executed while triggered."
     )
 
 
 class _VariantBase(StrictModel, title="A variant"):
     """A variant is one row of the library: its injections share one trigger, one draw and one aim."""
 
-    aim: str = Field(description="The hazard it aims at, one of the target's.")
+    aim: str = Field(description="The hazard that the fault is meant to cause, one of the target's.")
     about: str = Field(description="What this variant does.")
     changes: list[str] = Field(
         default_factory=list,
@@ -189,7 +195,8 @@ class _VariantBase(StrictModel, title="A variant"):
     )
     hold: Literal["while", "to_end"] | None = Field(None, description=f"{_LATCHES}.")
     draw: dict[str, _DrawModel] | None = Field(
-        None, description="One draw: name and unit -> draw. Without it the variant is a single fault."
+        None,
+        description="Exactly one draw: name and unit -> draw. Without a draw, the variant is a single fault.",
     )
 
 
@@ -200,14 +207,14 @@ class SpecModel(StrictModel, title="The file"):
 
     module: str = Field(description="The module of the controller that the fault is in.")
     fault_type: str = Field(
-        description="The name of the fault type; the spec's name is module and fault type."
+        description="The name of the fault type. The spec is named `<module>/<fault_type>`."
     )
     about: str = Field(description="What goes wrong, in one sentence.")
 
 
 @cache
 def spec_model(readings: Readings) -> type[SpecModel]:
-    """The schema of a library's spec files: its variants have a key for each of its readings."""
+    """The schema of a library's spec files. Its variants have one key for each reading of the library."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.about, strict=True):
         required = name == readings.default
@@ -224,7 +231,7 @@ def spec_model(readings: Readings) -> type[SpecModel]:
 
 
 def load_spec(path: Path, readings: Readings) -> FaultSpec:
-    """Read one spec of a library strictly (file:line errors); `expand` does the remaining checks."""
+    """Read one spec of a library; errors have file and line. `expand` does the remaining checks."""
     model, source = read(path, spec_model(readings), SCHEMA)
     models: dict[str, _VariantBase] = model.variants  # type: ignore[attr-defined]
     for key in ("module", "fault_type"):
@@ -294,7 +301,7 @@ def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys:
         raise source.error((*place, "integers_from"), "a range with fractions", expected="whole numbers")
     if model.decimals is not None and kind != "reals":
         raise source.error(
-            (*place, "decimals"), f"{model.decimals} decimals", expected="them with reals_from"
+            (*place, "decimals"), f"{model.decimals} decimals", expected="`decimals` only with reals_from"
         )
     return Draw(
         key=model.key or default_key,

@@ -25,10 +25,10 @@ from mutator.targets.source_tree import SourceTree
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """A resolved anchor: the anchored statement is lines `first` to `last` (exclusive, from 0).
+    """A resolved anchor. The statement is on lines `first` to `last` (exclusive, from 0).
 
-    For `entry` it is empty: `first == last`. `reindent` is how many of its lines a guard may indent: all, or
-    only the first if a string spans lines. `names` are the names that the function uses.
+    For `entry` there is no statement: `first == last`. `reindent` is the number of its lines that a guard may
+    indent: all, or only the first if a string spans lines. `names` are the names that the function uses.
     """
 
     first: int
@@ -57,7 +57,9 @@ class ParsedFile:
     fixed: tuple[FixedValue, ...]
     outer: tuple[range, ...]  # the lines of each outermost function
     where: Path
-    sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits known to be sound
+    sound: set[Hashable] = field(
+        default_factory=set, repr=False, compare=False
+    )  # edits that passed all checks
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve_value(self, location: FaultLocation) -> Expression:
@@ -73,7 +75,9 @@ class ParsedFile:
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """The lines of what the location names: the first (from 0), and the one after the last."""
+        """The first line (from 0) of the statement or value that the location names, and the line after its
+        last.
+        """
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
@@ -134,7 +138,7 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
 
 
 def plain_name(function: str) -> str:
-    """The qualified name of a function as written in files: without `<locals>`."""
+    """The qualified name of a function without `<locals>`, normalized as the compiler does."""
     return as_compiled(function.replace(".<locals>", ""))
 
 
@@ -175,7 +179,7 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
 
 
 def _inside(file: ParsedFile, first: int, names: frozenset[str]) -> Site:
-    """The beginning of the block whose head binds the name."""
+    """The site at the beginning of the block whose head binds the name."""
     indent = _indent(file.lines[first])
     return Site(first=first, last=first, after=True, alone=True, reindent=0, indent=indent, names=names)
 
@@ -254,8 +258,9 @@ def _no_single_hit(
     pairs: list[tuple[Function, Statement]],
     hits: list[tuple[Function, Statement]],
 ) -> MutatorError:
-    """The error about an ambiguous or missing anchor: `pairs` have its name, `hits` of them are
-    statements.
+    """The error about an ambiguous or missing anchor.
+
+    `pairs` are all matches of its name, `hits` those that are whole statements or heads of blocks.
     """
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
@@ -294,7 +299,10 @@ def _candidates(functions: tuple[Function, ...], verb: str) -> str:
 
 
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
-    """Refuse a statement that shares its line with others on the side where lines are inserted."""
+    """Raise MutatorError if no line can be inserted before or after the statement.
+
+    An example is a statement that shares its line with others.
+    """
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
     if statement.opens is not None and not after:

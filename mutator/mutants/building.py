@@ -1,4 +1,4 @@
-"""Build mutants: from a fault and a trigger to changed files, compiled, diffed and identified."""
+"""Build mutants: turn a fault and a trigger into changed files, a patch and an id."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,9 +46,10 @@ class InvalidMutant(MutatorError):
 
 @dataclass(frozen=True, kw_only=True)
 class Mutant:
-    """A mutated tree as its difference from the target. Same fault, trigger, target and templates: same id.
+    """A mutated tree, stored as its difference from the target.
 
-    `files` maps paths relative to the root to the full new content, including the probe.
+    Equal faults, triggers, targets and templates give equal ids. `files` maps paths relative to the root to
+    the full new content, including the probe.
     """
 
     id: str
@@ -66,8 +67,9 @@ class Mutant:
 def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
     """Build the mutant of `manifest`'s tree with `fault` under `trigger`; without a fault, the null mutant.
 
-    The null mutant has only the probe. `fault.hold` overrides `trigger.hold`. MutatorError if an anchor is
-    missing or ambiguous (candidates are listed), InvalidMutant if the result does not compile.
+    The null mutant contains only the probe and its observation. `fault.hold` overrides `trigger.hold`.
+    MutatorError if an anchor is missing or ambiguous (candidates are listed), InvalidMutant if the result
+    does not compile.
     """
     return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
@@ -109,7 +111,7 @@ def _build(
 def _edits(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
 ) -> dict[str, list[Edit]]:
-    """The edits of each file: the observation's first, then the injections' in order."""
+    """The edits by file: the observation first, then the injections in order."""
     edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
     for name, injection in zip(ids, injections, strict=True):
         check_location(manifest, injection.location)
@@ -161,7 +163,7 @@ def _compile(data: bytes, where: Path) -> None:
 
 
 class _Splicer:
-    """Makes every file by splicing, and compiles it; `ids` are those in the injected lines."""
+    """Splices and compiles every file. `ids` are the ids in the injected lines."""
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
         """Raise InvalidMutant unless the probe compiles."""
@@ -174,7 +176,7 @@ class _Splicer:
         return change
 
     def spliced(self, file: ParsedFile, edits: Sequence[Edit]) -> Change:
-        """The same, not compiled."""
+        """Return the edited file without compiling it; InvalidMutant unless it un-splices to the original."""
         pieces = apply_edits(file, edits)
         data = joined(pieces)
         if unsplice(data) != file.data:
@@ -187,7 +189,7 @@ class _Splicer:
 
 
 class _ReusingSplicer(_Splicer):
-    """Makes a file from a reusable change if there is one, else splices it and keeps one."""
+    """Reuses a known change of a file if there is one; otherwise splices the file and keeps the change."""
 
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
@@ -201,7 +203,7 @@ class _ReusingSplicer(_Splicer):
         key = reuse_key(file, edits, ids)
         if key in known:
             found = known[key]
-            if isinstance(found, Change):  # most changes of an expression occur once
+            if isinstance(found, Change):  # only now, since most changes of an expression occur once
                 found = known[key] = ReusableChange.of(found)
             return found.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):

@@ -1,5 +1,6 @@
-"""Decide whether a changed file compiles from its changed functions alone, since most of a file is
-unchanged.
+"""Check whether a changed file compiles by compiling only its changed functions.
+
+The rest of the file is unchanged.
 """
 
 from collections import defaultdict
@@ -13,10 +14,11 @@ from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
 
 
 def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
-    """Whether the file certainly compiles with these edits, and with all others of their key.
+    """Whether the file certainly compiles with these edits, and with all other edits of their key.
 
-    It does if the changed functions compile, as they are and normalized, and so does the file with the import
-    of the probe. False is inconclusive: an edit may lie outside functions.
+    True if the changed functions compile, both with these edits and with normalized ones, and the file
+    compiles with the import of the probe. False is inconclusive: for example, an edit may lie outside
+    functions.
     """
     as_they_are = in_order(edits)
     normalized = [
@@ -41,7 +43,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
 
 
 def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
-    """Whether the file compiles with edits outside functions, i.e. the probe's import; checked once."""
+    """Whether the file compiles with edits outside functions, i.e. the probe's import; success is cached."""
     if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
         return False
     if outside not in file.sound:

@@ -13,7 +13,7 @@ _MOST = 12  # candidates listed in an error
 
 
 def as_written(name: str) -> str:
-    """The text by which anchors know an expression; invalid text is returned unchanged."""
+    """The normalized text that anchors compare. Invalid text is returned unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -23,10 +23,10 @@ def as_written(name: str) -> str:
 def choose_expression(
     known: Sequence[Expression], location: FaultLocation, where: Path, line: int
 ) -> Expression:
-    """The one of a function's expressions that the location's anchor names; the function begins at `line`
-    (from 0).
+    """Choose from a function's expressions the one that the location's anchor names.
 
-    MutatorError that lists candidates unless there is exactly one.
+    The function begins at `line` (from 0). MutatorError with candidates unless exactly one expression
+    matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)
@@ -59,7 +59,7 @@ def _which(anchor: Anchor) -> str:
 
 
 def _candidates(known: Sequence[Expression], kind: AnchorKind, name: str) -> str:
-    """The anchors of this kind, those of the name if there are any, else the most similar."""
+    """List the anchors of this kind: those of this name if there are any, otherwise the most similar ones."""
     roles = [(called, place, one) for one in known for own, called, place in one.roles if own is kind]
     roles = [role for role in roles if role[0] == name] or roles
     if len(roles) > _MOST:

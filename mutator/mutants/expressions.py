@@ -1,7 +1,8 @@
 """Expressions whose value can be changed in place, such as returned values, conditions and arguments.
 
 Python's parser finds them and their roles; an expression counts only if LibCST sees one in the same place.
-None begins or ends on a line that cannot carry a tag, because it ends inside a string or in a backslash.
+Expressions that begin or end on a line that cannot carry a tag are left out. Such a line ends inside a string
+or in a backslash.
 """
 
 import ast
@@ -17,7 +18,9 @@ from mutator.model import AnchorKind
 from mutator.mutants.expression_roles import Found, Role, expressions_in, source_of
 from mutator.mutants.places import Positions
 
-_Point = tuple[int, int]  # line and column in bytes, both from 0
+_Point = tuple[
+    int, int
+]  # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
 
 _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
 
@@ -26,8 +29,9 @@ _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | as
 class Expression:
     """An expression of a function, from `start` to before `end`.
 
-    `roles` are the anchors that match it: kind, name, which argument; the last is VALUE, with its text.
-    `written` is its source on one line, in parentheses if an adjacent operator could split it.
+    `roles` are the anchors that match it, each with kind, name and `which`. The last is always VALUE, named
+    by the expression's text. `written` is its source on one line, in parentheses if an adjacent operator
+    could split it.
     """
 
     function: str
@@ -35,7 +39,7 @@ class Expression:
     end: _Point
     roles: tuple[Role, ...]
     written: str
-    bare: bool  # a tuple without parentheses, or a binding: its parentheses are not part of it
+    bare: bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
     node: ast.expr
 
     @property
@@ -111,7 +115,10 @@ def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
 
 
 def _known_by(node: ast.expr) -> Iterator[ast.expr]:
-    """The nodes by which LibCST must know it: for a tuple, whose parentheses LibCST ignores, its elements."""
+    """Yield the nodes that LibCST must also find.
+
+    For a tuple these are its elements, because LibCST ignores its parentheses.
+    """
     if isinstance(node, ast.Tuple):
         for element in node.elts:
             yield from _known_by(element)
@@ -128,7 +135,7 @@ def _seen_by_libcst(positions: Positions) -> frozenset[tuple[_Point, _Point]]:
 
 
 def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
-    """Where each bracket opens, and the end of the one that closes it: lines from 0."""
+    """Map the position of each opening bracket to the end of its closing bracket; lines from 0."""
     found, begun = {}, list[_Point]()
     for token in tokens:
         if token.type == tokenize.OP and token.string in "([{":
@@ -156,9 +163,9 @@ NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arg
 
 
 def parts_of(expression: Expression) -> dict[str, object]:
-    """What templates may use in addition to the whole expression; None or empty where it does not apply.
+    """The parts of an expression that templates may use; None or empty if it has no such part.
 
-    The sides of an operator (`left`, `right`), a call's function (`called`) and its `arguments`.
+    These are the operands of an operator (`left`, `right`), a call's function (`called`) and its `arguments`.
     """
     node, left, right = expression.node, None, None
     if isinstance(node, ast.BinOp):

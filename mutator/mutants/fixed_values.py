@@ -1,7 +1,8 @@
 """Fixed values: constants of modules and classes, and defaults of parameters.
 
-The program computes them once, on loading, when no fault is active. So the probe sets them while the fault is
-active, and restores them afterwards. A tagged line next to them tells it where they are.
+The program computes them once, when a module is loaded and no fault is active. So the probe sets them while
+the fault is active, and restores them afterwards. A tagged line after the statement passes their location to
+the probe.
 """
 
 import ast
@@ -29,8 +30,8 @@ class FixedValue:
     """A constant or a default: `name` is `LIMIT` or `Class.LIMIT`, or the parameter of `function`.
 
     It is on the lines `first` to `last` (exclusive, from 0). Its tagged line goes before line `index`, with
-    the indentation `indent`. `path` leads from the module to the constant, or via the function to the
-    parameter, as the compiler names them. A `reason` says why it cannot be set.
+    the indentation `indent`. `path` is the dotted path from the module to the constant or, through its
+    function, to the parameter, in the compiler's spelling. `reason` says why the value cannot be set.
     """
 
     kind: AnchorKind
@@ -45,8 +46,9 @@ class FixedValue:
 
 
 def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
-    """All of a file, in source order; the last assignment represents a constant that is assigned several
-    times.
+    """All fixed values of a file, in source order.
+
+    A constant that is assigned several times is represented by its last assignment.
     """
     found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
     for one, owner in _Finder(data).of_body(tree.body, ()):
@@ -66,7 +68,7 @@ def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
 
 
 def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
-    """The parameters of a function that have a default, with it."""
+    """The parameters of a function that have a default, each with its default."""
     places = [*arguments.posonlyargs, *arguments.args]
     with_default = places[len(places) - len(arguments.defaults) :]
     for argument, value in zip(with_default, arguments.defaults, strict=True):
@@ -87,7 +89,9 @@ class _Finder:
     def of_body(
         self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
     ) -> Iterator[tuple[FixedValue, _Owner]]:
-        """The values in statements of a module or class; `around` is the containing statement of its body."""
+        """Yield the values in a module's or class's statements; `around` is the statement of its body around
+        them.
+        """
         for statement in body:
             whole = around or statement
             match statement:
@@ -146,7 +150,7 @@ class _Finder:
             )
 
     def place(self, whole: ast.stmt) -> tuple[int, bytes]:
-        """Where a line after a statement goes, and its indentation."""
+        """The index where a line after a statement is inserted, and its indentation."""
         line = self.lines[min(one.lineno for one in (whole, *getattr(whole, "decorator_list", ()))) - 1]
         end = self.ends[bisect_left(self.ends, whole.end_lineno or 0)]
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
@@ -168,7 +172,7 @@ def _of(scope: _Scope) -> Iterator[str]:
 
 
 def _path(scope: _Scope, *names: str) -> str:
-    """The names from the module on; private names of a class as the compiler writes them."""
+    """The dotted path from the module; private names of a class are spelled as the compiler spells them."""
     path, private = list[str](), ""
     for name in (*_of(scope), *names):
         hidden = private and name.startswith("__") and not name.endswith("__")

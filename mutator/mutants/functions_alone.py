@@ -1,4 +1,4 @@
-"""Compile functions alone, so that a change in one is checked without its file."""
+"""Compile functions alone, to check a change without compiling its file."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -18,8 +18,8 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
 def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
     """The code of a module with only these lines of a function; None if they do not compile.
 
-    A function compiles in its file if and only if it does alone: only an outer function's names could be
-    missing, and it has no outer function.
+    An outermost function compiles alone if and only if it compiles in its file, because it uses no names of
+    an enclosing function.
     """
     text = b"".join(lines).decode(encoding).removeprefix("\ufeff")  # a byte order mark
     indented = text[:1] in (" ", "\t", "\f")

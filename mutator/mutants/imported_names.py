@@ -1,4 +1,4 @@
-"""Find modules of a tree that import a constant by name, which must be set there, too."""
+"""Find modules that import a constant by name, because the constant must be set there, too."""
 
 import ast
 from collections import Counter
@@ -38,7 +38,7 @@ class _Imports:
 
 
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
-    """Where else in the tree the constant `name` of the module at `path` is known, as `module.NAME`.
+    """Return `module.NAME` for each other place that imports the constant `name` of the module at `path`.
 
     MutatorError that lists the places where it cannot be set: star imports, imports into a class, and modules
     that also set the name in another way.
@@ -67,7 +67,7 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
 
 
 def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
-    """Why an import prevents setting the constant; `exported` is what `*` means, if known."""
+    """Why an import prevents setting the constant; `exported` lists the names that `*` imports, if known."""
     if one.name == _ALL:
         meant = not name.startswith("_") if exported is None else name in exported
         return "imports *" if meant else None

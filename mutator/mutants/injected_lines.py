@@ -1,6 +1,6 @@
 """The syntax of injected lines: tags, calls of the probe, and how to find them in files and patches.
 
-Code inside a target's process cannot import this module, so engines pass it what it needs.
+Code inside a target's process cannot import this module, so engines pass it the values that it needs.
 """
 
 import ast
@@ -15,7 +15,7 @@ from mutator.model import Injection
 IMPORT_TAG = "probe"  # on the line that imports the probe
 OBSERVE_TAG = "observe"  # on the statement that passes the ground truth to the probe
 ORIGINAL = "original"  # the original value in a line that sets a value
-# in quotes, a name or a tag, which may have several; not a number of eight digits
+# an id in quotes, in a name or in a tag, which may have several ids; not a number of eight digits
 INJECTION_ID = (
     r"(?:(?:(?<=[\"'_])|(?<=fi:))[0-9a-f]{8}(?![0-9A-Za-z.])"
     r"|(?<=[0-9a-f]\+)[0-9a-f]{8}(?=(?:\+[0-9a-f]{8})* was:))"
@@ -26,7 +26,7 @@ _MARK_BYTES = _MARK.encode()
 _TAG = rf"{_MARK}([0-9a-z]+(?:\+[0-9a-z]+)*)(?: guard:(\d+)| was:([^\r\n]*))?"
 _TAG_OF_LINE = re.compile(rf"[ \t]*{_TAG}(?=\r?\n?\Z)".encode())
 _NAME_IN_USE = re.compile(rf"\b{PROBE_NAME}\b".encode())
-_ASKING = (  # the choice of an instance or execution comes first
+_ASKING = (  # checks of the instance or execution come first
     rf"(?:{PROBE_NAME}\.on\(\) and \(.*?\) and )?"
     rf'(?:{PROBE_NAME}\.(?:call|every)\("[0-9a-z]+", \d+\) and )?'
     rf'{PROBE_NAME}\.active\("(?P<id>[0-9a-z]+)"\)'
@@ -52,9 +52,9 @@ _SETTING = re.compile(
 class Tag:
     """The tag at the end of an injected line: the injection's id, IMPORT_TAG or OBSERVE_TAG.
 
-    A line in which several injections change values has their ids, joined with `+`. `guarded` is the number
-    of lines that a guard indents, else 0; `code` the line without its tag. `was` is the target's line that
-    this one replaces; None for an inserted one.
+    If several injections change values in the line, `id` contains their ids, joined with `+`. `guarded` is
+    the number of lines that a guard indents, else 0. `code` is the line without its tag. `was` is the line of
+    the target that this line replaces, or None for an inserted line.
     """
 
     id: str
@@ -84,19 +84,20 @@ class Tag:
 
     @property
     def asked_for(self) -> list[str]:
-        """The injections whose values a changed line uses only if the probe says so."""
+        """The ids of the injections that a changed line asks the probe about."""
         return [found["id"].decode() for found in _ASKED.finditer(self.code)]
 
     @property
     def sets(self) -> bool:
-        """Whether the line tells the probe about a value to set while the fault is active."""
+        """Whether the line makes the probe set a value while the fault is active."""
         return _SETS.match(self.code) is not None
 
 
 def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
-    """Yield the changed values and instance choices of a file: injection, line, start and end column.
+    """Yield the place of each changed value and instance check in a file.
 
-    Lines count from 1, columns in bytes of UTF-8, as in tracebacks.
+    Each is an injection's id, a line, and a start and end column. Lines count from 1, columns in bytes of
+    UTF-8, as in tracebacks.
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.IfExp):
@@ -130,13 +131,14 @@ def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
 
 
 def asks(tag: str) -> str:
-    """The question whether to act, from an injected line to the probe."""
+    """The source of the call that asks the probe whether the injection acts."""
     return f'{PROBE_NAME}.active("{tag}")'
 
 
 def asks_for(tag: str, injection: Injection) -> str:
-    """The same for an injection limited to an instance or executions: those are checked only while the
-    fault is active.
+    """The condition under which an injection acts, including its limits to an instance or to executions.
+
+    The limits are checked only while the fault is active.
     """
     asked = [f"{PROBE_NAME}.on()", f"({injection.where})"] if injection.where else []
     for name in ("call", "every"):
@@ -146,27 +148,31 @@ def asks_for(tag: str, injection: Injection) -> str:
 
 
 def changed_value(asked: str, changed: str) -> str:
-    """What goes before an expression so that its value is `changed` when the probe, `asked`, says so."""
+    """The source to put before an expression.
+
+    It makes the value `changed` if the probe, `asked`, says so.
+    """
     return f"({changed} if {asked} else "
 
 
 def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
     """The line that makes the probe set the constant at `path` in its module (`Class.NAME` in a class).
 
-    `imported` are other modules' imports of it. `changed` is the new value, computed from `original`.
+    `imported` lists imports of the constant in other modules. `changed` is the new value, computed from
+    `original`.
     """
     more = "".join(f', "{name}"' for name in imported)
     return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
 
 
 def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
-    """The same for the default of a parameter."""
+    """The line that makes the probe set the default of a parameter."""
     where = f'globals(), "{function}", "{parameter}"'
     return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL}: {changed})'
 
 
 def sets_values(data: bytes) -> bool:
-    """Whether a file may have lines that tell the probe what to set; most have none."""
+    """Whether a file may contain lines that make the probe set values; most files contain none."""
     return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
 
 
@@ -181,7 +187,7 @@ def import_statement(package: str | None) -> str:
 
 
 def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
-    """The call that passes on the ground truth: the name of each observed value and its expression."""
+    """The call that passes the ground truth to the probe: each observed value's name and expression."""
     return f"{PROBE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
 
 
@@ -210,14 +216,14 @@ def adds_fault(hunk: str) -> bool:
 
 
 def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
-    """Begin, end and name of everything that differs between probes, in the patch that adds one."""
+    """Begin, end and name of each setting that differs between probes, in the patch that adds a probe."""
     for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
         name = match.lastgroup or ""
         yield *match.span(name), name
 
 
 def _end_of_settings(patch: str, begin: int, end: int) -> int:
-    """The end of the trigger's condition: the rest is long, and the same in every probe."""
+    """The end of the trigger's condition. The rest of a probe is long and always the same."""
     condition = patch.find("\n+def _condition(", begin, end)
     line = patch.find("\n+    return ", condition, end) if condition >= 0 else -1
     return end if line < 0 else patch.find("\n", line + 1, end) + 1 or end

@@ -1,4 +1,4 @@
-"""Make the edit of one injection: resolve the anchor, render the snippet, and protect the target's names."""
+"""Create the edit of one injection: resolve the anchor, render the snippet, protect the target's names."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -134,7 +134,7 @@ def _setting(
                 f"'{params[param.name]}' for `{param.name}` at a {value.kind.value}",
                 where=file.where,
                 line=value.first + 1,
-                expected="no variable: what the probe sets is in no function",
+                expected="no variable, because a constant or default is set outside functions",
                 remedy=f"leave `{param.name}` out, or anchor in a function",
             )
     changed = changed_value(model, params, name, ORIGINAL, NO_PARTS)
@@ -181,8 +181,8 @@ def _check_own_names(
             f"the injected lines set '{min(taken)}', a name that the function uses itself",
             where=file.where,
             line=site.first + 1,
-            expected="lines that set their parameters and names of their own",
-            remedy=f"rename it in {model.template_path.name}, or make it a parameter",
+            expected="lines that set only parameters and names that the function does not use",
+            remedy=f"rename the name in {model.template_path.name}, or make it a parameter",
         )
 
 

@@ -1,4 +1,4 @@
-"""Limit injections to one instance or to some executions, by a check before the probe's."""
+"""Limit injections to one instance or to some executions by adding a check before the probe's own check."""
 
 from mutator.config.instances import names_of
 from mutator.errors import MutatorError
@@ -9,7 +9,7 @@ from mutator.mutants.injected_lines import asks, asks_for
 
 
 def check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
-    """Raise MutatorError if the choice of the instance uses a name unknown in the function."""
+    """Raise MutatorError if `where` uses a name that is unknown in the function."""
     unknown = names_of(injection.where or "True") - names
     if unknown:
         raise MutatorError(
@@ -22,7 +22,10 @@ def check_instance(file: ParsedFile, names: frozenset[str], first: int, injectio
 
 
 def limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
-    """The snippet with a check for one instance or some executions, if the injection has any."""
+    """The snippet with a check for the instance or executions that the injection selects.
+
+    If it selects none, the snippet is unchanged.
+    """
     plain, asked = asks(name), asks_for(name, injection)
     if asked == plain:
         return code
@@ -31,7 +34,7 @@ def limited(code: tuple[str, ...], injection: Injection, name: str, model: Fault
         raise MutatorError(
             f"model {model.name}, with these parameters, cannot be limited by `where`, `call` or `every`",
             where=model.template_path,
-            expected=f"lines that ask the probe once, as `if {plain}:` or `if not {plain}:`",
-            remedy="leave these out, or take another model",
+            expected=f"a template with exactly one probe check, `if {plain}:` or `if not {plain}:`",
+            remedy="remove `where`, `call` and `every`, or use another model",
         )
     return tuple(heads.get(line, line) for line in code)

@@ -41,7 +41,7 @@ def places_of(file: ParsedFile, models: FaultModels, function: str | None = None
     """All places of a file or function, in order: statements and the expressions in them.
 
     A statement is listed under each name that it assigns or calls, an expression under its most specific
-    anchor. MutatorError with the file's functions if it has none of that name.
+    anchor. MutatorError, which lists the file's functions, if it has no function of this name.
     """
     lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
     names = tuple(file.functions)
@@ -131,12 +131,12 @@ class _Lister:
 
 
 def writable(name: str) -> bool:
-    """Whether a spec may write this name of a statement: `None` means no name."""
+    """Whether a spec can use this name of a statement. `None`, as in `return None`, is not a name."""
     return not name or dotted_name(name) or assignable(name)
 
 
 def changes(model: FaultModel, expression: Expression | None) -> bool:
-    """Whether a model changes the value of an expression; None: of a constant or default."""
+    """Whether a model can change this expression or, for None, a constant or default."""
     if model.expression is None:
         return False
     parts = parts_of(expression) if expression else NO_PARTS

@@ -4,18 +4,19 @@ Compiling a file takes milliseconds, and mutants of one kind differ only in the 
 their ids. If the normalized source compiles, so does every source that normalizes to it:
 
 * A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
-  replaced, up to a length that Python always accepts, so a token keeps its kind, all that the compiler cares
-  about. Where it cares about more (a mapping pattern must not repeat a key), equal numbers are the worst.
+  replaced, up to a length that Python always accepts. So the kind of each token stays the same, and the
+  compiler rarely checks more. Where it does (a mapping pattern must not repeat a key), equal numbers are the
+  worst case.
 * An id (hex digits) becomes one that is neither a token alone (`0f...`) nor a character (`\\U0f...`). So
-  normalized source compiles only where ids are in strings, comments or names, and there any id compiles.
-  Equal ids stay equal, different ones different.
+  normalized source compiles only if its ids are in strings, comments or names, where any id compiles.
+  Equal ids stay equal, and different ids stay different.
 """
 
 import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-_PART = r"[\w.\\\x80-\U0010ffff]"  # next to a literal: it continues, or belongs to a name or an escape
+_PART = r"[\w.\\\x80-\U0010ffff]"  # next to a number that continues, or belongs to a name or an escape
 _NUMBER = re.compile(  # the digit comes first because searching for it is fast; the lookbehind follows
     rf"[0-9](?<!{_PART}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_PART})"
 )

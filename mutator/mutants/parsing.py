@@ -46,7 +46,7 @@ def python_tree(data: bytes, where: Path) -> ast.Module:
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         message, line = (error.msg, error.lineno) if isinstance(error, SyntaxError) else (str(error), None)
         raise MutatorError(
-            f"not valid Python: {message}", where=where, line=line, remedy="mend the target"
+            f"not valid Python: {message}", where=where, line=line, remedy="correct the target's source"
         ) from None
 
 
@@ -59,7 +59,9 @@ def reading(where: Path) -> Iterator[None]:
         message, line = str(error), None
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]
-            line = None if message.startswith("tokenizer") else error.raw_line  # it would be line 1 of a part
+            line = (
+                None if message.startswith("tokenizer") else error.raw_line
+            )  # counted in a part of the file
         raise MutatorError(
             f"LibCST cannot read it: {message}",
             where=where,

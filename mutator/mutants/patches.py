@@ -11,7 +11,7 @@ _NO_NEWLINE = "\\ No newline at end of file\n"
 
 @dataclass(slots=True)
 class _Hunk:
-    """Pieces shown together, and the number of lines before them on each side."""
+    """Pieces shown together, and the number of lines before them in the old and the new file."""
 
     old: int
     new: int
@@ -73,7 +73,7 @@ def _span(before: int, count: int) -> str:
 
 
 def _name(path: str) -> str:
-    """A name with a space ends with a tab, or `patch` takes the rest for a date."""
+    """A name with a space ends with a tab; otherwise `patch` takes the part after the space for a date."""
     return f"{path}\t" if " " in path else path
 
 

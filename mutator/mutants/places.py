@@ -1,7 +1,7 @@
 """Positions of functions and statements, which count only if LibCST and `ast` agree.
 
-A parser that drops a line shifts everything below. A mutant made with such positions would compile and
-un-splice, with the fault at the wrong line.
+If a parser drops a line, all positions below it shift. A mutant made with such positions would compile and
+un-splice, but its fault would be on the wrong line.
 """
 
 import ast
@@ -30,7 +30,7 @@ class Place:
     docstring: bool = False
 
     def in_bytes(self, lines: Sequence[bytes], encoding: str) -> "Place":
-        """The same with columns in bytes of UTF-8; `lines` are those of the file."""
+        """The same place with columns in bytes of UTF-8; `lines` are the lines of the file."""
 
         def column(point: _Point) -> _Point:
             line, characters = point

@@ -1,7 +1,7 @@
 """The probe's contract: the path of `_fi`, its template values, its operation and its report.
 
-Every mutant carries this module, rendered from `templates/_fi.py.j2`. Code inside a target's process cannot
-import the contract, so engines pass on what is needed.
+Every mutant contains the probe `_fi`, rendered from `templates/_fi.py.j2`. Code inside a target's process
+cannot import this contract, so engines pass on the values that are needed.
 """
 
 import math
@@ -17,7 +17,7 @@ from mutator.model import Activation, Hold, Injection, Trigger
 from mutator.targets.observation import Observation
 from mutator.triggers.conditions import TIME, check_condition, to_code
 
-# a probe's own part: docstring, settings, condition
+# the part of a probe that differs between mutants: docstring, settings, condition
 _OWN = re.compile(
     r'\A"""(?s:.*?)"""\n|^MUTANT = (?s:.*?)^_TINY = .*\n|^def _condition\((?s:.*?)^(?=\n)', re.MULTILINE
 )
@@ -83,7 +83,7 @@ def template_values(
 def parts_of(probe: str) -> tuple[str, str]:
     """A probe's source in two parts: its own, and the part that all probes of a target share.
 
-    Run in sequence, they equal the whole. Blank lines keep the line numbers.
+    Run one after the other, the parts do the same as the whole. Blank lines keep the line numbers unchanged.
     """
     own, common, at = [], [], 0
     for found in _OWN.finditer(probe):
@@ -97,7 +97,7 @@ def parts_of(probe: str) -> tuple[str, str]:
 def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
     """The time (s) from which a probe is armed, and its condition as a function of the observed values.
 
-    A fault is first active where the probe is armed and the condition holds. Calling `observe` for every
+    A fault first becomes active when the probe is armed and the condition holds. Calling `observe` for every
     value instead takes almost four times as long.
     """
     module: dict[str, Any] = {"__name__": PROBE_NAME}
@@ -106,16 +106,20 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
 
 
 def decision_in(own: str) -> tuple[float, str]:
-    """The same from the source of a probe's own part; the condition is the source of its function."""
+    """Like `decision`, but from the source of a probe's own part. The condition is the source of its
+    function.
+    """
     armed = _ARMED.search(own)
     assert armed is not None
     return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
-    """The object with a probe's observations, and its attributes after `observed` of them.
+    """The name of the probe's object that holds its observations, and its attributes after `observed` of
+    them.
 
-    The first was at time `began` (s), the last at `t`. A probe that replaces another one gets these.
+    The first observation was at time `began` (s), the last at `t`. A probe that replaces another one gets
+    these attributes.
     """
     return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
 
@@ -124,14 +128,14 @@ def state_after(observed: int, began: float | None, t: float | None) -> tuple[st
 
 
 def silent_report(mutant: str | None) -> dict[str, Any]:
-    """The parts that are read from the report of a mutant whose trigger never holds."""
+    """The report of a mutant whose trigger never holds, with only the parts that are read."""
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
 
 def report_problem(report: object, mutant: str, injections: Sequence[str]) -> str:
-    """What is wrong with a probe's report for a mutant with these injections; empty if nothing is.
+    """What is wrong with a probe's report for a mutant with these injections; empty if it is valid.
 
-    A mutant may have overwritten anything in its probe.
+    Nothing in the report is trusted, because a mutant may have overwritten anything in its probe.
     """
     if not isinstance(report, dict):
         return "its probe has no report"
@@ -148,7 +152,7 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
 
 
 def _is_told(told: object, number: str) -> bool:
-    """Whether this is a first time, a last time and a count, or says that there was none."""
+    """Whether this is a valid entry: a first time, a last time and a count, or None, None and 0."""
     if not isinstance(told, dict) or told.keys() != {"first", "last", number}:
         return False
     first, last, count = told["first"], told["last"], told[number]

@@ -46,8 +46,8 @@ def literal(value: object) -> str:
 def signed(value: int | float) -> str:
     """A term to add in an expression: `+ 3` or `- 2.5`.
 
-    An integer has no point, so that adding it to an integer gives an integer; for a float it makes no
-    difference.
+    A whole number is written without a point, so that adding it to an integer gives an integer. For a float,
+    this makes no difference.
     """
     negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
     size = -value if negative else value
@@ -56,7 +56,10 @@ def signed(value: int | float) -> str:
 
 
 def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
-    """The arguments of a call with the values of two exchanged, counted from 1; keywords stay in place."""
+    """A call's arguments after exchanging the values of arguments `first` and `second`, counted from 1.
+
+    Keywords stay in place.
+    """
     parts = [_ARGUMENT.fullmatch(text) for text in arguments]
     for place in (first, second):
         part = parts[place - 1] if 0 < place <= len(parts) else None
@@ -72,7 +75,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
 
 
 def taken_for(written: str, read: str) -> float:
-    """The factor for a number that is written in one unit and read as if it were in another."""
+    """The factor by which a quantity changes if it is written in one unit and read in another."""
     one, other = units.UNITS[written], units.UNITS[read]
     if one.dimension != other.dimension or one == other:
         raise MutatorError(
@@ -89,7 +92,7 @@ def refuse(why: str) -> NoReturn:
 
 
 class _Sandbox(ImmutableSandboxedEnvironment):
-    """Jinja2's sandbox without powers, since 9 ** 9 ** 9 never ends."""
+    """Jinja2's sandbox without the power operator, because 9 ** 9 ** 9 would take forever."""
 
     intercepted_binops = frozenset({"**"})
 
@@ -115,8 +118,8 @@ def snippet(
 ) -> tuple[str, ...]:
     """The model's lines for these parameters, untagged, 4 spaces a level.
 
-    `fi` is the injection's id, `statements` what the model needs of the source. MutatorError if the template
-    fails or its result is not whole lines of Python.
+    `fi` is the injection's id; `statements` are the source texts that the model needs. MutatorError if the
+    template fails or its result is not whole lines of Python.
     """
     if model.kind is SnippetKind.VALUE:
         target = str(_checked(next(param for param in model.params if param.name == "target"), params))
@@ -139,10 +142,10 @@ def changed_value(
     original: str,
     parts: Mapping[str, object] | None = None,
 ) -> str:
-    """The model's expression for the changed value of `original`, source on one line; `parts` are its
-    components.
+    """The model's expression for the changed value of `original`, which is source on one line.
 
-    MutatorError if the model changes no values, or if the template fails or does not render one expression.
+    `parts` are the components of `original`. MutatorError if the model cannot change values, or if the
+    template fails or does not render one expression.
     """
     if model.expression is None:
         raise MutatorError(
@@ -169,7 +172,7 @@ def changed_value(
 
 @lru_cache(maxsize=1024)
 def _is_expression(text: str) -> bool:
-    """Whether normalized source, and so all that it covers, is an expression without `yield`."""
+    """Whether normalized source, and so all source that it covers, is an expression without `yield`."""
     try:
         tree = ast.parse(text, mode="eval")
         ast.parse(f"({text})", mode="eval")  # a comment would hide the bracket
@@ -190,7 +193,7 @@ def _holds_together(text: str) -> bool:
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     """The template's value for this parameter.
 
-    A constant that is not a number is already Python source, so that None differs from a missing one.
+    A constant that is not a number is passed as Python source, so that None differs from a missing value.
     """
     value = params.get(param.name)
     if param.type == "constant":
@@ -243,7 +246,7 @@ def _line_in(error: BaseException) -> int | None:
 
 @lru_cache(maxsize=1024)
 def _are_lines(text: str, kind: SnippetKind) -> bool:
-    """Whether normalized source, and so all that it covers, passes `_check_lines`."""
+    """Whether normalized source, and so all source that it covers, passes `_check_lines`."""
     try:
         _check_lines(text, kind, Path())
     except MutatorError:
@@ -277,7 +280,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
         raise MutatorError(
             f"the template yields: {text!r}",
             where=where,
-            expected="lines that do not make a generator of the function that they are put into",
+            expected="lines without `yield`, which would turn the function into a generator",
             remedy="correct the template",
         )
     uneven = any((len(x) - len(x.lstrip(" "))) % 4 or "\t" in x for x in lines)

@@ -1,4 +1,4 @@
-"""Reusable changes: a changed file without its inserted lines, to be filled with those of other mutants.
+"""Reusable changes: a changed file without its inserted lines, which other mutants fill with their lines.
 
 Splicing and compiling a file takes milliseconds, and many mutants insert the same lines except for numbers
 and ids. Only the first is spliced. The number of reusable changes depends on the library, not on the number
@@ -52,8 +52,9 @@ class ReusableChange:
 
 
 def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
-    """The reusable changes of a file so far, or single changes; kept with the tree, and extended by
-    callers.
+    """The changes of a file made so far, reusable or single.
+
+    Callers add to this dictionary, which is kept with the tree.
     """
     return tree.derived(path, _none_yet)
 

@@ -1,6 +1,6 @@
 """What names mean in the functions of a source, according to the compiler.
 
-One assignment anywhere in a function makes a name local to all of it, even if it never runs.
+An assignment anywhere in a function makes the name local to the whole function, even if it never runs.
 """
 
 import unicodedata
@@ -23,7 +23,7 @@ class Moved:
 
 
 def function_names(data: bytes) -> FunctionNames:
-    """The names that each function knows and uses, by its line (from 1) and its own name."""
+    """The names that each function knows and uses, by the function's line (from 1) and name."""
     return dict(_function_names(_table(data), ""))
 
 
@@ -41,7 +41,7 @@ def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[in
 
 
 def set_by_functions(data: bytes) -> frozenset[str]:
-    """The names of a module that its functions or classes bind, declared `global` there."""
+    """The names of a module that its functions or classes bind after declaring them `global`."""
     return frozenset(
         symbol.get_name()
         for table in _below(_table(data))
@@ -57,14 +57,14 @@ def _below(table: SymbolTable) -> Iterator[SymbolTable]:
 
 
 def as_compiled(name: str) -> str:
-    """An identifier as the compiler normalizes it: `µ` has two code points, which are one to it."""
+    """An identifier as the compiler normalizes it. For example, the two code points for `µ` become one."""
     return unicodedata.normalize("NFKC", name)
 
 
 def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[Moved]:
-    """The names whose meaning changed by inserting lines: their numbers in `after`, from 1.
+    """The names whose meaning the inserted lines change.
 
-    SyntaxError if `after` is not valid.
+    `inserted` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
     """
     return _moved(_table_of_target(before), _table(after), inserted)
 

@@ -20,11 +20,10 @@ from mutator.mutants.injected_lines import asks, changed_value, import_statement
 
 
 class Rank(IntEnum):
-    """Order of edits between two lines: what follows the upper one, what precedes the lower one, what changes
-    it.
+    """The order of edits at one line index.
 
-    Changes are a guard around the lower line or a replacement. What follows a whole function comes after what
-    follows its last line.
+    First come lines after the line above, then lines after a whole statement that ends above, then lines
+    before the line itself, and last a guard around that line or its replacement.
     """
 
     AFTER = 0
@@ -38,7 +37,7 @@ class Rank(IntEnum):
 class Edit:
     """Lines to insert before line `index`; the `reindent` lines that follow are indented by `unit`.
 
-    An edit of rank INSTEAD replaces that line.
+    An edit of rank INSTEAD replaces line `index`.
     """
 
     index: int
@@ -50,9 +49,9 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueEdit:
-    """What to write around an expression, which keeps its bytes.
+    """The bytes to write before and after an expression, which itself stays unchanged.
 
-    Its `start` and `end` are a line and a byte in it, from 0.
+    `start` and `end` are a line and a byte in it, from 0.
     """
 
     start: tuple[int, int]
@@ -85,7 +84,7 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
             where=file.where,
             line=site.first + 1,
             expected="an anchor before_call, before_assign or before_return",
-            remedy="anchor at the statement that is to be left out",
+            remedy="anchor at the statement to leave out",
         )
     lines = _lines(file, site, code, tag, site.reindent)
     return Edit(
@@ -106,8 +105,9 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
 def value_change(
     file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
 ) -> ValueEdit:
-    """The edit that makes `expression` evaluate to `changed` (source on one line) when the probe, `asked`,
-    says so.
+    """The edit that gives `expression` the value `changed` (source on one line) if the probe says so.
+
+    `asked` is the source of the question to the probe.
     """
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
@@ -120,7 +120,7 @@ def value_change(
 
 
 def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
-    """The edits with those of values turned into lines, each of which replaces a line of the target."""
+    """The edits, with edits of values converted to edits that replace whole lines of the target."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
     for one, other in pairwise(values):
@@ -129,8 +129,8 @@ def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
                 "two injections into one expression",
                 where=file.where,
                 line=other.start[0] + 1,
-                expected="expressions that lie apart",
-                remedy="drop one of the injections",
+                expected="expressions that do not overlap",
+                remedy="remove one of the injections",
             )
     written: dict[int, list[tuple[int, bytes, str]]] = defaultdict(list)
     for edit in values:
@@ -195,9 +195,9 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
 
 
 def in_order(edits: Iterable[Edit]) -> list[Edit]:
-    """Edits from the top of the file to its end; those at one index and rank keep their order.
+    """Sort edits from the top of the file to its end; edits of equal index and rank keep their order.
 
-    What follows a whole class comes after what follows its last function.
+    An exception: lines after a whole class come after lines after its last function.
     """
     return sorted(edits, key=lambda e: (e.index, e.rank, -_depth(e)))
 
@@ -217,7 +217,7 @@ def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
                 where=file.where,
                 line=edit.index + 1,
                 expected="one guard a statement, and nothing else in it",
-                remedy="drop one of the injections",
+                remedy="remove one of the injections",
             )
         _keep(pieces, file.lines[done : edit.index])
         done = edit.index
@@ -256,7 +256,9 @@ def _margin(line: bytes) -> bytes:
 
 
 def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
-    """If the file ends without a newline, so does the result: the old last line gets the new one's."""
+    """Keep a missing newline at the end of the file: the old last line gets the newline of the last added
+    line.
+    """
     last = pieces[-1]
     if last.lines[-1].endswith((b"\n", b"\r")):
         return added
@@ -269,7 +271,7 @@ def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> lis
 
 
 def joined(pieces: Iterable[Piece]) -> bytes:
-    """The bytes of the result."""
+    """The bytes of the edited file."""
     return b"".join(line for piece in pieces if piece.sign != "-" for line in piece.lines)
 
 

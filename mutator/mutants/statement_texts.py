@@ -20,9 +20,9 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[str, str]]:
-    """The texts by their names in templates, each on one line, and the site.
+    """Return the site, and the statements' texts by their names in templates, each on one line.
 
-    The site has both statements if the model needs the next one. MutatorError if there is no such statement,
+    If the model needs the next statement, the site covers both. MutatorError if there is no such statement,
     or if its lines cannot be moved.
     """
     anchored, following = _small_statements(file.data).get(site.first, (None, None))
@@ -60,7 +60,7 @@ def _one_line(file: ParsedFile, site: Site, statement: ast.stmt) -> str:
     if "\n" in text:
         raise _unfit(file, site, "the statement cannot be written on one line")
     if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in ast.walk(statement)):
-        raise _unfit(file, site, "the statement yields: what it gives and gets has its place in a sequence")
+        raise _unfit(file, site, "the statement contains `yield`, which can be neither repeated nor moved")
     return text
 
 

@@ -13,7 +13,7 @@ from mutator.mutants.scopes import FunctionNames, as_compiled
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """A small statement; with a `reason`, something that binds or calls but is not a statement, and why.
+    """A small statement, or something that binds or calls but is not a statement; then `reason` says why.
 
     Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also has
     the empty name in `returns`, which matches any return. `place` is None if there is a reason.

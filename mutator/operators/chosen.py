@@ -25,10 +25,10 @@ _GLOB = "*?["
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """The mutations of some places, and how many were left out, by reason.
+    """The mutations of some places, and the numbers of those left out, by reason.
 
-    Their line is executed in no golden run (`unexecuted`), or their code equals the original's (`equal`) or
-    another mutation's (`twins`) or does not compile (`invalid`).
+    `unexecuted`: no golden run executes the line. `equal`: the code equals the original's code. `twins`: the
+    code equals that of another mutation. `invalid`: the code does not compile.
     """
 
     mutations: tuple[Mutation, ...] = ()
@@ -60,8 +60,8 @@ def find_mutations(
 ) -> Found:
     """The mutations that the operators make at these places, in the order of files and lines.
 
-    A place is `PATH::FUNCTION` or `PATH`, with `*`, and `**` over folders. `executed` restricts the lines
-    (None: all). MutatorError for a place that matches nothing.
+    A place is `PATH` or `PATH::FUNCTION`; `*` is a wildcard, and `**` also matches across folders. `executed`
+    restricts the lines (None: all). MutatorError for a place that matches nothing.
     """
     wanted: dict[str, dict[str, None]] = {}
     for place in places:
@@ -135,7 +135,8 @@ def _paths(manifest: TargetManifest, path: str) -> list[str]:
         raise MutatorError(
             f"no file of target {manifest.name} matches '{path}'",
             argument="in",
-            expected="PATH or PATH::FUNCTION, with `*`, and `**` over folders, of files that may be changed",
+            expected="PATH or PATH::FUNCTION of files that may be changed; `*` is a wildcard, `**` also "
+            "matches across folders",
             remedy="correct the place",
         )
     return sorted(hits)
@@ -150,9 +151,9 @@ def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
 
 
 def sampled(found: Found, count: int | None, seed: int) -> tuple[Mutation, ...]:
-    """`count` of the mutations, in their order, sampled in proportion from each operator in each function.
+    """Sample `count` of the mutations, in proportion to the number from each operator in each function.
 
-    The sample is systematic over a seeded order, so each mutation has the same chance.
+    They keep their order. The sample is systematic over a seeded order, so each mutation has the same chance.
     """
     total = len(found.mutations)
     if count is None or count >= total:

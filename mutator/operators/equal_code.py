@@ -12,10 +12,10 @@ from mutator.operators.mutations import Mutation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distinct:
-    """Mutations with distinct code.
+    """Mutations with distinct code, and the numbers of those left out.
 
-    `equal`, `twins` and `invalid` count those left out: equal to the original, equal to an earlier mutation,
-    not compiling.
+    `equal`: the code equals the original's. `twins`: it equals that of an earlier mutation. `invalid`: it
+    does not compile.
     """
 
     mutations: tuple[Mutation, ...]

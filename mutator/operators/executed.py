@@ -1,7 +1,7 @@
 """The lines that golden runs execute, measured once per run in a separate process and cached.
 
-Only lines from the first observation on count: what runs before, such as a constructor, ends before a fault
-can be active.
+Only lines executed from the first observation on count. Code that runs earlier, such as a constructor, ends
+before a fault can be active.
 """
 
 import json
@@ -54,7 +54,7 @@ def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Exec
     execution = engine.execute(job, folder)
     if execution.status is not Status.OK:
         raise MutatorError(
-            f"the golden run of {drive.scenario.stem}, needed to find the executed lines: {execution.detail}",
+            f"no executed lines: the golden run of {drive.scenario.stem} failed: {execution.detail}",
             where=engine.manifest.path,
             expected="a fault-free run that succeeds",
             remedy="see `mutator check --drive`",

@@ -17,7 +17,7 @@ _OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda:
 class Facts:
     """Statements of a file's functions. Lines count from 1.
 
-    * `augmented`: the operator of the augmented assignment whose value is the expression of that extent
+    * `augmented`: the operator of an augmented assignment, by the extent of the assigned expression
     * `texts`: the source of each statement that begins on a line
     * `bound`: the line that first binds a name in a function, which is identified by its `def` line, since
       a property and its setter share a name
@@ -30,7 +30,9 @@ class Facts:
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
-        """All lines of the statements that contain one of these lines: a statement executes as a whole."""
+        """All lines of the statements that contain one of these lines, because a statement executes as a
+        whole.
+        """
         ran = [own for own in self.own if any(line in lines for line in own)]
         return frozenset(lines).union(*ran)
 

@@ -24,7 +24,7 @@ class Operator(StrEnum):
 
 
 def operator_of(fault: Fault) -> Operator | None:
-    """The operator that made a fault, or None: no spec's name contains `::`."""
+    """The operator that made a fault; None for a fault from a spec, whose name contains no `::`."""
     return Operator(fault.fault_type) if fault.module == OPERATORS and "::" in fault.spec else None
 
 

@@ -1,4 +1,4 @@
-"""Which rules fit an expression: the sets of docs/reference/operators.md."""
+"""Choose the mutation rules that fit an expression, as listed in docs/reference/operators.md."""
 
 import ast
 from collections.abc import Iterator

@@ -1,8 +1,8 @@
-"""Conditions and formulas over observed values: checked, total, and pure data.
+"""Conditions and formulas over observed values: check, convert and evaluate them.
 
 Ids are made from a condition's canonical text (`gap <= 2.0 and closing > 0.0`). All numbers are floats and
-division cannot raise, so a condition is True or False for every observation. A formula is a number in the
-same language, including choices (`a / b if b > 0 else inf`).
+division cannot raise, so a condition is True or False for every observation. A formula yields a number; its
+language is the same, plus choices (`a / b if b > 0 else inf`).
 """
 
 import ast
@@ -16,7 +16,11 @@ from mutator.errors import MutatorError
 TIME = "t"  # s; every target has it
 _FUNCTIONS = ("abs", "min", "max", "hypot")
 _OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
-_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # at least, at most; others take two or more
+_ARGUMENTS = {
+    "abs": (1, 1),
+    "hypot": (2, 2),
+    "rate": (1, 1),
+}  # minimum and maximum number; others take two or more
 _NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not allowed as variables
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
@@ -36,8 +40,8 @@ def check_condition(
 
     Allowed: the variables (None: any name, checked once the target is known), numbers, `True`, comparisons,
     and/or/not, + - * /, abs/min/max/hypot, and, with `over_time`, `ever` of a condition and `rate` of a
-    number, which need a whole trace. Anything else raises MutatorError without a place; the caller knows file
-    and line.
+    number, which need a whole trace. Anything else raises MutatorError without file and line, which the
+    caller adds.
     """
     return _checked(text, constants or {}, variables, number=False, over_time=over_time)
 
@@ -45,8 +49,8 @@ def check_condition(
 def check_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
     """Check a formula and return its canonical text; errors as in `check_condition`.
 
-    Allowed is what `check_condition` allows inside a comparison, `inf`, and a choice: `a if CONDITION else
-    b`.
+    Allowed: everything that `check_condition` allows inside a comparison, `inf`, and choices, `a if CONDITION
+    else b`.
     """
     return _checked(text, {}, variables, number=True, over_time=over_time)
 
@@ -89,13 +93,16 @@ def to_code(text: str, *, number: bool = False) -> str:
 
 
 def evaluate(condition: str, values: Mapping[str, float]) -> bool:
-    """What the probe would decide for these values of the variables; missing ones are NaN."""
+    """Evaluate a condition as the probe does, for these values of the variables; missing values are NaN."""
     names = names_in(condition)
     return bool(_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names)))
 
 
 def divide(a: float, b: float) -> float:
-    """a / b as IEEE 754 has it: infinite or NaN at b = 0, never an exception. The probe has the same."""
+    """a / b by IEEE 754: infinite or NaN at b = 0, never an exception.
+
+    The probe contains the same function.
+    """
     if b:
         return a / b
     return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
@@ -128,8 +135,9 @@ def parse(text: str) -> ast.expr:
 
 
 class _Writer:
-    """Writes a parsed condition back; refuses anything not on the list, and keeps booleans and numbers
-    apart.
+    """Writes a parsed condition back as text.
+
+    It rejects everything that is not allowed, booleans used as numbers, and numbers used as booleans.
     """
 
     def __init__(

@@ -15,12 +15,15 @@ ALWAYS = "always"  # the trigger of a permanent fault
 
 
 def always(*, armed_after_s: float = 0.0) -> Trigger:
-    """Fires at the first observation after arming and stays active."""
+    """Return a trigger that fires at the first observation after arming and stays active."""
     return Trigger(name=ALWAYS, condition="True", hold=Hold.TO_END, armed_after_s=armed_after_s)
 
 
 def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None) -> Trigger:
-    """Fires at the first step that starts at `time_s` or later; stays active for `hold_s`, or to the end."""
+    """Return a trigger that fires at the first step that starts at `time_s` or later.
+
+    It stays active for `hold_s`, or to the end of the run.
+    """
     if not math.isfinite(time_s):
         raise MutatorError(f"time {time_s}", expected="a number of seconds")
     hold = Hold.TO_END if hold_s is None else Hold.FOR
@@ -37,9 +40,9 @@ def time_of(trigger: Trigger) -> float | None:
 
 
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
-    """Draw a time from the steps from `first_s` to `last_s` (both included), uniform in (seed, key).
+    """Draw the time of a step from `first_s` to `last_s` (both included), each with the same probability.
 
-    The result is the start of a step, rounded to nine decimals for readability.
+    `seed` and `key` determine the result: the start of a step, rounded to nine decimals for readability.
     """
     first, last = round(first_s / step_s), round(last_s / step_s)
     if last < first:

@@ -1,4 +1,4 @@
-"""Signal temporal logic as read by rtamt, an optional package (`pip install rtamt`)."""
+"""Signal temporal logic, evaluated by the optional package rtamt (`pip install rtamt`)."""
 
 import logging
 import re
@@ -18,12 +18,12 @@ _PLACE = re.compile(r"1:(\d+): Syntax")
 _BOUNDED = ("TimedAlways", "TimedEventually", "TimedUntil")
 _UNBOUNDED = ("Always", "Eventually", "Until")
 _NEXT = ("Next", "StrongNext")
-_SAME_LENGTH = 0.01  # of a step; times are sums of steps, or rounded
+_SAME_LENGTH = 0.01  # tolerance in steps; times are sums of steps, or rounded
 
 
 def check(formula: str, variables: Collection[str], step_s: float) -> None:
     """Raise MutatorError for a formula that cannot be evaluated in steps of `step_s`, or without rtamt."""
-    # NaN passes through any arithmetic
+    # NaN suffices: no arithmetic fails on it
     _evaluated(formula, {name: np.full(1, np.nan) for name in (*variables, TIME)}, step_s)
 
 
@@ -36,9 +36,9 @@ def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
 def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
     """How far each step is from violating the formula (below 0: violated).
 
-    `values` has an array for each variable, and the time of each step. A formula that looks ahead is known
-    for a step once all the steps it looks at are there: its value for step i stands at i + its look-ahead,
-    with `inf` before. MutatorError if steps are not `step_s` long, since the logic counts steps, not times.
+    `values` has an array for each variable, and the time of each step. If the formula looks n steps ahead,
+    its value for step i is known at step i + n and stored there; the first n entries are `inf`. MutatorError
+    if steps are not `step_s` long, because the logic counts steps, not times.
     """
     time = values[TIME]
     lengths = np.diff(time)
@@ -57,7 +57,7 @@ def _evaluated(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     specification = _specification(step_s)
     formula = " ".join(formula.split())
     names, steps = names_in(formula, values), len(values[TIME])
-    # rtamt needs two steps at least: the last one is doubled, and its second value dropped
+    # rtamt needs at least two steps, so the last one is doubled and its second value dropped
     rows = {name: [*values[name].tolist(), *values[name][-1:].tolist()] for name in names}
     try:
         _parse(specification, formula, names)
@@ -89,7 +89,7 @@ def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
         specification.declare_var(name, "float")
     specification.spec = f"{_OUT} = {formula}"
     before = logging.root.manager.disable
-    logging.disable(logging.WARNING)  # rtamt warns of an unknown name, which is refused here
+    logging.disable(logging.WARNING)  # rtamt warns about an unknown name, which is rejected below
     try:
         specification.parse()
     finally:

@@ -1,4 +1,4 @@
-"""Conditions and formulas as JSON, for evaluation in another language: the report's page.
+"""Conditions and formulas as JSON, which the report's page evaluates.
 
 A number, a truth value or a name (also `t` and `inf`) stands for itself. Anything else is a list of an
 operator and its operands: `+ - * / neg abs hypot min max rate`, `< <= > >= == !=`, `and or not ever`, and
