@@ -260,7 +260,7 @@ def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
         def __init__(self, scenario, seed):
             self.seed = seed
 
-    with pytest.raises(GlueError, match=r"Bare.__init__ does not call super\(\).__init__\(step_s=..., "):
+    with pytest.raises(GlueError, match=r"Bare.__init__ does not call super\(\).__init__; add "):
         Bare.open(arguments)
 
 
