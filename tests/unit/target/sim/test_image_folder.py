@@ -53,14 +53,14 @@ def folder(tmp_path):
 
 
 def test_frames_are_read_in_the_order_of_their_numbers(folder):
-    """Frame 2 precedes frame 10; both are grey, at the size of the calibration's camera."""
+    """Frame 2 comes before frame 10. Both are grey and have the size of the calibration's camera."""
     frames = list(ImageFolder(folder).read())
     assert [frame[0, 0] for frame in frames] == list(range(10, 121, 10))
     assert {frame.shape for frame in frames} == {(48, 64)}
 
 
 def test_a_folder_becomes_a_library(folder, tmp_path):
-    """A folder's frames follow the run's time at their rate, under the folder's name and camera."""
+    """A folder's frames follow the run's time at their rate. The library has the folder's name and camera."""
     library = open_library(Pictures(frames=folder, cache=tmp_path / "cache"), 0)
     assert library.name == "test drive"
     assert (library.fps, library.spacing) == (20.0, None)
@@ -69,7 +69,7 @@ def test_a_folder_becomes_a_library(folder, tmp_path):
 
 
 def test_the_digest_follows_every_byte(folder, tmp_path):
-    """Another pixel in a frame, or another number in the calibration, makes another library."""
+    """If a pixel of a frame or a number of the calibration changes, the library's digest changes."""
     digests = {ImageFolder(folder).digest}
     cv2.imwrite(str(folder / "7.png"), np.full((48, 64), 71, np.uint8))
     digests.add(ImageFolder(folder).digest)
@@ -79,7 +79,7 @@ def test_the_digest_follows_every_byte(folder, tmp_path):
 
 
 def test_a_full_calibration_gives_that_camera(folder):
-    """Focal lengths, principal point, height and pitch reach the camera model, in its units."""
+    """Focal lengths, principal point, height and pitch reach the camera model in its units."""
     (folder / "camera.yaml").write_text(CALTECH)
     read = ImageFolder(folder)
     assert astuple(read.model) == pytest.approx(astuple(CameraModel()))
@@ -87,7 +87,7 @@ def test_a_full_calibration_gives_that_camera(folder):
 
 
 def test_frames_are_made_smaller_with_their_camera(folder):
-    """A resized frame shows each point of the road where the resized camera has it."""
+    """In a resized frame, each road point is where the resized camera has it."""
     full = ImageFolder(folder).model
     (folder / "camera.yaml").write_text(VIEW + "resize_width: 32\n")
     half = ImageFolder(folder)
@@ -97,27 +97,27 @@ def test_frames_are_made_smaller_with_their_camera(folder):
 
 
 def error(folder):
-    """The error for an unusable folder."""
+    """Return the error for an unusable folder."""
     with pytest.raises(ConfigError) as caught:
         list(ImageFolder(folder).read())
     return str(caught.value)
 
 
 def test_a_frame_of_another_size_is_named(folder):
-    """The message gives the file, its size and the size expected."""
+    """For a frame of another size, the error gives the file, its size and the expected size."""
     cv2.imwrite(str(folder / "7.png"), np.zeros((60, 80), np.uint8))
     assert error(folder).startswith(f"{folder}/7.png: 80x60, expected 64x48; ")
 
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n truncated"])
 def test_an_unreadable_frame_is_named(folder, content):
-    """A file that is no image is named with a remedy."""
+    """For a file that is not an image, the error names the file and says what to do."""
     (folder / "7.png").write_bytes(content)
     assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
 
 
 def test_a_frame_that_is_cut_off_is_named(folder):
-    """Half a JPEG or PNG file is refused, although its header and first rows are intact."""
+    """Half a JPEG or PNG file is refused, even if its header and first rows are intact."""
     picture = np.random.default_rng(0).integers(0, 256, (48, 64), dtype=np.uint8)
     for kind in (".png", ".jpg"):
         whole = cv2.imencode(kind, picture)[1].tobytes()
@@ -128,7 +128,7 @@ def test_a_frame_that_is_cut_off_is_named(folder):
 
 
 def test_a_frame_too_large_to_be_read_is_named(folder):
-    """A header that claims billions of pixels is refused with a message, too."""
+    """A header that claims billions of pixels is refused with an error, too."""
     header = b"IHDR" + struct.pack(">II5B", 60000, 60000, 8, 0, 0, 0, 0)
     png = cv2.imencode(".png", np.zeros((48, 64), np.uint8))[1].tobytes()
     (folder / "7.png").write_bytes(
@@ -138,8 +138,9 @@ def test_a_frame_too_large_to_be_read_is_named(folder):
 
 
 def test_colour_depth_and_transparency_do_not_matter(folder):
-    """Grey, colour with and without alpha, and 16 bits a channel are all read as 8 bit grey; one frame is
-    enough.
+    """Grey images, colour with and without alpha, and 16 bits per channel are read as 8-bit grey.
+
+    One frame is enough.
     """
     for path in folder.glob("*.png"):
         path.unlink()
@@ -150,13 +151,13 @@ def test_colour_depth_and_transparency_do_not_matter(folder):
 
 
 def test_a_missing_frame_is_named(folder):
-    """A gap in the numbers means a missing frame."""
+    """A gap in the numbers counts as a missing frame."""
     (folder / "7.png").unlink()
     assert error(folder).startswith(f"{folder}/7.png: missing, expected ")
 
 
 def test_numbers_may_go_in_larger_steps(folder):
-    """Frames numbered 0, 30, 60 are a sequence without gaps, unless one of them is missing."""
+    """Frames 0, 30 and 60 are a sequence without gaps, unless one of them is missing."""
     for path in folder.glob("*.png"):
         path.rename(folder / f"run{30 * int(path.stem):05}.png")
     assert len(ImageFolder(folder).files) == 12
@@ -165,7 +166,7 @@ def test_numbers_may_go_in_larger_steps(folder):
 
 
 def test_several_sequences_follow_each_other(folder):
-    """Clips in separate folders are used in order; in each, numbers start again, or are not needed."""
+    """Clips in separate folders are used in order. In each folder, numbers start again or are not needed."""
     for clip in ("b", "a"):
         (folder / clip).mkdir()
         for number in (1, 2, 3):
@@ -200,7 +201,7 @@ def test_several_sequences_follow_each_other(folder):
     ],
 )
 def test_a_wrong_calibration_is_explained(folder, old, new, message):
-    """The message gives finding and expectation, with file and line."""
+    """For an invalid calibration, the error gives file and line, what was found and what was expected."""
     (folder / "camera.yaml").write_text(VIEW.replace(old, new))
     assert message in error(folder)
 
@@ -212,7 +213,7 @@ def test_a_camera_that_sees_no_road_is_refused(folder):
 
 
 def test_a_folder_without_calibration_is_explained(tmp_path):
-    """For a missing camera.yaml the error gives its path and where to read how to write one."""
+    """For a missing camera.yaml, the error gives its path and the page that says how to write one."""
     assert error(tmp_path).startswith(f"{tmp_path}/camera.yaml: No such file")
 
 
@@ -221,7 +222,7 @@ EXAMPLES = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 @pytest.mark.parametrize("text", EXAMPLES)
 def test_the_calibrations_in_the_docs_are_good(tmp_path, text):
-    """Every camera.yaml in the documentation is valid and gives a camera that sees road."""
+    """Every camera.yaml in the documentation is valid and gives a camera that sees the road."""
     (tmp_path / "camera.yaml").write_text(text)
     pattern = re.search(r'files: "([^"]*)"', text)
     frame = tmp_path / pattern[1].replace("*", "1")

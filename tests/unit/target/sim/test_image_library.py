@@ -1,4 +1,4 @@
-"""The image library: frames built once, safely, and found by time or distance."""
+"""The image library builds frames once, stores them safely and finds them by time or distance."""
 
 import subprocess
 import sys
@@ -21,12 +21,12 @@ DIGEST = "ab" * 32
 
 
 def noise(seed=1):
-    """Frames of that shape with noise."""
+    """Return frames of that shape with noise."""
     return iter(np.random.default_rng(seed).integers(0, 256, SHAPE, dtype=np.uint8))
 
 
 def refuse():
-    """Fails if anything is built again."""
+    """Fail if frames are built again."""
     raise AssertionError("made again")
 
 
@@ -45,20 +45,23 @@ def library(**given):
 
 
 def test_frames_are_found_by_distance_and_start_again():
-    """The next frame comes every `spacing` metres, the first after the last, whatever the time."""
+    """The next frame comes every `spacing` metres, whatever the time.
+
+    After the last frame comes the first.
+    """
     frames = library(spacing=2.0)
     assert [frames.frame(9.9, x)[0, 0] for x in (0.0, 1.9, 2.0, 9.0, 10.0, 13.0)] == [0, 0, 1, 4, 0, 1]
 
 
 def test_frames_are_found_by_time_and_start_again():
-    """Frames at 10 a second follow the run's time, not the distance; rounding of times skips none."""
+    """Ten frames a second follow the run's time, not the distance. Rounded times skip none."""
     frames = library(fps=10.0)
     times = [k * 0.05 for k in range(12)]
     assert [frames.frame(t, 99.0)[0, 0] for t in times] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 0, 0]
 
 
 def test_the_rendered_loop_closes_on_a_dash():
-    """600 frames span whole dash periods, and pass at 20 a second at 60 mph."""
+    """The 600 frames cover whole dash periods and pass at 20 a second at 60 mph."""
     periods = FRAMES * SPACING / DASH_PERIOD
     assert FRAMES >= 600
     assert periods == pytest.approx(round(periods))
@@ -66,7 +69,10 @@ def test_the_rendered_loop_closes_on_a_dash():
 
 
 def test_frames_are_made_once(tmp_path):
-    """A cached frame is not built again; the cached file is read-only, and other digests do not find it."""
+    """A cached frame is not built again.
+
+    The cached file is read-only, and another digest does not find it.
+    """
     first = cached(tmp_path, DIGEST, SHAPE, noise)
     again = cached(tmp_path, DIGEST, SHAPE, refuse)
     other = cached(tmp_path, "cd" * 32, SHAPE, lambda: noise(2))
@@ -108,7 +114,7 @@ def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
 
 
 def test_only_frames_that_are_looked_at_are_verified(tmp_path):
-    """Mapping a file takes almost no time; a damaged frame is rebuilt on access."""
+    """Mapping a file takes almost no time. A damaged frame is rebuilt when it is used."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     data = path.read_bytes()
@@ -120,7 +126,7 @@ def test_only_frames_that_are_looked_at_are_verified(tmp_path):
 
 
 def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch):
-    """If a file is damaged again right after writing, the frames are kept in memory."""
+    """If the file is damaged again right after it was written, the frames are kept in memory."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     real = image_library._mapped
 
@@ -133,7 +139,7 @@ def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch
 
 
 def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
-    """Half a set of frames never appears in the cache."""
+    """If building fails, an incomplete set of frames never appears in the cache."""
 
     def break_off():
         yield from list(noise())[:2]
@@ -146,7 +152,7 @@ def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
 
 @pytest.mark.parametrize("place", [None, "file/cache", "x" * 300])
 def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, place):
-    """Without a cache, or one that cannot be created, frames equal cached ones and are read-only."""
+    """If there is no cache or it cannot be created, the frames equal cached frames and are read-only."""
     (tmp_path / "file").write_text("in the way")
     cache = None if place is None else tmp_path / place
     frames = cached(cache, DIGEST, SHAPE, noise)
@@ -157,7 +163,7 @@ def test_without_a_cache_that_can_be_written_the_frames_are_the_same(tmp_path, p
 
 
 def test_processes_may_make_the_same_frames_at_once(tmp_path):
-    """Several processes that start with a cold cache all get the same frames, and leave one complete file."""
+    """If processes start with an empty cache, all get the same frames and leave one complete file."""
     code = (
         "import numpy as np, hashlib, pathlib, sys\n"
         "from selfdrive.sim.image_library import cached\n"
@@ -181,8 +187,9 @@ def test_processes_may_make_the_same_frames_at_once(tmp_path):
 
 @pytest.mark.slow
 def test_the_rendered_library_is_the_road_in_steps(tmp_path):
-    """The 600 frames are those of the renderer, equal for equal seeds, different for other seeds
-    and marks.
+    """The 600 frames are the renderer's.
+
+    They are equal for equal seeds and different for other seeds and marks.
     """
     pictures = Pictures(marks=DASHED, cache=tmp_path / "one")
     frames = open_library(pictures, 5)

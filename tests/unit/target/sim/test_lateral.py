@@ -1,4 +1,4 @@
-"""Lateral motion: from torque to wheel, and from wheel to car."""
+"""Lateral motion: torque turns the wheel, and the wheel turns the car."""
 
 from math import radians
 
@@ -32,14 +32,14 @@ def test_nothing_moves_without_torque(car):
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_left_is_positive_all_the_way(car, sign):
-    """Torque to one side turns wheel, car and path to that side."""
+    """Torque to one side turns the wheel, the car and the path to that side."""
     run(car, 1.0, 0.2 * sign, 20.0)
     assert car.steer_angle * sign > 0 and car.yaw_rate * sign > 0
     assert car.heading * sign > 0 and car.offset * sign > 0
 
 
 def test_sides_are_symmetric():
-    """Left and right are mirror images to the last bit."""
+    """A motion to the left and one to the right are mirror images to the last bit."""
     left, right = LateralDynamics(get_params()), LateralDynamics(get_params())
     run(left, 2.0, 0.3, 20.0)
     run(right, 2.0, -0.3, 20.0)
@@ -52,8 +52,9 @@ def test_sides_are_symmetric():
 
 @pytest.mark.parametrize("speed", [1.0, 5.0, 15.0, 26.8, 40.0])
 def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
-    """At a constant angle, the car settles at yaw rate v delta / (L (1 + K v^2)), K the understeer
-    gradient.
+    """At a constant angle, the car settles at the bicycle model's yaw rate.
+
+    The yaw rate is v delta / (L (1 + K v^2)), with the understeer gradient K.
     """
     p = get_params()
     rear = p.wheelbase - p.center_to_front
@@ -67,7 +68,10 @@ def test_steady_turn_is_that_of_the_bicycle_model(car, speed):
 
 
 def test_full_torque_is_limited_by_the_tyres(car):
-    """At 60 mph full torque turns the wheel no faster than 0.5 rad/s and ends near 2.8 m/s^2."""
+    """At 60 mph, full torque turns the wheel at up to 0.5 rad/s.
+
+    The lateral acceleration ends near 2.8 m/s^2.
+    """
     fastest = 0.0
     for _ in range(600):
         car.step(1.0, 26.8, 0.0)
@@ -85,7 +89,7 @@ def test_the_wheel_returns_by_itself(car):
 
 
 def test_the_wheel_has_a_stop(car):
-    """Turned on a standing car, the wheel stops at its stop, and leaves it at once."""
+    """On a standing car, the wheel stops at its stop and can leave it at once."""
     run(car, 30.0, 1.0, 0.0)
     assert (car.steer_angle, car.steer_rate) == (8.7, 0.0)
     run(car, 0.01, -1.0, 0.0)
@@ -94,7 +98,7 @@ def test_the_wheel_has_a_stop(car):
 
 @pytest.mark.parametrize("speed", [0.0, 0.05, 0.3, 2.0])
 def test_slow_driving_is_stable(car, speed):
-    """At walking pace and at rest nothing diverges, and a standing car does not move."""
+    """At walking pace and at rest no value diverges, and a standing car does not move."""
     run(car, 20.0, 1.0, speed)
     assert abs(car.steer_angle) <= 8.7
     assert abs(car.lateral_speed) <= 2 * speed
@@ -104,7 +108,7 @@ def test_slow_driving_is_stable(car, speed):
 
 
 def test_a_bend_carries_the_lane_away(car):
-    """Going straight in a left-hand bend of 500 m, the car is right of its lane by s^2 / 2R."""
+    """A car that goes straight in a left-hand bend of 500 m is s^2 / 2R to the right of its lane."""
     run(car, 1.0, 0.0, 20.0, curvature=0.002)
     assert car.offset == pytest.approx(-(20.0**2) / 1000, rel=0.02)
     assert car.heading == pytest.approx(-0.04, rel=0.01)

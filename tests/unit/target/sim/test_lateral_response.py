@@ -1,4 +1,4 @@
-"""The controlled car's lane behaviour at 60 mph: overshoot, settling, steady error."""
+"""The controlled car's lateral response at 60 mph: overshoot, settling and steady error."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ STEP_AT, STEP = 800, 0.5  # simulation step, m
 
 @pytest.fixture
 def drive(scenarios):
-    """Run a lateral scenario, mirrored on request; `step` moves the lane (m, to the left) after 8 s."""
+    """Run a lateral scenario, mirrored on request. `step` moves the lane (m, to the left) after 8 s."""
 
     def run(name, side=1, step=0.0):
         scenario = load_scenario(scenarios / f"{name}.yaml")
@@ -35,15 +35,16 @@ def drive(scenarios):
 
 
 def settling(trace, start, band):
-    """Seconds from `start` until the car stays within `band` m of the middle."""
+    """Return the seconds from `start` until the car stays within `band` m of the middle."""
     outside = np.flatnonzero(np.abs(trace["lateral_offset"]) > band)
     return trace["t"][outside[-1]] - start
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_offset_start(drive, side):
-    """Engaged half a metre off, the car is within 5 % after 3 to 3.6 s, at most 1 % beyond, and 5 mm off in
-    the end.
+    """If engaged half a metre off, the car is within 5 % after 3 to 3.6 s.
+
+    It overshoots by at most 1 % and ends within 5 mm of the middle.
     """
     result = drive("L01", side)
     offset = side * result.trace["lateral_offset"]
@@ -56,8 +57,9 @@ def test_offset_start(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_step_in_lane_position(drive, side):
-    """After a lane step of half a metre, the car is half way in 1.5 s, within 5 % in 3.4 s, with 1 %
-    overshoot.
+    """After a lane step of half a metre, the car is half way in 1.5 s and within 5 % in 3.4 s.
+
+    Its overshoot is 1 %.
     """
     result = drive("L01", step=side * STEP)
     trace = result.trace
@@ -90,7 +92,7 @@ def test_bend_of_500_m(drive, side):
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_torque_saturation(drive, side):
-    """Two seconds of full torque raise an alert; the car drifts, stays in its lane and returns smoothly."""
+    """Two seconds of full torque raise an alert. The car drifts, stays in its lane and returns smoothly."""
     result = drive("L03", side)
     trace = result.trace
     outside = -side * trace["lateral_offset"]

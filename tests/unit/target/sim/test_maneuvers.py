@@ -1,4 +1,4 @@
-"""The page of maneuvers: complete, self-contained, small, and true to the data."""
+"""The page of maneuvers is complete, self-contained and small, and it matches the data."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -20,7 +20,7 @@ lead: {{gap_m: 20, speed_mps: 0}}
 
 @pytest.fixture
 def folder(tmp_path):
-    """Two short scenarios, and a reference for the first."""
+    """A folder with two short scenarios and a reference for the first."""
     for name in ("A", "B"):
         (tmp_path / f"{name}.yaml").write_text(BRIEF.format(name=name))
     arguments = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path), "--update-references"]
@@ -34,7 +34,7 @@ def show(folder, *arguments):
 
 
 def test_page(folder):
-    """It has all scenarios, with hazards, the reference if there is one, and loads nothing."""
+    """The page has all scenarios with their hazards and any reference, and loads nothing."""
     code, text = show(folder, "--references", str(folder / "kept"), "--plant", "reference")
     assert code == 0
     first, second = re.findall(r"<section.*?</section>", text)
@@ -57,7 +57,7 @@ def test_page_is_the_same_again(folder):
 
 
 def test_road_the_plant_does_not_know(folder, capsys):
-    """A bend is left out of all maneuvers on the reference plant; naming it is an error."""
+    """On the reference plant, "all maneuvers" leave out a bend. Naming the bend is an error."""
     bend = BRIEF.format(name="B") + "road: {curvature: {at_m: [0], per_m: [0.001]}}\n"
     (folder / "B.yaml").write_text(bend)
     code, text = show(folder, "--plant", "reference")
@@ -68,7 +68,7 @@ def test_road_the_plant_does_not_know(folder, capsys):
 
 
 def test_mistakes(folder, tmp_path, capsys):
-    """An unknown scenario, none, an invalid file and an unwritable page end with exit code 2."""
+    """An unknown scenario, no scenario, an invalid file or an unwritable page exits with code 2."""
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(folder), "X"]) == 2
     assert main(["--out", str(tmp_path / "page"), "--scenarios", str(tmp_path / "nowhere")]) == 2
     assert main(["--out", str(folder / "A.yaml"), "--scenarios", str(folder), "A"]) == 2
@@ -80,7 +80,7 @@ def test_mistakes(folder, tmp_path, capsys):
 
 
 def test_simplified_line():
-    """A line with fewer points stays within the tolerance of all of them, and keeps both ends and peaks."""
+    """A line with fewer points stays within the tolerance of all points and keeps both ends and peaks."""
     x = np.linspace(0.0, 1000.0, 600)
     y = 300.0 * np.sin(x / 60.0) + 200.0 * (x > 500.0)
     few = simplify(np.column_stack((x, y)), 2.5)
@@ -90,7 +90,7 @@ def test_simplified_line():
 
 
 def test_gaps_and_constants_are_drawn():
-    """A line breaks where it has no value; without values it is empty; a constant has an axis, too."""
+    """A line has gaps where values are missing. Without values it is empty. A constant has an axis, too."""
     t = np.arange(10) / 20
     broken = np.where(np.arange(10) == 5, np.inf, 1.0)
     panel = Panel(title="a", unit="m", lines=(Line("b", 0, t, broken), Line("c", 1, t, np.full(10, np.nan))))

@@ -1,4 +1,4 @@
-"""Images that are computed on access."""
+"""Images that compute their pixels when they are read."""
 
 from copy import deepcopy
 
@@ -10,7 +10,7 @@ WHOLE = np.arange(6 * 8, dtype=np.uint8).reshape(6, 8)
 
 
 def picture(asked=None):
-    """An image that computes only the requested part; `asked` records the requests."""
+    """Return an image that computes only the requested part. `asked` records the requests."""
 
     def make(region):
         if asked is not None:
@@ -41,7 +41,7 @@ CUTS = [
 
 @pytest.mark.parametrize("cut", CUTS)
 def test_a_cut_is_that_of_the_whole(cut):
-    """Any cut equals that of an array with the same pixels, whether computed before or not."""
+    """A slice equals the slice of an array with the same pixels, whether it was computed before or not."""
     one = picture()
     assert np.array_equal(one[cut], WHOLE[cut])
     one.pixels()
@@ -49,7 +49,7 @@ def test_a_cut_is_that_of_the_whole(cut):
 
 
 def test_no_more_is_made_than_asked_for():
-    """Size and type compute nothing; a cut computes its content; each part is computed once."""
+    """Size and type compute nothing. A slice computes only its content, and each part is computed once."""
     asked = []
     one = picture(asked)
     assert (one.shape, one.dtype, len(one)) == ((6, 8), np.uint8, 6) and asked == []
@@ -60,7 +60,7 @@ def test_no_more_is_made_than_asked_for():
 
 
 def test_it_is_calculated_with_as_an_array():
-    """Operators, functions and methods of arrays give the same results as for its pixels."""
+    """Operators, functions and methods of arrays give the results that they give for the pixels."""
     one = picture()
     assert np.array_equal(one * 0.5 + 3, WHOLE * 0.5 + 3) and np.array_equal(200 - one, 200 - WHOLE)
     assert np.array_equal(one.astype(float), WHOLE.astype(float)) and (one == WHOLE).all()
@@ -91,8 +91,9 @@ def put_into_pixels(one):
 @pytest.mark.parametrize("made", [False, True])
 @pytest.mark.parametrize("write", [add_in_place, add_into, put, put_into_cut, put_into_pixels])
 def test_it_is_not_written_to(write, made):
-    """The image, its pixels and its cuts are read-only, computed or not, since all runs share the frame;
-    writing raises NumPy's usual error.
+    """The image, its pixels and its slices are read-only, because all runs share the frame.
+
+    Writing raises NumPy's usual error.
     """
     one = picture()
     if made:
@@ -103,7 +104,7 @@ def test_it_is_not_written_to(write, made):
 
 
 def test_what_is_made_of_it_can_be_written_to():
-    """A sum is a separate array, and an image may be added to another array in place."""
+    """A sum with an image is a new array. An image can be added to an array in place."""
     one = picture()
     more = one + 5
     more += one

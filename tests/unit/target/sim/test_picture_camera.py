@@ -1,4 +1,4 @@
-"""The camera with frames: a frame as seen from the car's pose."""
+"""The camera with frames shows a frame as seen from the car's pose."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ CAMERAS = pytest.mark.parametrize("model", [CALTECH, UDACITY])
 
 
 def camera(model, translation=GROUND, frames=12):
-    """A camera over a few frames of a rendered road, and their renderer."""
+    """A camera with a few frames of a rendered road, and the renderer."""
     renderer = RoadRenderer(model, "dashed", 3, periods=2)
     pictures = np.stack([renderer.grey(k * SPACING) for k in range(frames)])
     pictures.flags.writeable = False
@@ -31,9 +31,7 @@ def camera(model, translation=GROUND, frames=12):
 @CAMERAS
 @pytest.mark.parametrize(("offset", "heading"), [(0.4, 0.0), (0.0, 0.02), (-0.5, -0.02), (0.9, 0.03)])
 def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, truth):
-    """Below the horizon a moved frame equals the road drawn from the displaced pose, apart from
-    interpolation.
-    """
+    """Below the horizon, a moved frame equals the road rendered from that pose, apart from interpolation."""
     looking, renderer = camera(model)
     seen = looking.look(truth(lateral_offset=offset, heading=heading, position=3 * SPACING)).picture
     drawn = renderer.grey(3 * SPACING, offset, heading)
@@ -46,7 +44,7 @@ def test_the_view_is_what_would_be_rendered_from_there(model, offset, heading, t
 
 @CAMERAS
 def test_lines_in_the_view_are_where_the_truth_says(model, truth):
-    """The lines in the moved frame are where the displaced car sees them, to a fraction of a pixel."""
+    """In the moved frame, lines are where the displaced car sees them, within a fraction of a pixel."""
     looking, renderer = camera(model)
     offset, heading = 0.32, -0.015
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture.astype(float)
@@ -64,7 +62,7 @@ def test_lines_in_the_view_are_where_the_truth_says(model, truth):
 
 
 def test_in_the_middle_of_the_lane_the_frame_is_the_view(truth):
-    """At the pose of the frame, the car sees the frame itself, read-only."""
+    """At the frame's own pose, the car sees the frame itself, read-only."""
     looking, renderer = camera(CALTECH)
     picture = looking.look(truth(position=2.5 * SPACING)).picture
     assert np.array_equal(picture, renderer.grey(2 * SPACING))
@@ -90,7 +88,7 @@ def test_the_rounding_is_finer_than_a_pixel(truth):
 
 
 def test_above_the_horizon_the_view_pans_and_no_more(truth):
-    """The sky does not follow the offset; a left turn moves it right."""
+    """The sky does not follow the offset. When the car turns left, the sky moves right."""
     looking, renderer = camera(CALTECH)
     frame = renderer.grey(0.0)
     aside = looking.look(truth(lateral_offset=0.8)).picture
@@ -104,7 +102,7 @@ def test_above_the_horizon_the_view_pans_and_no_more(truth):
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.5, 0.0), (-0.5, 0.0), (0.0, 0.01), (40.0, 0.0)])
 def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
-    """In the paper's mode all rows shift alike, by the lane's shift 10 m ahead."""
+    """In the paper's mode all rows shift by the same amount, the lane's shift 10 m ahead."""
     looking, renderer = camera(CALTECH, SHIFT)
     picture = looking.look(truth(lateral_offset=offset, heading=heading)).picture
     away = offset + SHIFT_DISTANCE * np.tan(heading)
@@ -115,7 +113,7 @@ def test_a_shift_moves_the_frame_as_a_whole(offset, heading, truth):
 
 @pytest.mark.parametrize("offset", [0.5, -0.9, 3.0])
 def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
-    """The whole image shifts by a pixel for 0.03895 m, at most for 1 m; the car's heading has no effect."""
+    """The whole image shifts by a pixel for each 0.03895 m, up to 1 m. The car's heading has no effect."""
     looking, renderer = camera(CALTECH, CODED)
     picture = looking.look(truth(lateral_offset=offset, heading=0.02)).picture
     shift = round(min(max(offset, -1.0), 1.0) / 0.03895)
@@ -124,14 +122,14 @@ def test_as_coded_the_frame_moves_by_another_rows_metres(truth, offset):
 
 
 def test_the_message_stays_geometric(truth):
-    """Lane, path and lead in the message are the ideal camera's; the image is added."""
+    """Lane, path and lead in the message are the ideal camera's. The image is added."""
     looking, _ = camera(CALTECH)
     there = truth(lateral_offset=0.3, heading=0.01, d_rel=42.0)
     assert looking.look(there)._replace(picture=None) == Camera(Road(None, None)).look(there)
 
 
 def test_any_size_of_frame_is_moved(truth):
-    """Frames need not be 640 x 480, and the horizon may lie above them."""
+    """Frames of other sizes than 640 x 480 are moved, also if the horizon lies above the frame."""
     small = CameraModel.from_view(width=320, rows=117, horizon=-5.0, focal=260.0, height=1.5)
     looking, renderer = camera(replace(small), frames=1)
     picture = looking.look(truth(lateral_offset=0.4, heading=0.01)).picture
@@ -141,7 +139,7 @@ def test_any_size_of_frame_is_moved(truth):
 
 
 def test_pictures_show_no_curves():
-    """Frames show a straight road, so frames on a road with curvature are refused."""
+    """Frames on a road with curvature are refused, because frames show a straight road."""
     with pytest.raises(ConfigError, match="a road with curvature, expected a straight road"):
         build_vision(Pictures(), Road(None, ((0.0, 100.0), (0.0, 0.001))), 0)
 
@@ -149,7 +147,7 @@ def test_pictures_show_no_curves():
 @pytest.mark.parametrize("translation", [GROUND, SHIFT, CODED])
 @CAMERAS
 def test_a_part_is_that_of_the_whole_view(model, translation, truth):
-    """Any cut of a moved frame, at any row and column, has the bytes that the whole has there."""
+    """Any slice of a moved frame has the same bytes as in the whole frame."""
     looking, _ = camera(model, translation, frames=1)
     random = np.random.default_rng(4)
     for _ in range(60):

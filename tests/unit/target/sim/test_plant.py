@@ -15,7 +15,7 @@ def plant():
 
 
 def test_coasting_from_60_mph(plant):
-    """The first steps of a coasting car are the original's to its printed digits."""
+    """The first steps of a coasting car match the original's to all printed digits."""
     car = plant(26.8224)
     car.step(Actuators(), 0.0, 0.0)
     assert (car.position, car.speed, car.acceleration) == pytest.approx((0.26822, 26.821, -0.17586), abs=6e-4)
@@ -25,7 +25,7 @@ def test_coasting_from_60_mph(plant):
 
 
 def test_position_uses_the_old_speed(plant):
-    """By Euler's order, a step moves the car by exactly its speed at the step's beginning."""
+    """A step moves the car by exactly its speed at the start of the step (Euler's method)."""
     car = plant(10.0)
     car.step(Actuators(brake=1.0), 0.0, 0.0)
     assert car.position == 0.1
@@ -33,7 +33,7 @@ def test_position_uses_the_old_speed(plant):
 
 
 def test_gas_below_and_above_base_speed():
-    """Gas gives a constant force below 19.6 m/s and constant power above."""
+    """Gas gives constant force below 19.6 m/s and constant power above."""
     assert abs(BASE_SPEED - 19.608) < 1e-3
     for speed, force in ((10.0, 5100 * 3.33), (25.0, 100_000 / 25.0 * 3.33)):
         gain = acceleration(speed, 0.5, 0.0, 0.0) - acceleration(speed, 0.0, 0.0, 0.0)
@@ -41,7 +41,7 @@ def test_gas_below_and_above_base_speed():
 
 
 def test_brake_and_grade():
-    """A unit of brake takes 3.0 m/s^2, a grade its own value."""
+    """Full brake decelerates by 3.0 m/s^2. A grade decelerates by its own value."""
     free = acceleration(15.0, 0.0, 0.0, 0.0)
     assert free - acceleration(15.0, 0.0, 1.0, 0.0) == pytest.approx(3.0)
     assert free - acceleration(15.0, 0.0, 0.0, 1.0) == pytest.approx(1.0)
@@ -55,7 +55,7 @@ def test_creep():
 
 
 def test_the_car_never_drives_backwards(plant):
-    """A car braked to a stop stays there: no speed, acceleration or distance."""
+    """A car that brakes to a stop stays there, with zero speed and acceleration and no further distance."""
     car = plant(1.0)
     for _ in range(200):
         car.step(Actuators(brake=1.0), 0.0, 0.0)

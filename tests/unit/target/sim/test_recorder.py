@@ -1,4 +1,4 @@
-"""The recorder's rows."""
+"""The recorder stores one row for each step."""
 
 from types import SimpleNamespace
 
@@ -11,7 +11,7 @@ TRUTH = ("t", "v_ego", "a_ego", "d_rel", "v_lead", "hwt", "steer_angle", "latera
 
 
 def driven(rows: int) -> tuple[Recorder, np.ndarray]:
-    """A recorder with that many rows, and the time and the heading of each."""
+    """Return a recorder with that many rows, and the time and heading of each row."""
     state = SimpleNamespace(
         **{"alerts": (), "enabled": True, "long_state": "pid", "angle_desired": 0.5},
         **dict.fromkeys(("v_ego", "a_ego", "v_cruise", "v_pid"), 1.5),
@@ -27,7 +27,7 @@ def driven(rows: int) -> tuple[Recorder, np.ndarray]:
 
 @pytest.mark.parametrize("rows", [0, 1, 63, 64, 65, 129, 4096, 4097, 8300])
 def test_every_row_is_in_the_trace(rows):
-    """The trace has every row in its place, however many there are, and the last is the newest."""
+    """The trace has every row in its place, for any number of rows."""
     recorder, values = driven(rows)
     trace = recorder.trace()
     assert tuple(trace) == CHANNELS

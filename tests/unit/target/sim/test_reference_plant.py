@@ -1,4 +1,4 @@
-"""The reference plant copies the original's simulator, including its errors."""
+"""The reference plant copies the original's simulator with its errors."""
 
 import json
 from dataclasses import replace
@@ -33,7 +33,7 @@ def s1(scenarios):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("speed", [0.0, 30.0])
 def test_torque_turns_the_wheel_slowly(sign, speed):
-    """Full torque turns the wheel 0.1 deg a second; at any speed, a fifth of the turn moves the car."""
+    """Full torque turns the wheel by 0.1 deg a second. A fifth of the turn moves the car, at any speed."""
     lateral = CrudeLateral()
     assert [lateral.step(sign * 1.0, speed, 0.0) for _ in range(200)] == [speed] * 200
     assert degrees(lateral.steer_angle) == pytest.approx(0.2 * sign)
@@ -42,7 +42,7 @@ def test_torque_turns_the_wheel_slowly(sign, speed):
 
 
 def test_only_every_fifth_step_moves_the_car():
-    """Steering of steps 0, 5, 10 ... moves the car, that of the others never does."""
+    """Only the steering of steps 0, 5, 10 and so on moves the car."""
     moved = []
     for pushed in range(10):
         lateral = CrudeLateral()
@@ -54,7 +54,7 @@ def test_only_every_fifth_step_moves_the_car():
 
 
 def test_nothing_turns_the_wheel_back():
-    """Without torque the wheel stays turned, and the car keeps its line."""
+    """Without torque the wheel stays turned and the car keeps its line."""
     lateral = CrudeLateral()
     for torque in [1.0] * 100 + [0.0] * 500:
         lateral.step(torque, 30.0, 0.0)
@@ -79,8 +79,9 @@ def test_it_moves_along_the_road_as_the_standard_plant(car):
 
 
 def test_headway_time(car):
-    """Headway time is distance over speed, of the last moving step while the car stands, and 30 s before the
-    first.
+    """Headway time is distance over speed, or the last moving step's while the car stands.
+
+    Before the first moving step it is 30 s.
     """
     assert ReferencePlant(get_params(), speed=0.0).headway(50.0) == 30.0
     assert car.headway(50.0) == 2.5
@@ -90,7 +91,7 @@ def test_headway_time(car):
 
 
 def test_distance_ends_at_zero(car):
-    """A lead that was hit stays at 0 m; on the standard plant it falls behind."""
+    """After contact, the lead stays at 0 m. On the standard plant it falls behind."""
     car.position = 10.0
     assert (car.distance_to(12.0), car.distance_to(8.0)) == (2.0, 0.0)
     standard = Plant(get_params(), speed=20.0)
@@ -99,7 +100,7 @@ def test_distance_ends_at_zero(car):
 
 
 def test_drift_is_not_shown(s1):
-    """A car half a metre off mid-lane sees lanes at 1.85 m to both sides and the lead straight ahead."""
+    """A car half a metre off the middle sees lines at 1.85 m to both sides and the lead straight ahead."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator._plant.lateral.offset = 0.5
@@ -128,7 +129,7 @@ def test_speed_is_wrong_where_the_gearbox_is_believed(truth, speed, read):
 
 
 def test_a_scenario_may_choose_it(scenarios):
-    """The key `plant`, or `on_plant`, selects it; the default is the standard plant."""
+    """The key `plant`, or `on_plant`, selects the plant. The default is the standard plant."""
     assert parse_scenario(TEXT, "a.yaml", "").plant == "reference"
     plain = load_scenario(scenarios / "S1.yaml")
     assert plain.plant == "standard"
@@ -153,7 +154,10 @@ def test_what_it_does_not_know_is_refused(text, line, remedy):
 
 
 def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
-    """`--plant reference` uses it and the record says so; an unsupported road exits with code 2."""
+    """`--plant reference` selects the plant, and the record says so.
+
+    An unsupported road exits with code 2.
+    """
     common = ["--max-steps", "5", "--plant", "reference", "--out", str(tmp_path / "out")]
     assert main(["--scenario", str(scenarios / "S1.yaml"), *common]) == 0
     assert json.loads((tmp_path / "out" / "record.json").read_text())["plant"] == "reference"
@@ -164,7 +168,7 @@ def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
 
 
 def test_both_plants_in_one_simulator(s1):
-    """A run on one plant has no effect on the next on the other, and each is named in the record."""
+    """A run on one plant does not affect the next run on the other. Each record names its plant."""
     simulator, results = Simulator(), []
     for scenario in (s1, replace(s1, plant="standard"), s1):
         simulator.reset(replace(scenario, steps=200), 0)
@@ -177,7 +181,7 @@ def test_both_plants_in_one_simulator(s1):
 
 
 def test_lines_are_mirrored(s1):
-    """The controller receives the left line in place of the right one, and never sees its true side."""
+    """The controller receives the left line as the right one. It never sees the true side."""
     simulator = Simulator()
     simulator.reset(s1, 0)
     simulator.step()
@@ -187,7 +191,7 @@ def test_lines_are_mirrored(s1):
 
 
 def test_pictures_move_to_the_other_side(car):
-    """A car left of the middle is shown equally far to the right; the rest is unchanged."""
+    """A car left of the middle is shown equally far to the right. The rest of the frame is unchanged."""
     truth = GroundTruth(*(1.0, 50.0, 20.0, 20.0, 0.0, 0.3, 0.0, 0.0, 0.0, 20.0, 2.5), free_road=False)
     assert car.pictured(truth) == truth._replace(lateral_offset=-0.3)
     assert car.shown(truth) == truth._replace(lateral_offset=0.0)

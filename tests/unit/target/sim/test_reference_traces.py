@@ -27,7 +27,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def recorded():
-    """Read a recording: its steps, and columns as arrays, NaN where nothing was published."""
+    """Read a recording: its steps, and its columns as arrays with NaN where nothing was published."""
 
     def read(name):
         path = TRACES / f"{name}.csv"
@@ -46,7 +46,7 @@ def recorded():
 
 @pytest.fixture(scope="module")
 def driven():
-    """Run a scenario on the reference plant, once; `X_nolead` is X without its lead."""
+    """Run a scenario on the reference plant once. `X_nolead` is X without its lead."""
 
     def run(name):
         scenario = on_plant(load_scenario(SCENARIOS / f"{name.removesuffix('_nolead')}.yaml"), "reference")
@@ -61,7 +61,7 @@ def rms(values):
 
 @pytest.mark.parametrize("name", RECORDED)
 def test_a_recorded_run(recorded, driven, name):
-    """Speed, distance, headway, braking, engaging and set speed are the original's, within narrow limits."""
+    """Speed, distance, headway, braking, engaging and set speed match the original's within narrow limits."""
     steps, column = recorded(name)
     result = driven(name)
     trace = {channel: values[steps] for channel, values in result.trace.items()}
@@ -82,7 +82,7 @@ def test_a_recorded_run(recorded, driven, name):
 
 @pytest.mark.parametrize("name", ["S1", "S3", "O02", "O09"])
 def test_what_the_controller_thought(recorded, driven, name):
-    """Its speed estimate, plan and view of the lead follow the recording, from engaging on."""
+    """From engaging on, the controller's speed estimate, plan and lead follow the recording."""
     steps, column = recorded(name)
     trace = driven(name).trace
     later = steps > 150
@@ -119,7 +119,7 @@ def test_contexts(driven, name, rows):
 
 
 def faulty(scenario, disturb):
-    """Run a scenario with `disturb(simulator, truths)` applied; `truths` are the ground truths so far."""
+    """Run a scenario with `disturb(simulator, truths)`. `truths` are the ground truths so far."""
     simulator, truths = Simulator(), []
     simulator.reset(scenario, 0)
     observe = simulator._observe
@@ -136,7 +136,7 @@ def s1(scenarios):
 
 
 def angle_off(degrees):
-    """The measured steering angle is off while the headway time is in 0 .. 2 s."""
+    """Add an error to the measured steering angle while the headway time is 0 to 2 s."""
 
     def disturb(simulator, truths):
         measure = simulator._sensors.measure
@@ -156,7 +156,7 @@ def angle_off(degrees):
     ("degrees", "leaves"), [(0.86, 11.9), (-0.86, 11.9), (0.576, 13.0), (0.366, 18.3), (0.34, None)]
 )
 def test_steering_angle_off(s1, degrees, leaves):
-    """An error drives the car out of its lane, later if it is smaller, and below some size never."""
+    """An error makes the car leave its lane, later if it is smaller. A very small error never does."""
     record = faulty(s1, angle_off(degrees))
     assert record["alerts"] == []
     if leaves is None:
@@ -166,7 +166,7 @@ def test_steering_angle_off(s1, degrees, leaves):
 
 
 def near(truths):
-    """The headway time has been 2 s or less."""
+    """Whether the headway time has been 2 s or less."""
     return any(truth.hwt <= 2.0 for truth in truths)
 
 

@@ -1,4 +1,4 @@
-"""Detectors that look up earlier results."""
+"""Detectors that look up earlier results in a memory."""
 
 import subprocess
 import sys
@@ -38,7 +38,7 @@ def frames():
 
 @pytest.fixture
 def look(frames, truth):
-    """Take an image of these frames from a pose, moved by `translation`."""
+    """Return an image of these frames from a pose, moved by `translation`."""
 
     def taken(translation=GROUND, digest="d", **pose):
         library = ImageLibrary(
@@ -51,13 +51,13 @@ def look(frames, truth):
 
 
 def view(picture):
-    """A view with only this image."""
+    """Return a view with only this image."""
     nan = float("nan")
     return CameraView(nan, nan, nan, (), nan, picture)
 
 
 class Counting:
-    """Counts its calls."""
+    """A detector that counts its calls."""
 
     def __init__(self):
         self.asked, self.state = 0, ()
@@ -91,7 +91,7 @@ def test_remembered_lines_are_those_seen(make, look, tmp_path):
 
 
 def test_nothing_is_looked_at_twice(look, tmp_path):
-    """An image with a known key is neither built nor analysed; an array always is."""
+    """An image with a known key is neither built nor analysed. An array is always analysed."""
     looking = Counting()
     detector = RememberingDetector(looking, "it", DetectionMemory(tmp_path))
     lines = detector.detect(view(look(lateral_offset=0.1)))
@@ -107,8 +107,9 @@ def test_nothing_is_looked_at_twice(look, tmp_path):
 
 
 def test_what_makes_another_picture_makes_another_key(look, truth):
-    """Frame, pose, translation, frames, effects, their amounts, seeds, order and moments all change
-    the key.
+    """The key depends on frame, pose, translation and frames, and on each effect.
+
+    Of an effect, it depends on the amount, seed, order and time.
     """
     base = look()
     moment, later = truth(t=1.0), truth(t=1.05)
@@ -139,14 +140,14 @@ def test_what_makes_another_picture_makes_another_key(look, truth):
 
 
 def test_what_makes_no_other_picture_makes_no_other_key(look, truth):
-    """Poses that round alike share a key, as do moments under an effect that does not move."""
+    """Poses that round to the same value share a key, and so do times of an effect that does not move."""
     assert look(lateral_offset=0.1).key == look(lateral_offset=0.1004).key
     light = Brightness(20, 1, MODEL)
     assert light.apply(look(), truth(t=1.0)).key == light.apply(look(), truth(t=2.0)).key
 
 
 def test_effects_from_elsewhere_are_looked_at(look, truth):
-    """The result of an effect outside the digest is not remembered: it gives an array."""
+    """An effect outside the digest returns an array, so its result is not remembered."""
 
     class Upside(Effect):
         UNIT, LEAST, MOST = "times", 0.0, 1.0
@@ -162,7 +163,7 @@ def test_effects_from_elsewhere_are_looked_at(look, truth):
 
 
 def test_other_code_has_another_digest(tmp_path):
-    """The memory's key changes with any file that affects detection, and with no other."""
+    """The memory's key changes with any file that affects detection, and with no other file."""
     root = tmp_path / "selfdrive"
     copytree(ROOT, root)
     before = seeing_digest(root)

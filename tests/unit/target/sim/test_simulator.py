@@ -14,7 +14,7 @@ from selfdrive.sim.simulator import Simulator
 
 
 class Script:
-    """Replaces the controller: records its input and sends `commands(step)`."""
+    """Replaces the controller. It records its input and sends `commands(step)`."""
 
     def __init__(self, commands=lambda step: (0, 0, 0)):
         self.commands = commands
@@ -49,7 +49,7 @@ def drive(scenario, script, steps):
 
 
 def test_a_command_acts_in_the_next_step(s1):
-    """A command of step k moves the car in step k + 1, and row k shows the active commands."""
+    """A command of step k moves the car in step k + 1. Row k shows the active commands."""
     script = Script(lambda step: (-384, 51, 0) if step == 3 else (0, 0, 0))
     trace = drive(s1, script, 8).result().trace
     assert np.flatnonzero(trace["brake"]).tolist() == [4]
@@ -84,7 +84,7 @@ def test_buttons_reach_the_bus(s1):
 
 
 def test_truth_of_a_coasting_run(s1):
-    """The first rows equal the original's plant to its printed digits, and HWT is distance over speed."""
+    """The first rows match the original's plant to all printed digits. HWT is distance over speed."""
     trace = drive(s1, Script(), 101).result().trace
     row = {name: trace[name][100] for name in ("d_rel", "v_rel", "v_ego", "a_ego", "hwt")}
     expected = {"d_rel": 91.058, "v_rel": -8.7637, "v_ego": 26.645, "a_ego": -0.17485, "hwt": 3.4174}
@@ -93,14 +93,14 @@ def test_truth_of_a_coasting_run(s1):
 
 
 def test_hwt_at_standstill_is_infinite(s1):
-    """A standing car has no headway time."""
+    """A standing car has infinite headway time."""
     trace = drive(replace(s1, speed=0.0), Script(lambda step: (0, 255, 0)), 5).result().trace
     assert trace["v_ego"][-1] == 0.0
     assert np.isinf(trace["hwt"][-1])
 
 
 def test_free_road(s1):
-    """Without a lead the object ahead stays at 200 m and at the host's speed, for truth, radar and camera."""
+    """Without a lead, truth, radar and camera have an object 200 m ahead at the car's speed."""
     script = Script()
     result = drive(replace(s1, lead=None), script, 50).result()
     assert set(result.trace["d_rel"]) == {200.0}
@@ -139,7 +139,7 @@ def test_hazards_and_alerts_in_the_record(s1):
 
 
 def test_trace_channels(s1):
-    """Every channel has one value a step, of its type, including the controller's own view."""
+    """Every channel has one value per step, with the right type. This includes the controller's own view."""
     script = Script()
     script.radar_state = SimpleNamespace(lead_one=LeadData(status=True, d_rel=50.0, v_lead_k=17.0))
     script.controlsd.plan = Plan(v_target=25.0, source="mpc2")
@@ -155,7 +155,7 @@ def test_trace_channels(s1):
 
 
 def test_a_result_may_be_taken_on_the_way(s1):
-    """Asking for the result does not disturb a run."""
+    """Reading the result during a run does not disturb the run."""
     simulator = drive(s1, Script(), 10)
     early = simulator.result()
     simulator.step()

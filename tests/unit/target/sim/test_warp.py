@@ -1,4 +1,4 @@
-"""Regions of warped images have OpenCV's bits of the whole, from C as from OpenCV."""
+"""Regions of warped images have the bits of OpenCV's whole image, in C and with OpenCV."""
 
 import ctypes
 import subprocess
@@ -29,7 +29,7 @@ def library(all_compiled):
 
 
 def moves(random):
-    """Homographies of cars slightly, far or absurdly off the lane's middle; and impossible ones."""
+    """Return homographies of cars slightly, far or absurdly off the middle, and impossible ones."""
     for offset, heading in random.normal(0.0, 1.0, (12, 2)) * ((0.5, 0.02),):
         yield product(product(np.linalg.inv(TO_CAR), car_to_road(0.0, offset, heading)), TO_CAR)
     for offset, heading in ((9.0, 0.4), (-30.0, 1.5), (0.0, 3.0)):
@@ -48,7 +48,7 @@ def sources(random):
 
 
 def test_a_region_is_that_of_opencvs_whole():
-    """With any matrix, the reference's region equals the cut of OpenCV's whole result."""
+    """With any matrix, the region equals the slice of OpenCV's whole result."""
     random = np.random.default_rng(1)
     for matrix in moves(random):
         flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -62,7 +62,7 @@ def test_a_region_is_that_of_opencvs_whole():
 
 @needs_compiler
 def test_compiled_warps_have_the_same_bits(library):
-    """The bits agree in any region, for contiguous and cut images."""
+    """The bits agree in any region, for contiguous images and slices."""
     if not agrees(library):
         pytest.skip("OpenCV calculates in another way here")
     random, fast = np.random.default_rng(2), CompiledWarp(library)
@@ -109,7 +109,7 @@ def test_pictures_of_any_size_are_warped(library, shape):
 
 @needs_compiler
 def test_what_is_no_grey_picture_is_left_to_opencv(library):
-    """A fault may make a float image, which is left to OpenCV."""
+    """A float image, which a fault can produce, is warped by OpenCV."""
     source = np.random.default_rng(4).random(SHAPE).astype(np.float32)
     region = Region(5, 9, 3, 200)
     assert np.array_equal(CompiledWarp(library)(source, np.eye(3), region), source[region.part])
@@ -117,7 +117,7 @@ def test_what_is_no_grey_picture_is_left_to_opencv(library):
 
 @needs_compiler
 def test_another_opencv_is_left_alone(library, monkeypatch):
-    """If OpenCV has other bits than the compiled warp, OpenCV warps, and no library is named."""
+    """If OpenCV's bits differ from the compiled warp's, OpenCV warps and the run names no library."""
 
     def rounds_otherwise(source, matrix, region):
         return warp(source, matrix * (1.0 + 1e-7), region)
@@ -130,7 +130,7 @@ def test_another_opencv_is_left_alone(library, monkeypatch):
 
 @needs_compiler
 def test_without_a_library_opencv_warps(library):
-    """Without a library OpenCV warps, and no library is named."""
+    """Without a library, OpenCV warps and the run names no library."""
     assert isinstance(library.code, ctypes.CDLL)
     folder, compiled._folder = compiled._folder, None
     assert build_warp() == (warp, "")
