@@ -33,21 +33,22 @@ def run(
 ) -> Run:
     """Run a campaign (a name in the library, or a file) in the run folder `out`, or resume it there.
 
-    Experiments that have a result are not rerun. If `out` holds a frozen plan, the run uses it; choices that
-    you do not give are the frozen ones.
+    Experiments that have a result are not rerun. If `out` holds a frozen plan, the run uses it. For choices
+    that you do not give, the frozen ones apply.
 
     * `workers`: number of processes; 0: only this one.
     * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
     * `reviewed`: refuse to run mutants without an approval.
     * `accept_versions`: resume with another Python or other packages than before, and note it.
     * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. The
-      workers of that cluster run the experiments; `workers` only serve the checks before.
+      workers of that cluster run the experiments; `workers` then applies only to the checks before the
+      campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.
     * `progress`: called about twice a second, from another thread.
 
-    `Run.summary` describes the result of this call. Harness errors, a full disk or an interruption end in an
-    IncompleteRun warning; the same call then resumes the run. MutatorError for invalid input; CheckFailed if
-    an approval is missing, or if the checks before the campaign or the equivalence check fail.
+    `Run.summary` describes the result of this call. After harness errors, a full disk or an interruption, an
+    IncompleteRun warning is issued; the same call then resumes the run. MutatorError for invalid input;
+    CheckFailed if an approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
     check_whole("workers", workers)
     if choices is not None:

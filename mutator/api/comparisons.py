@@ -25,7 +25,7 @@ SHOWN = 3  # tables shown in a notebook: endings, changes, rates
 class RunComparison:
     """Two runs, matched experiment by experiment; `comparison` has all details."""
 
-    comparison: Comparison  #: all that is known of the pairs
+    comparison: Comparison  #: the comparison, with all details of the pairs
 
     def __repr__(self) -> str:
         names = self.comparison.names

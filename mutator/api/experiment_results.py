@@ -153,7 +153,7 @@ class ExperimentResult(ABC):
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     """Return a trace as a frame by time in s; `attrs["units"]` has the units of the manifest's channels.
 
-    A channel with its own times keeps its newest value.
+    A channel that has no value at a time keeps its newest one.
     """
     import pandas as pd
 

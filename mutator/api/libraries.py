@@ -94,13 +94,14 @@ def check_target(
     drive: bool = False,
     scenarios: Sequence[str] = (),
 ) -> list[Finding]:
-    """Check a target and its faults before a campaign: what keeps them off the fork engines, and draws that
-    nothing uses.
+    """Check a target and its faults before a campaign. The findings are what prevents them from running on
+    the fork engines, and entries of `draw` that no injection uses.
 
     With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all).
-    The findings then say whether the target is deterministic, with the likely cause if not; which statements
-    of faults and triggers no run reaches; and which canaries do no harm. `target` names a manifest; default:
-    the library's only one. MutatorError for a library with problems, which `check_library` lists.
+    The findings then also cover whether the target is deterministic (and the likely cause if not), statements
+    of faults and triggers that no run reaches, and canaries that do not reach their hazard. `target` names a
+    manifest; default: the library's only one. MutatorError for a library with problems, which `check_library`
+    lists.
     """
     found = open_workspace(workspace)
     name = found.target_name(target)

@@ -130,7 +130,7 @@ class MutantSet:
     ) -> list[dict[str, str]]:
         """Write patches, index.csv and, with `trees`, whole source trees into a new or empty folder.
 
-        Returns the index: one row for each mutant. `step` is called after each pair.
+        Returns the index: one row for each mutant. `step` is called after each pair of fault and trigger.
         """
         return write_mutants(self.bench, self.pairs, Path(out), trees=trees, step=step)
 
@@ -145,7 +145,8 @@ def write_mutants(
 ) -> list[dict[str, str]]:
     """Write `out`/patches, `out`/index.csv and, with `trees`, `out`/trees; returns the index.
 
-    `out` must be new or empty, so that old and new patches do not mix. `step` is called after each pair.
+    `out` must be new or empty, so that old and new patches do not mix. `step` is called after each pair of
+    fault and trigger.
     """
     make_folder(out)
     if any(out.iterdir()):

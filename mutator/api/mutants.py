@@ -15,7 +15,8 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class BuiltMutant:
-    """A fault with a trigger, built into a target. The same three always have the same `id`."""
+    """A fault with a trigger, built into a target. The `id` depends only on fault, trigger, target and
+    templates."""
 
     fault: Fault  #: the fault that is built in
     trigger: Trigger  #: when it is active
@@ -73,11 +74,11 @@ def build_mutant(
     """Build a fault into the target's source, without running or writing anything.
 
     `fault` is a Fault, a spec (`sensor/bias`), one of its variants (`sensor/bias/distance`), or a spec file.
-    It gets `value`, in the spec's unit, or else the middle one of the drawn values. `trigger` is a Trigger, a
-    context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest; default:
-    the library's only one.
+    The fault gets `value`, in the spec's unit, or else the middle one of the drawn values. `trigger` is a
+    Trigger, a context (`C2`), a time in s, `always`, or a condition (`gap <= 2`). `target` names a manifest;
+    default: the library's only one.
 
-    MutatorError for a mistake in these, and if a place is not found in the source; InvalidMutant (a
+    MutatorError for an invalid argument, and if a place is not found in the source; InvalidMutant (a
     MutatorError) if the mutant does not compile.
     """
     bench = Bench.of(workspace, target)

@@ -18,8 +18,8 @@ def plan(
 ) -> Plan:
     """Expand a campaign (a name in the library, or a file) into its experiments, without running any.
 
-    With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments. It is
-    then written seed by seed, and the experiments of a very large plan are read on demand.
+    With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments. In
+    that case the plan is written seed by seed, and the experiments of a very large plan are read on demand.
 
     MutatorError for a mistake in campaign or choices, if no experiment is left, and for a folder with other
     content.
@@ -29,7 +29,7 @@ def plan(
         return make_plan(found, campaign, choices)
     planning = Planning(found, campaign, choices)
     folder, tally = freeze_and_tell(planning, Path(out), found)
-    return load_plan(folder, tally)  # knows the cost of a run, if one was made here
+    return load_plan(folder, tally)  # reading it back adds the cost measured in this folder, if any
 
 
 def not_forkable(plan: Plan, workspace: Workspace) -> dict[str, str]:

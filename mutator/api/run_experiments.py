@@ -84,7 +84,7 @@ class RunExperiment(ExperimentResult):
             same_as_record=same if self.record else None,
             temporary=temporary,
         )
-        if keep and trial.save_plot(self.plot_file) and same:  # only if it belongs to the record
+        if keep and trial.save_plot(self.plot_file) and same:  # keep a series only if it matches the record
             golden, faulty = (load_trace(manifest, place) for place in (single.golden, single.faulty))
             keep_series(folder.path, manifest, golden, faulty, single.record)
         return trial
@@ -99,7 +99,7 @@ class RunExperiment(ExperimentResult):
 
     @property
     def stretch(self) -> Stretch | None:
-        """What the experiment was run with; None until it has run."""
+        """The versions and machine that the experiment ran with; None until it has run."""
         return self.run.folder.stretch_of(self.id)
 
     @property

@@ -170,8 +170,8 @@ class Run(RunContents):
     def report(self, *, anew: bool = False) -> building.Report:
         """Write the report, Markdown and one HTML page, unless it is up to date.
 
-        `anew` always writes it. No experiment is rerun for it. Without a library, the report shows the
-        results only.
+        With `anew`, write it even if it is up to date. No experiment is rerun. Without a library, the report
+        shows only the results.
         """
         workspace = self._workspace_if_any()
         if not anew:

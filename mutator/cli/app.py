@@ -139,8 +139,8 @@ for module in (
 
 
 def program() -> int:
-    """Run the program `mutator`. With unfinished experiments it exits at once: a library that ran out of
-    memory while loading may crash when the interpreter unloads it."""
+    """Run the program `mutator`. If experiments are unfinished, end the process without the interpreter's
+    cleanup: a library that ran out of memory while loading may crash during cleanup."""
     code = main()
     if code == EXIT_HARNESS_ERRORS:
         sys.stdout.flush()
@@ -150,13 +150,13 @@ def program() -> int:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line and return its exit code. A user's mistake never ends in a traceback."""
+    """Run one command line and return its exit code. Wrong input never causes a traceback."""
     _open_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # as on standard error
+        sys.stdout.reconfigure(errors="backslashreplace")  # standard error does the same
     try:
         code = _answer(sys.argv[1:] if argv is None else argv)
-        sys.stdout.flush()  # now: when the interpreter exits, a closed pipe would be an error
+        sys.stdout.flush()  # at exit, the interpreter would report a closed pipe as an error
     except BrokenPipeError:  # the reader has closed the pipe
         discard(sys.stdout)
         return EXIT_OK
@@ -164,8 +164,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _open_streams() -> None:
-    """Replace closed standard streams by null devices. Otherwise a new file could get a standard stream's
-    number, and its text."""
+    """Replace closed standard streams by null devices. Otherwise a file opened later could get the number of
+    a standard stream, and output meant for that stream."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             file = os.open(os.devnull, os.O_RDWR)
@@ -192,7 +192,7 @@ def _answer(words: Sequence[str]) -> int:
         return EXIT_OK
     except typer.Exit as e:
         return e.exit_code
-    except SystemExit as e:  # from completion
+    except SystemExit as e:  # raised by shell completion
         return int(e.code or 0)
     except MutatorError as e:
         show_error(e)
@@ -212,7 +212,7 @@ def _answer(words: Sequence[str]) -> int:
 
 
 def _known(error: Exception) -> MutatorError | None:
-    """Turn an error of the machine that the user can fix into a MutatorError."""
+    """Return a MutatorError for an error that the user can fix on the machine; None for any other error."""
     where = getattr(error, "filename", None)
     if is_disk_full(error):
         return disk_full(where)

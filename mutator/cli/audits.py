@@ -45,7 +45,7 @@ def verify(
 ) -> None:
     """Audit a run folder and print one page to keep.
 
-    Exit code 1 if anything was changed or does not follow from the plan and the sources.
+    The exit code is 1 if anything was changed or does not follow from the plan and the sources.
     """
     terminal = Terminal(as_json)
     with terminal.wait("verifying"):

@@ -191,7 +191,7 @@ def run(
     stills: Annotated[
         bool,
         typer.Option(
-            help="Rerun the worst camera experiments for stills in the report: one in 20, at most ten, "
+            help="Rerun the worst camera experiments to add stills to the report: one in 20, at most ten, "
             "about two minutes."
         ),
     ] = True,
@@ -228,14 +228,14 @@ def run(
             written = _report(out, made, notify)
     except KeyboardInterrupt:
         raise typer.Abort(f"interrupted; finished experiments are kept; resume: {resume_command()}") from None
-    assert made.summary is not None  # it has just run
+    assert made.summary is not None  # `mutator.run` always sets it
     _print_end(terminal, out, made, made.summary, written)
     if made.summary.exit_code:
         raise typer.Exit(made.summary.exit_code)
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
-    """Take stills for the report; without them the run still succeeds."""
+    """Take stills for the report; if that fails, the run still succeeds."""
     if problem := run.take_stills(notify, workers=workers):
         terminal.note(f"no stills of {problem}")
 

@@ -15,7 +15,7 @@ from mutator.errors import EXIT_CHECK_FAILED, EXIT_HARNESS_ERRORS, MutatorError
 if TYPE_CHECKING:
     from mutator.comparison.comparison import Comparison, Finding
 
-NAMED = 20  # experiments named in the terminal; the written comparison has all
+NAMED = 20  # experiments listed in the terminal; the written comparison lists all of them
 GATES = (
     "new-hazard, other-hazard, higher-severity, earlier-hazard, lost-alert, worse, new-crash, harness-error, "
     "unmatched, severity:CLASS (S0 to S3: a contact of that class or worse, after a milder one or none)"
@@ -137,7 +137,7 @@ def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") 
 def _judge(
     terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
 ) -> None:
-    """Apply the gate: exit with 1 on a finding, with 3 when results are missing."""
+    """Apply the gate: exit with 1 if there are findings, or with 3 if results are missing."""
     for finding in failing[:NAMED]:
         terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
     if more := failing[NAMED:]:

@@ -48,7 +48,7 @@ def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def _library(ctx: typer.Context) -> Path:
-    """Return the library that the options before or after the verb, or the environment, name."""
+    """Return the library named by the options before or after the verb, or else by the environment."""
     given: dict[str, Any] = {}
     for one in (ctx.find_root(), ctx):
         given |= {name: one.params.get(name) for name in ("root", "library") if one.params.get(name)}

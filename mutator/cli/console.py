@@ -84,7 +84,7 @@ class Terminal:
         right: Sequence[int] = (),
         total: bool = False,
     ) -> None:
-        """Print a table; columns in `right` are right-aligned; with `total`, the last row is set apart."""
+        """Print a table; columns in `right` are right-aligned; `total` sets the last row apart."""
         cells = [[_cell(c) for c in row] for row in rows]
         if self.as_json:
             return
@@ -161,7 +161,8 @@ def option(argument: str) -> str:
 
 
 def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
-    """Return the error with options in place of API arguments; `own` holds the command's exceptions."""
+    """Return the error with options in place of API arguments; `own` has the options that have different
+    names in this command."""
     if error.argument is None:
         return error
 

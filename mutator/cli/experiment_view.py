@@ -74,8 +74,8 @@ def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -
 
 
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
-    """Print the verdict of an experiment that ran, and its events with times from the activation. Differences
-    from golden count up to the end of the drive."""
+    """Print the verdict of an experiment that has run, and its events with times since the activation.
+    Differences from golden after the end of the drive do not count."""
     record = result.record
     assert record is not None
     ending = record.outcome.value if record.outcome else record.status.value

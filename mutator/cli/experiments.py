@@ -66,7 +66,7 @@ def show(
         str | None,
         typer.Option(metavar="EXPR", help="List only experiments whose results match, e.g. 'delta_v > 5'."),
     ] = None,
-    limit: Annotated[int, typer.Option(min=1, help="List this many.")] = 10,
+    limit: Annotated[int, typer.Option(min=1, help="List at most this many experiments.")] = 10,
     patch_alone: Annotated[
         bool,
         typer.Option("--patch", help="Print only the whole patch, including the probe."),
@@ -185,7 +185,7 @@ def rerun(
 ) -> None:
     """Rerun one experiment and compare the result.
 
-    Exit code 1 if the new record differs from the campaign's.
+    The exit code is 1 if the new record differs from the campaign's record.
     """
     from mutator.api.experiment_results import describe
     from mutator.cli import experiment_view

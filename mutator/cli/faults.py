@@ -285,7 +285,8 @@ def _operator_choice(
     seed: int | None,
     others: bool,
 ) -> "mutator.OperatorChoice | None":
-    """Collect the operator options; None without any. `others`: specs or a campaign are named too."""
+    """Collect the operator options; return None if none are given. `others`: whether specs or a campaign are
+    given as well."""
     if operators is None:
         if places or scenario or all_lines or sample is not None:
             raise MutatorError(

@@ -47,7 +47,7 @@ def stpa(
     workspace = place.workspace()
     problems = mutator.check_hazard_analysis(workspace, target=manifest)
     analysis = workspace.analysis()
-    assert analysis is not None  # it has just been checked
+    assert analysis is not None  # the check above fails without an analysis
     if svg:
         _write(svg, mutator.draw_control_structure(workspace))
     if as_json:
@@ -133,7 +133,7 @@ def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
 
 
 def _show_table(terminal: Terminal, table: "ContextTable") -> None:
-    """Print a context table: the trigger of each row, and what is hazardous there."""
+    """Print a context table: for each row, its trigger and which control actions are hazardous in it."""
     actions = list(table.rows[0].actions)
     heads = ["context", "trigger"]
     heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]

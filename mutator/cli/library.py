@@ -150,7 +150,9 @@ def check(
     manifest: Manifest = None,
     drive: Annotated[
         bool,
-        typer.Option("--drive", help="Also make golden runs: is the target deterministic, how do they end?"),
+        typer.Option(
+            "--drive", help="Also make golden runs: how they end, and whether they are deterministic."
+        ),
     ] = False,
     scenario: Annotated[
         list[str] | None,
@@ -165,9 +167,9 @@ def check(
 ) -> None:
     """Check library, templates and anchors against the target.
 
-    Prints each problem with its file and line. If there is none, lists what keeps the target or its faults
-    off the fork engines, and draws that nothing uses. Exit code 1 for a problem, or for a golden run or
-    canary that would stop a campaign from starting.
+    Prints each problem with its file and line. If there is none, lists what prevents the target or its faults
+    from running on the fork engines, and entries of `draw` that no injection uses. The exit code is 1 if
+    there is a problem, or if a golden run or canary would stop a campaign from starting.
     """
     terminal = Terminal(as_json)
     if scenario and not drive:
@@ -219,7 +221,8 @@ def _line(text: str) -> str:
 def doctor(as_json: Json = False, *, place: Place) -> None:
     """Check whether this machine can run campaigns.
 
-    Checks the interpreter, packages, machine, library and target. Exit code 1 if a campaign could not run.
+    Checks the interpreter, packages, machine, library and target. The exit code is 1 if a campaign could not
+    run.
     """
     terminal = Terminal(as_json)
     with terminal.wait("looking around"):

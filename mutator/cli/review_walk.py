@@ -19,8 +19,8 @@ KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 def walk_through(
     terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], reviewer: Callable[[], str]
 ) -> None:
-    """Show each new or changed group, ask, and save each decision at once. If somebody else has decided in
-    the meantime, ask again.
+    """Show each new or changed group, ask for a decision, and save it at once. If somebody else has decided
+    in the meantime, ask again.
 
     MutatorError if there is no terminal.
     """

@@ -51,7 +51,7 @@ class Verbs(TyperGroup):
     """The verbs of `review`; the default is `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Insert `list` where neither a verb nor help is asked for."""
+        """Insert `list` if the first argument is neither a verb nor a request for help."""
         if not args or (args[0].startswith("-") and args[0] not in ("-h", "--help")):
             args = ["list", *args]
         return super().parse_args(ctx, args)
@@ -139,7 +139,7 @@ def show(
 def _write_pictures(
     terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
 ) -> dict[str, dict[str, str]]:
-    """Write them and print the value that each shows; returns the files by group."""
+    """Write the frames of groups, and print the value that each frame shows; returns the files by group."""
     from mutator.api.review_pictures import write_pictures
 
     with terminal.wait("drawing"):

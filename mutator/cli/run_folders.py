@@ -34,7 +34,7 @@ def show_counts(terminal: Terminal, run: "Run") -> None:
     score = run.mutation_totals()
     if score.rows:
         terminal.table(score.heads, score.rows, right=tuple(score.right))
-    with suppress(MutatorError):  # only a library says which alerts count
+    with suppress(MutatorError):  # the library defines which alerts count
         if note := run.alerts_note():
             terminal.say(note)
     if run.folder.stop_note:

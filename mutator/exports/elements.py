@@ -2,7 +2,7 @@
 
 A mutant is a fault at its first location, with its value; a mutant that changes an expression's value
 replaces only the expression. Its tests are runs: a scenario and a trigger. *Killed* means that a run ended in
-a hazard, because fault-free runs pass the hazard checks. So a high score speaks against the controller;
+a hazard, because fault-free runs pass the hazard checks. So a high score is bad for the controller, and
 thresholds are set so that no score is green.
 """
 
@@ -87,15 +87,15 @@ def _line(manifest: TargetManifest, injection: Injection) -> int:
 
 
 def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
-    """What the fault's first injection replaces, and the replacement."""
+    """The text that the fault's first injection replaces, and the replacement."""
     first = fault.injections[0]
     file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
     name, span = injection_id(0, first), file.span(first.location)
     if first.location.anchor.kind in VALUE_ANCHORS:
         expression, changed = replaced_value(file, model, first, name)
-        # in parentheses if an adjacent operator could bind more tightly
+        # `enclosed` adds parentheses if an adjacent operator could bind more tightly
         return _located(file, expression.start, expression.end, enclosed(changed))
-    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the statement is omitted
+    if fault.module == OPERATORS and model.kind is SnippetKind.GUARD:  # the mutant omits the statement
         line, last = file.lines[span[0]], file.lines[span[1] - 1].rstrip(b"\r\n")
         start = len(line) - len(line.lstrip())
         return _located(file, (span[0], start), (span[1] - 1, len(last)), "pass")
@@ -115,7 +115,7 @@ def _located(
 
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
-    """The anchored lines as a whole (for a function's entry the line there), and their replacement."""
+    """All anchored lines (at a function's entry, the line there), and their replacement."""
     first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0

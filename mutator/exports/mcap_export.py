@@ -118,8 +118,8 @@ class Content:
         return written.finish()
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
-        """The kept traces, if both runs have one; never reruns. MutatorError if a trace is not the
-        campaign's: the series would be silently coarser."""
+        """The kept traces, if both runs have one; never reruns. MutatorError if a trace does not match its
+        record: using the coarser series instead would hide this."""
         kept = self._folder.path / "traces" / experiment_id
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
@@ -129,7 +129,7 @@ class Content:
             return None
         if not self._traces.is_kept(experiment_id):
             raise MutatorError(
-                f"the kept trace of {experiment_id} is not the one of its record",
+                f"the kept trace of {experiment_id} does not match its record",
                 where=faulty,
                 expected="the complete trace of the campaign's run",
                 remedy=f"rerun it: {making_again(self._folder.path, experiment_id)}, or delete {kept}",

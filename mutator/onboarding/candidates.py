@@ -10,7 +10,7 @@ from mutator.onboarding.survey import Module, Survey
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
-_WORDS = {  # names of steps, by certainty
+_WORDS = {  # names of step functions; a higher number is more certain
     6: "step update control compute_control run_step",
     5: "act compute compute_command drive get_control",
     4: "__call__ tick calculate decide iterate acceleration steering",
@@ -20,10 +20,10 @@ _WORDS = {  # names of steps, by certainty
 _STEP = {word: score for score, words in _WORDS.items() for word in words.split()}
 _CONTROLLER = re.compile("control|pid|pilot|planner|agent|driver|regulator|tracker|cruise|mpc")
 _WORLD = re.compile("env|sim|plant|world|render|viewer|logger|graphics|mixin|wrapper|test")
-_MOST_STATE = _MOST_VALUES = 6  # more than these do not add certainty
-_IN_CONTROLLER = 3  # the file name suggests a controller
-_NO_HINT = -6  # neither name nor calls suggest a step
-_NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # return numbers
+_MOST_STATE = _MOST_VALUES = 6  # more attributes or values than this do not add certainty
+_IN_CONTROLLER = 3  # points if the file name suggests a controller
+_NO_HINT = -6  # points if neither the name nor calls suggest a step
+_NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|norm")  # these return numbers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -47,7 +47,7 @@ class LoopCandidate:
     module: str
     path: str
     line: int
-    owner: str | None  # class
+    owner: str | None  # its class
     function: str
     needs: tuple[str, ...]
     builds: tuple[str, ...]
@@ -78,7 +78,7 @@ def _of_module(module: Module, looped: Counter[str]) -> Iterator[LoopCandidate]:
 
 
 def _may_step(function: Function) -> bool:
-    """Whether it is public and not a property, class method, coroutine or empty."""
+    """Whether the function is public, and neither a property, class method or coroutine nor empty."""
     if isinstance(function, ast.AsyncFunctionDef):
         return False
     if function.name.startswith("_") and function.name not in _STEP:

@@ -89,7 +89,7 @@ def _distribution(name: str) -> str | None:
 
 
 def _packages_in(folder: Path) -> Iterator[str]:
-    """Packages, with or without `__init__.py`, and flat modules of a folder, without tests and the like."""
+    """Packages (with or without `__init__.py`) and flat modules of a folder, except tests and the like."""
     try:
         entries = sorted(folder.iterdir())
     except OSError as err:
@@ -128,7 +128,7 @@ def _importable(name: str) -> bool:
 
 def _parsed(path: Path) -> ast.Module:
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about the controller's code
+        warnings.simplefilter("ignore")  # warnings concern the controller's code
         return ast.parse(path.read_bytes())
 
 

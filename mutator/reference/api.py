@@ -22,8 +22,8 @@ _INTRO = """\
 [changelog](../../CHANGELOG.md) announces every change. Anything else below `mutator` may change at any time.
 The import is fast: a name loads what it needs when you first use it.
 
-Nothing prints. Mistakes raise [MutatorError](#mutatorerror). A notebook shows most objects as a small table.
-[Use mutator in a notebook](../how-to/use-in-a-notebook.md) has examples.
+No function prints. Invalid input raises [MutatorError](#mutatorerror). A notebook shows most objects as a small
+table. [Use mutator in a notebook](../how-to/use-in-a-notebook.md) has examples.
 
 ## Shared arguments
 """
@@ -43,7 +43,7 @@ _ARGUMENTS = (
     ("`target`", "the name or file of a target's manifest; default: the only one in the library"),
     (
         "`value`, `reading`, `seed`",
-        "of a fault given by name: value in the spec's unit, reading, seed of the draw",
+        "for a fault given by name: its value in the spec's unit, its reading, and the seed of the draw",
     ),
     ("`choices`", "`Choices` that override the campaign file"),
 )

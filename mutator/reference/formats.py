@@ -69,7 +69,7 @@ def manifests(workspace: Workspace) -> str:
     """Return the text of docs/reference/target-manifest.md."""
     return _page(
         generated("Target manifests"),
-        "A manifest at `fault_library/targets/<name>.yaml` tells the harness everything that it knows "
+        "A manifest at `fault_library/targets/<name>.yaml` holds everything that the harness knows "
         "about a controller.\nTo write one, see [Add a target](../how-to/add-a-target.md). "
         "[Channels](channels.md) lists "
         "what the manifests of this library\nrecord.\n",
@@ -128,7 +128,7 @@ def _readings() -> Iterator[str]:
         "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
         f"{' and '.join(f'`{name}`' for name in UNDECLARED.names)}. "
         "The first is the\ndefault: every variant must have it, and it "
-        "replaces readings that a variant does not have. The first key of the file is\n"
+        "is used in place of readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
     yield from sections("fault-spec.md", ReadingsModel, below=2)

@@ -72,13 +72,13 @@ def _columns(columns: Iterable[Column]) -> Iterator[str]:
 
 
 def channels(workspace: Workspace) -> str:
-    """docs/reference/channels.md."""
+    """Return the text of docs/reference/channels.md."""
     manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
         generated("Channels and units"),
-        "What is observed, recorded and compared of each target of the library, as its "
-        "[manifest](target-manifest.md) declares.\nInternally, all values are in SI units and radians. "
-        "Files and tables may "
+        "This page lists what is observed, recorded and compared for each target of the library, as the "
+        "target's [manifest](target-manifest.md) declares.\nInternally, all values are in SI units and "
+        "radians. Files and tables may "
         "use other units, which are part of the\nnames there ([units](fault-spec.md#units)).\n",
     ]
     for manifest in manifests:

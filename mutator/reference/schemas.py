@@ -76,8 +76,8 @@ def file_formats(declared: Readings) -> tuple[Format, ...]:
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
-    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), the file's
-    first.
+    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`). The schema of
+    the file comes first.
 
     The schema of a model has the class's title, its docstring in one line, and descriptions of its
     properties.
@@ -105,7 +105,7 @@ def _described(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _clean(value: Any) -> Any:
-    """Drop titles and descriptions, many of them made up by pydantic, and shorten references."""
+    """Drop titles and descriptions, because pydantic generates many of them, and shorten references."""
     if isinstance(value, list):
         return [_clean(item) for item in value]
     if not isinstance(value, dict):

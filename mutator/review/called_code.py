@@ -18,13 +18,13 @@ from mutator.review.source_names import SUPER, Import, Module, Use, uses_in
 from mutator.targets.source_tree import SourceTree
 
 _Class = tuple[str, str]  # its file, its name
-_FURTHEST = 20  # longest chain of imports that a name is followed through
+_FURTHEST = 20  # most imports to follow for a name
 
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
     """A piece of the tree with source: `name` in the file at `path`, or the whole file (no name). For a
-    method, `me` is the class of the object, whose own methods override those of bases."""
+    method, `me` is the class of its object; methods of this class override those of its bases."""
 
     path: str
     name: str
@@ -40,14 +40,14 @@ class CalledCode:
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
         """The code that injected lines call in `data`, the mutated file at `path`.
 
-        Returns sources by place: `car/weather.py Rain`; for a file that is not Python, all of it.
+        Returns the source of each place, such as `car/weather.py Rain`. For a file that is not Python, this
+        is the whole file.
         """
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 
     def of_expressions(self, path: str, function: str, texts: Iterable[str]) -> dict[str, str]:
-        """The code that expressions in a function would call; text that is not an expression calls
-        nothing."""
+        """The code that expressions would call in a function. Text that is not an expression is ignored."""
         node, owner = self._module(path).function(function), function.rpartition(".")[0]
         found: list[Use] = []
         for text in texts:
@@ -66,7 +66,7 @@ class CalledCode:
         return {f"{one.path} {one.name}".strip(): found[one] for one in sorted(found)}
 
     def _beyond(self, place: _Place) -> Iterator[_Place]:
-        """The places that a place's source calls; a class already includes its methods."""
+        """The places that the source of this place calls. A class includes its methods."""
         module = self._module(place.path)
         for node in module.nodes_of(place.name) if place.name else [module.tree]:
             uses = uses_in(node, place.name.rpartition(".")[0])
@@ -146,7 +146,7 @@ class CalledCode:
             yield from self._of_bases(owner, name, me, depth)
 
     def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The same for `super().name`: bases only."""
+        """The method that `super().name` refers to in an object of `me`: that of the bases."""
         path, inside = owner
         for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):

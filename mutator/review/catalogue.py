@@ -39,10 +39,10 @@ class Group:
     line: location and template.
 
     `shapes` are its diffs with holes, several if a template writes different lines for different numbers.
-    Their members are `faults`, by id. `runs` is the number of its experiments in a campaign, None without
-    one. `trigger` and `hold` list the kinds, joined by `or`.
-    `values` is the range of each parameter in the specs. `seen` is the text that a decision is bound to.
-    `made_from` are the spec files and templates, with their YAML.
+    Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None if no
+    campaign is given. `trigger` and `hold` list the kinds, joined by `or`. `values` is the range of each
+    parameter in the specs. `seen` is the text that a decision is bound to. `made_from` are the spec files and
+    templates, with their YAML.
     """
 
     id: str
@@ -84,7 +84,7 @@ def of_plan(workspace: Workspace, plan: Plan) -> tuple[Group, ...]:
     files = [one.file for one in plan.campaign.faults if one.file]
     named = [
         workspace.spec(file) for file in files if file.is_file()
-    ]  # a run's copy of a campaign has no targets for its links
+    ]  # links in a run's copy of a campaign have no targets
     specs = (*workspace.specs(), *named)
     return _Catalogue(workspace.fault_models(), manifest, specs).groups(members, runs)
 
@@ -99,8 +99,8 @@ def of_library(
 ) -> tuple[Group, ...]:
     """The groups of the library's faults; the probe's group is last.
 
-    Each fault is built under every context of the tables and at a random time, as in campaigns that do not
-    set the hold. Without `reading`, all readings are included. `specs` are spec files or globs (none: all);
+    Each fault is built with every context of the tables and with a random time, as in campaigns that do not
+    set `hold`. Without `reading`, all readings are included. `specs` are spec files or globs (none: all);
     MutatorError if one matches nothing.
     """
     models = workspace.fault_models()
@@ -213,7 +213,7 @@ class _Catalogue:
         )
 
     def _material_of_operator(self, fault: Fault, operator: Operator) -> Material:
-        """The texts that all mutants of an operator in a function follow from, whichever were drawn."""
+        """The texts that determine all mutants of an operator in a function, drawn or not."""
         at, tree = fault.injections[0].location, self.manifest.tree
         file, facts = parsed(tree, at.path), facts_of(tree, at.path)
         found = list(mutations_of(file, facts, at.function, self.models, [operator]))

@@ -21,7 +21,8 @@ class _Commit:
     others: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
-        """Whether this reviewer wrote it: `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`."""
+        """Whether this reviewer is an author of the commit: `Jane Doe`, `jane@x.org` or `Jane Doe
+        <jane@x.org>`."""
         return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
 
 

@@ -37,7 +37,7 @@ class Kind(StrEnum):
 
     APPROVE = "approve"
     REJECT = "reject"
-    CLEAR = "clear"  # take the decision back
+    CLEAR = "clear"  # withdraw the decision
     REMARK = "remark"
     FLAG = "flag"
     UNFLAG = "unflag"
@@ -57,7 +57,7 @@ class Change:
 
 
 class Conflict(CheckFailed):
-    """Somebody else changed the review of these groups since the caller looked. Nothing was written.
+    """Somebody else has changed the review of these groups since the caller read it. Nothing was written.
 
     `groups` are their ids, `review` is the current review.
     """
@@ -113,7 +113,7 @@ class Review:
     def changes(self, group: Group) -> str:
         """A unified diff from what the reviewer saw to the current state.
 
-        Empty if the decision is valid or what was seen was not stored.
+        Empty if the decision is valid, or if the text that the reviewer saw was not stored.
         """
         decision = self.decision(group.id)
         if decision is None or not self.changed(group):
@@ -121,7 +121,7 @@ class Review:
         return seen_texts.changes(self.seen_path(group.id), decision.bound, group.seen)
 
     def seen_path(self, group: str) -> Path:
-        """The file with what was seen of a group."""
+        """The file with the text of a group that the reviewer saw."""
         return self.path.parent / "seen" / self.target / f"{group}.txt"
 
     def in_turn(self, groups: Iterable[Group]) -> list[Group]:
@@ -178,7 +178,7 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
 
 
 def _text_of(kind: Kind) -> str:
-    """The argument with a change's text."""
+    """The name of the API argument that holds the text of a change."""
     return "text" if kind is Kind.REMARK else "remark"
 
 
@@ -200,7 +200,7 @@ def _refuse_unseen(review: Review, changes: Sequence[Change], looked_at: Mapping
         "\n".join(["somebody else has reviewed these groups in the meantime:", *told]),
         where=review.path,
         expected="groups unchanged since you saw them",
-        remedy="look at them again, then decide (nothing was written)",
+        remedy="check these groups again, then decide (nothing was written)",
     )
     conflict.groups, conflict.review = tuple(one.id for one in unseen), review
     raise conflict
@@ -222,7 +222,7 @@ def _last_word(review: Review, group: Group) -> str:
 
 
 def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) -> Review:
-    """Store the changes and return the review; texts of what was seen are written first."""
+    """Store the changes and return the review; the texts that reviewers saw are written first."""
     at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
     entries = dict(review.entries)
     for change in changes:

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from mutator._common.hashing import content_id
 
-# Parameter -> least and greatest number, then values that are not finite numbers (`nan`), as text.
+# For each parameter: its least and greatest number, then values that are not finite (`nan`), as text.
 Values = Mapping[str, tuple[float | str, ...]]
 
 _WORDS = {
@@ -44,8 +44,8 @@ class Bound:
 class Decision:
     """The decision of `by` about a group, and the group's state at that time.
 
-    `at` is the time (UTC, ISO 8601), `commit` the library's, `tool` the version of mutator. They, `values`
-    and the digest of called code are None in decisions from older files.
+    `at` is the time (UTC, ISO 8601), `commit` the library's, `tool` the version of mutator. In decisions from
+    older files, `at`, `commit`, `tool`, `values` and the digest of called code are None.
     """
 
     group: str
@@ -71,7 +71,7 @@ class Decision:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """A line of text on a group; `at` as in a decision."""
+    """A line of text about a group; `at` is the time, as in a decision."""
 
     by: str
     at: str | None
@@ -80,7 +80,7 @@ class Remark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Flag:
-    """A mark to look at a group again."""
+    """A mark that asks for another look at a group."""
 
     by: str
     at: str

@@ -17,7 +17,7 @@ from mutator.workspace import Workspace
 
 SCHEMA = "reviewed/1"
 FILE = "reviewed.json"
-_MOST_IDS = 10  # in one printed command
+_MOST_IDS = 10  # most ids in one printed command
 
 
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
@@ -92,7 +92,8 @@ def share(group: Group) -> str:
 
 
 def _campaign(workspace: Workspace, plan: Plan) -> str:
-    """The campaign as commands name it: by name if the library has this text under it, else by file."""
+    """The campaign as commands name it: its name if the library's file of that name has the same text, else
+    its file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source

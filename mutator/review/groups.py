@@ -18,7 +18,7 @@ from mutator.mutants.readable_diffs import adds_file, file_patches
 from mutator.operators.names import operator_of
 from mutator.triggers.conditions import TIME, names_in
 
-Span = tuple[int, int, str]  # of a value in a patch: begin, end, name (empty: not yet known)
+Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
 
 HOLE = "\0"  # never in Python source
 _WORD = r"\w.\\\x80-\U0010ffff"  # next to a number: it continues, or is part of a name
@@ -79,8 +79,8 @@ class Shape:
 def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
     """The shapes of patches given as (key, name, patch), in the order of their first members.
 
-    Keys are the members' names. Patches with different `name`s never share a shape: the name is what else its
-    members have in common (see `group_label`), or empty.
+    Keys are the members' names. Patches with different `name`s never share a shape: the name states what else
+    the members have in common (see `group_label`), or is empty.
     """
     found: dict[tuple[str, str], _ShapeBuilder] = {}
     for key, name, patch in patches:
@@ -206,7 +206,7 @@ def _unused_name(label: str, taken: list[str]) -> str:
 
 def _spans(patch: str) -> Iterator[Span]:
     """The positions of values, from top to bottom."""
-    if HOLE in patch:  # not Python source: no holes
+    if HOLE in patch:  # no holes, because it is not Python source
         return
     begin = 0
     for section in file_patches(patch):

@@ -77,7 +77,7 @@ def fault_hunks(patch: str) -> str:
 
 
 def _named(texts: Mapping[str, str | Sequence[str]]) -> str:
-    """The texts one below the other, each under its name."""
+    """The texts, one after another, each under its name."""
     each = ((name, text if isinstance(text, str) else "\n".join(text)) for name, text in texts.items())
     return "\n".join(f"-- {name}\n{text.rstrip()}\n" for name, text in each)
 

@@ -43,7 +43,7 @@ MODEL = "image_effect"
 LEVELS = ("least", "middle", "most")
 MOST = 9  # values of a group that are drawn; three are shown
 CLEAR = 0.5  # minimum correlation of amount and change for ranking severity by amount
-QUALITY = 85  # of JPEG files
+QUALITY = 85  # quality of JPEG files
 LIMITS = Limits(cpu_s=60, wall_s=120)
 _SCHEMA = "pictures/1"
 _drawing = Lock()  # a page requests all images of a group at once: the first request draws them
@@ -130,7 +130,7 @@ class _Wanted:
 
 
 def _scenario(workspace: Workspace) -> Path:
-    """The library's first scenario: any road will do."""
+    """The library's first scenario. The choice does not matter, because any road shows the effect."""
     found = next(iter(workspace.scenarios.values()), None)
     if found is None:
         raise MutatorError(
@@ -227,7 +227,7 @@ def _run(
         ended = execution.status is Status.OK
         raise MutatorError(
             f"no image of {location.path} {location.function}: "
-            + ("the run never got there" if ended else execution.detail),
+            + ("the run never reached it" if ended else execution.detail),
             where=scenario,
             expected="a run that reaches the image effect",
             remedy="see `mutator check --drive`",
@@ -251,8 +251,8 @@ def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarr
 
 def _by_severity(changes: Sequence[float]) -> list[int]:
     """Indices into `changes`, least severe first. The order follows the amounts, in the direction in which
-    the image changes more, to ignore chance differences of neighbours. Amounts on both sides of "no effect"
-    are ordered by change."""
+    the image changes more. This ignores random differences between neighbouring amounts. Amounts on both
+    sides of "no effect" are ordered by change."""
     order = list(range(len(changes)))
     trend = correlation(order, changes) if len(set(changes)) > 1 else 1.0
     if abs(trend) < CLEAR:

@@ -9,7 +9,7 @@ from mutator.review.entries import values_in_words
 from mutator.review.groups import Shape
 
 _TIME = re.compile(r"t >= ([0-9.e+-]+)\Z")
-_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # ids mean nothing to readers
+_ID_HOLE = re.compile(r"id(_\d+)?\Z")  # readers do not need ids
 
 
 def value_table(group: Group) -> tuple[list[str], list[list[str]]]:

@@ -26,7 +26,7 @@ _HEAD = """\
 _WHEN = re.compile(r"; (?:always|time|state), (?:while|for|to_end)\Z")  # at the end of `what` in review/1
 _DIGEST = r"^[0-9a-f]{16}$"
 _TIME = r"^\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ$"
-_DIFFERS = "0" * 16  # for parts in which merged old decisions differ: the decision is no longer valid
+_DIFFERS = "0" * 16  # for digests that differ between merged old decisions, which makes the decision invalid
 _NEEDED = ("by", "diff", "function", "template")
 
 
@@ -66,8 +66,8 @@ class _FileModel(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """The file's content: entries by group, and whether the author of a change is barred from approving
-    it."""
+    """The file's content: entries by group, and whether authors are prevented from approving their own
+    changes."""
 
     entries: Mapping[str, Entry]
     four_eyes: bool = False
@@ -182,7 +182,7 @@ def _json(value: Any) -> str:
 
 
 def _from_first(source: Source) -> Source:
-    """Convert the blocks of a `review/1` file; invalid parts are left alone."""
+    """Convert the blocks of a `review/1` file; invalid parts stay as they are."""
     blocks = source.data.get("decisions")
     if not isinstance(blocks, list):
         return source
@@ -199,7 +199,7 @@ def _new_block(block: dict[str, Any]) -> dict[str, Any]:
 
 
 def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
-    """Merge entries about one change: each kind of trigger was a separate group."""
+    """Merge the entries of groups that differed only in the kind of trigger."""
     found: dict[tuple[str, str], list[Entry]] = {}
     for entry in entries:
         what = _WHEN.sub("", entry.what)
@@ -210,7 +210,8 @@ def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 
 
 def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
-    """Merge: rejected if one part was, else approved; by everyone who approved a part."""
+    """Merge decisions: rejected if any part was rejected, else approved. `by` names everybody with that
+    verdict."""
     decisions = [entry.decision for entry in parts if entry.decision]
     remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
     counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions

@@ -1,4 +1,4 @@
-"""What a reviewer saw when deciding on a group, stored as plain text, and how it differs from now.
+"""Stores the text that a reviewer saw when deciding on a group, and compares it with the current text.
 
 Each text begins with its digests, so that a text for another decision is ignored.
 """
@@ -23,7 +23,7 @@ def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
 
 
 def keep(path: Path, text: str) -> None:
-    """Write what was seen, replacing earlier text."""
+    """Write the text that a reviewer saw; replaces earlier text."""
     make_folder(path.parent)
     write_atomic(path, text.encode("utf-8", "surrogateescape"))
 
@@ -51,7 +51,7 @@ def _headed(diff: Iterable[str], new: Sequence[str]) -> Iterator[str]:
 
 
 def _section(lines: Iterable[str]) -> str:
-    """The section and part in which these lines end."""
+    """The section, and the part of it, in which these lines end."""
     section = part = ""
     for line in lines:
         if line.startswith("== "):

@@ -49,7 +49,7 @@ class Module:
     imports: Mapping[str, Sequence[Import]]
 
     def nodes_of(self, name: str) -> Sequence[ast.stmt]:
-        """The statements that define a name; several if it is set again."""
+        """The statements that define a name. There are several if the name is assigned more than once."""
         return self.defined.get(name, ())
 
     def knows(self, name: str) -> bool:
@@ -96,7 +96,8 @@ def read_module(path: str, data: bytes, root: Path) -> Module:
 
 
 def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
-    """The external names that `node` uses, if `wanted`. `owner` is its class if it is a method."""
+    """The external names that `node` uses, in its parts that `wanted` accepts. `owner` is its class if it is
+    a method."""
     yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
 
 
@@ -113,7 +114,7 @@ class _Scope:
     local: frozenset[str] = frozenset()
     imports: tuple[tuple[str, Import], ...] = ()
     owner: str = ""  # class of the method
-    me: str = ""  # the method's name for its object
+    me: str = ""  # the name of the method's first argument, such as `self`
 
     def inside(self, node: _Function) -> "_Scope":
         """The scope of a nested function."""
@@ -128,7 +129,7 @@ class _Scope:
         )
 
     def use(self, words: tuple[str, ...]) -> Use | None:
-        """What a name with attributes refers to; None for a variable."""
+        """The external use that a name with attributes stands for; None for a local variable."""
         for name, one in reversed(self.imports):
             if name == words[0]:
                 return Use(words, imported=one)

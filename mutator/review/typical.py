@@ -79,7 +79,8 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 def _typical(
     texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
 ) -> Typical:
-    """The result for `rows`, worst first; the worse of two equally frequent outcomes wins."""
+    """The result for `rows`, which are sorted from worst to best. Of two equally frequent outcomes, the worse
+    one counts."""
     by_ending: dict[str, list[int]] = {}
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)

@@ -22,7 +22,7 @@ _KINDS = {
     ".gif": "image/gif",
     ".html": "text/html; charset=utf-8",
     ".jpg": "image/jpeg",
-    ".js": "application/javascript",  # without an encoding: in series, each byte is a character
+    ".js": "application/javascript",  # no charset, because each byte of a series is a character
     ".md": "text/plain; charset=utf-8",
     ".mp4": "video/mp4",
     ".png": "image/png",

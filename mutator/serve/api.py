@@ -12,7 +12,7 @@ from mutator.serve.orders import Desk
 from mutator.serve.reviews import Decisions, Moved, Reviews, Selection
 from mutator.serve.runs import Runs
 
-_MOST_WORDS = 100  # of an address
+_MOST_WORDS = 100  # most parameters in an address
 
 
 class ReviewApi:

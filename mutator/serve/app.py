@@ -87,7 +87,7 @@ def application(site: Site) -> Starlette:
 
 
 def _quick(answer: Callable[[Request], Response]) -> Answer:
-    """Compute the response in a separate thread, so that others need not wait."""
+    """Compute the response in a separate thread, so that other requests need not wait."""
 
     async def answered(request: Request) -> Response:
         return await run_in_threadpool(answer, request)
@@ -96,7 +96,7 @@ def _quick(answer: Callable[[Request], Response]) -> Answer:
 
 
 def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
-    """The same for a request with a JSON body."""
+    """Compute the response to a request with a JSON body in a separate thread."""
 
     async def answered(request: Request) -> Response:
         kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()

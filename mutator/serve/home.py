@@ -24,7 +24,7 @@ def error_page(facts: Mapping[str, Any]) -> str:
 
 
 def offered(workspace: Workspace) -> dict[str, Any]:
-    """Return the choices: faults, scenarios, triggers, campaigns. What cannot be read is reported as
+    """Return the choices: faults, scenarios, triggers, campaigns. An entry that cannot be read is reported as
     `problem`."""
     names = ("targets", "scenarios", "campaigns")
     found: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}

@@ -1,4 +1,4 @@
-"""Jobs: command lines that the server queues, runs and reports on until it ends."""
+"""Jobs: command lines that the server queues and runs. They end with the server."""
 
 import os
 import queue
@@ -20,15 +20,15 @@ from mutator.serve.runs import Absent
 from mutator.store.progress import Tail
 
 _KEEPER = "mutator.serve.keeper"
-_COLUMNS = "200"  # of a job's lines: pages fold them
-_LOG_BYTES = 100_000  # of a job, the last ones
-_MOST_JOBS = 200  # kept; of those that ended, the newest
+_COLUMNS = "200"  # line width of a job's output; pages wrap the lines
+_LOG_BYTES = 100_000  # of a job's output; only the end is kept
+_MOST_JOBS = 200  # jobs to keep: the newest of those that have ended
 _MOST_WAITING = 50
 _NEWS = ("the same as", "no record to compare", "film: ", "verdict: ", "outcomes: ")
-_STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # of a terminal
+_STYLES = re.compile(r"\x1b\[[0-9;]*[A-Za-z]")  # terminal escape codes
 _COUNT = re.compile(r"^([a-z ]+) (\d+)/(\d+)(?:,|$)")
 _TRIED = re.compile(r"^experiment +([0-9a-f]{16})$", re.MULTILINE)
-_END_S = 30.0  # for jobs to end after the server
+_END_S = 30.0  # time for jobs to end when the server ends
 
 
 class State(StrEnum):
@@ -52,13 +52,13 @@ class Job:
     id: str
     work: Work
     state: State = State.QUEUED
-    progress: float | None = None  # of its stage
+    progress: float | None = None  # of the current stage, from 0 to 1
     message: str = ""
     result: str | None = None
     started: datetime | None = None
     ended: datetime | None = None
     log: bytearray = field(default_factory=bytearray)
-    tail: Tail | None = None  # of the records of a campaign that runs its experiments
+    tail: Tail | None = None  # follows the records of a campaign while its experiments run
     hold: int | None = None  # the writing end of the pipe to its keeper
 
     def told(self) -> dict[str, Any]:
@@ -241,7 +241,7 @@ def _complaint(job: Job) -> str:
     lines = job.text.splitlines()
     errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
     differs = [line for line in lines if line.startswith("DIFFERS")]
-    return (errors or differs or [job.message or "it ended without a word"])[-1]
+    return (errors or differs or [job.message or "it ended without output"])[-1]
 
 
 def _time(moment: datetime | None) -> str | None:

@@ -218,7 +218,7 @@ def _files_in(place: Path) -> list[tuple[str, int, int]]:
         inner[:] = sorted({*inner} - _SKIPPED)
         for name in names:
             path = os.path.join(folder, name)  # noqa: PTH118 - a thousand of them at each look
-            with suppress(OSError):  # it may vanish meanwhile
+            with suppress(OSError):  # the file may have been deleted in the meantime
                 facts = os.lstat(path)
                 found.append((path, facts.st_mtime_ns, facts.st_size))
     return found

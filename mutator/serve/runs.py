@@ -106,7 +106,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
     except MutatorError as err:
         facts["problem"] = err.got
     except (LookupError, TypeError, ValueError):
-        facts["problem"] = "its head is damaged"
+        facts["problem"] = "its run.json is damaged"
     return facts
 
 

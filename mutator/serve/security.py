@@ -2,7 +2,8 @@
 
 Other pages in the user's browser and other users of the machine can reach a port on the loopback interface.
 So each request needs the token, in a cookie that other sites cannot send. It must name this server, because a
-page whose name resolves to it could otherwise read responses. It must not come from a page of another origin.
+page whose host name resolves to this machine could otherwise read responses. It must not come from a page of
+another origin.
 """
 
 import base64

@@ -1,4 +1,4 @@
-"""The server: a socket on the loopback interface and a token; its end ends all jobs."""
+"""The server: a socket on the loopback interface, and a token. When the server ends, it ends all jobs."""
 
 import secrets
 import socket
@@ -31,7 +31,7 @@ def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
     """Return the server for a port, which answers only with the token."""
     config = uvicorn.Config(
         Guarded(application(site), port=port, token=token),
-        access_log=False,  # it would show the token
+        access_log=False,  # the log would show the token
         log_level="error",
         ws="none",
         server_header=False,

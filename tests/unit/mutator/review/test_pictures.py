@@ -156,7 +156,7 @@ def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
     sensing.write_text(text.replace("def sense(self, world):\n", "def sense(self, world):\n        return\n"))
-    with pytest.raises(MutatorError, match="the run never got there"):
+    with pytest.raises(MutatorError, match="the run never reached it"):
         drawn(workspace, next(g for g in groups_of(workspace) if g.faults))
 
 
