@@ -22,8 +22,9 @@ _INTRO = """\
 [changelog](../../CHANGELOG.md) announces every change. Anything else below `mutator` may change at any time.
 The import is fast: a name loads what it needs when you first use it.
 
-No function prints. Invalid input raises [MutatorError](#mutatorerror). A notebook shows most objects as a small
-table. [Use mutator in a notebook](../how-to/use-in-a-notebook.md) has examples.
+No function prints. Invalid input raises [MutatorError](#mutatorerror).
+A notebook shows most objects as a small table.
+[Use mutator in a notebook](../how-to/use-in-a-notebook.md) has examples.
 
 ## Shared arguments
 """

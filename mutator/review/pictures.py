@@ -130,7 +130,7 @@ class _Wanted:
 
 
 def _scenario(workspace: Workspace) -> Path:
-    """The library's first scenario. The choice does not matter, because any road shows the effect."""
+    """The library's first scenario: any road will do."""
     found = next(iter(workspace.scenarios.values()), None)
     if found is None:
         raise MutatorError(
