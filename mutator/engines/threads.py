@@ -15,8 +15,8 @@ _KNOWN = (  # start of a thread's name, what the thread is, how to turn it off
 )
 _UNNAMED = (
     "of a library",
-    f'set {_NUMBERS} and the like to "1" under `env` of the manifest, as they are where it says nothing, '
-    "and have the library use no pool (`cv2.setNumThreads(0)`, `torch.set_num_threads(1)`, "
+    f'set {_NUMBERS} and similar variables to "1" (the default) under `env` of the manifest, '
+    "and turn off the library's thread pool (`cv2.setNumThreads(0)`, `torch.set_num_threads(1)`, "
     "`use_threads=False` of pyarrow)",
 )
 _OTHER = ("", "start it after the run, or not at all")

@@ -33,7 +33,7 @@ def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distri
             raise MutatorError(
                 "no cluster",
                 argument="insecure_network",
-                remedy="leave it out: without a cluster, all stays here",
+                remedy="leave it out: without a cluster, all work runs on this machine",
             )
         return LocalWorkers()
     where = parse(cluster)

@@ -171,7 +171,7 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
         goldens = read_json(folder.path / CHECKS, CHECKS_SCHEMA)["goldens"]
         if differ := [name for name in first if goldens.get(name) != first[name]]:
             raise CheckFailed(
-                f"the golden run {differ[0]} is another one than in {folders[0].path}",
+                f"the golden run {differ[0]} differs from the one in {folders[0].path}",
                 where=folder.path,
                 expected="machines on which the target computes the same bytes",
                 remedy="run this shard again on such a machine (run.json says what each ran with)",

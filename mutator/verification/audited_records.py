@@ -88,8 +88,11 @@ def mutants(
     known = {one.record.experiment_id for one in records}
     for name in folder.patches if folder.verifiable and folder.finished else ():
         if name not in known:
-            got, where = f"a patch of {name}, no experiment of this run", folder.patches.file(name)
-            yield MutatorError(got, where=where, expected="one of each that ran")
+            got, where = (
+                f"a patch of {name}, which is not an experiment of this run",
+                folder.patches.file(name),
+            )
+            yield MutatorError(got, where=where, expected="patches only of experiments that ran")
 
 
 def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:

@@ -34,7 +34,7 @@ def _differences(folder: RunFolder, there: list[str]) -> Iterator[MutatorError]:
             if name == results.CSV:
                 yield from _cells(path, made[name])
             elif name not in made or not same_parquet(path, made[name]):
-                yield MutatorError("not what the records give", where=path, remedy=_REMEDY)
+                yield MutatorError("does not follow from the records", where=path, remedy=_REMEDY)
 
 
 def _cells(path: Path, made: Path) -> Iterator[MutatorError]:

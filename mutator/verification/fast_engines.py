@@ -35,7 +35,7 @@ def finding(refusal: Refused | None) -> Finding:
         name=NAME,
         level=Level.WARN,
         found=f"nothing can be forked: {refusal}",
-        remedy=f"{refusal.remedy or 'see docs/explanation/performance.md, which engine runs'}; {_WITHOUT}",
+        remedy=f"{refusal.remedy or 'see docs/explanation/performance.md'}; {_WITHOUT}",
     )
 
 

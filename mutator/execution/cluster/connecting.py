@@ -21,9 +21,9 @@ _ADDRESS = re.compile(
     r"(?P<protocol>tcp|tls)://(?P<host>\[[0-9a-fA-F:.]+\]|[^\s:/@\[\]]+):(?P<port>\d{1,5})/?"
 )
 _TO_CLOSE = (
-    "whoever reaches a Dask scheduler can run code on its workers: use tls:// "
-    "(docs/how-to/run-on-many-machines.md says how), or allow it with `insecure_network` where nobody else "
-    "is on the network"
+    "anyone who reaches a Dask scheduler can run code on its workers: use tls:// "
+    "(see docs/how-to/run-on-many-machines.md), or allow it with `insecure_network` if nobody else is on "
+    "the network"
 )
 
 

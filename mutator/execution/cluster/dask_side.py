@@ -42,7 +42,9 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
 def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
     """Unpack the bundle of a run; MutatorError if it is damaged."""
     if sha256(bundle).hexdigest() != digest:
-        raise MutatorError("another bundle arrived than was sent", remedy="check the network")
+        raise MutatorError(
+            "the bundle that arrived differs from the one that was sent", remedy="check the network"
+        )
     host = Host.lay_out(bundle, get_worker().local_directory, name)
     with _arrived:
         _hosts[run] = host

@@ -90,8 +90,8 @@ class Deal:
                 self._changed.clear()
         except _Gone:
             self._session.problem = (
-                f"the scheduler at {self._address} does not answer any more; nothing that finished is lost: "
-                "start it and its workers again, and give the same command"
+                f"the scheduler at {self._address} does not answer any more, but finished work is stored; "
+                "start the scheduler and its workers again, then run the same command"
             )
         except DiskFull as err:
             self._session.problem = str(err)
@@ -170,7 +170,7 @@ class Deal:
             self._session.problem = f"no worker is left that may do the work: {reasons}"
         elif self._queued is None and time.monotonic() - self._alone_since > _ALONE_S:
             self._session.problem = (
-                f"no worker at {self._address} for {_ALONE_S:.0f} s; start some (`dask worker`), and give "
+                f"no worker at {self._address} for {_ALONE_S:.0f} s; start some (`dask worker`), then run "
                 "the same command"
             )
 

@@ -24,7 +24,7 @@ def unpack(data: bytes) -> dict[str, bytes]:
         raise MutatorError(
             f"a damaged parcel of {len(data)} bytes",
             expected="the bytes that were sent",
-            remedy="check the network; the same command goes on",
+            remedy="check the network, then run the same command",
         )
     end = begin + _LENGTH + int.from_bytes(data[begin : begin + _LENGTH], "little")
     parts = {}
