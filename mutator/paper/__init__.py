@@ -1,4 +1,5 @@
-"""A published study that the library reproduces: its tables, observations and figures next to those of a run.
+"""The published study that the library reproduces: shows its tables, observations and figures next to those
+of a run.
 
-Nothing imports this package; its entry point in `mutator.studies` registers it.
+No other package imports this one. An entry point in `mutator.studies` registers it.
 """

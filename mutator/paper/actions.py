@@ -1,7 +1,7 @@
 """Detects unsafe control actions in the traces of a fault-free and a faulty run.
 
-Each `Wanted` has a query for candidate runs, and a `Look` that decides whether two traces show the action,
-and in which steps.
+Each `Wanted` has a query that finds candidate runs, and a `Look` that decides whether two traces show the
+action, and in which steps.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,21 @@ from mutator.outcomes.golden import Trace
 
 Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
-APPLIED = 0.01  # of full gas or brake; less counts as none
-WRONG_S = 0.5  # minimum of wrong gas or brake
-BRAKE_S = 0.1  # minimum of braking that is too short
-SHORT = 0.5  # of the fault-free run's braking time; more is not too short
-RELEASED_S = 1.0  # after the alert: gas and brake must be gone by then
-MISSED_S = 0.1  # minimum of gas, and of braking, in the fault-free run
+APPLIED = 0.01  # share of full gas or brake; less counts as none
+WRONG_S = 0.5  # minimum duration of wrong gas or brake
+BRAKE_S = 0.1  # minimum duration of braking that is too short
+SHORT = 0.5  # share of the braking time in the fault-free run; more is not too short
+RELEASED_S = 1.0  # maximum time from the alert to the last gas or brake
+MISSED_S = 0.1  # minimum duration of gas, and of braking, that only the fault-free run has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
     """Both runs over their common steps.
 
-    `t`: simulated s, one per step of `step_s`; `golden` and `faulty` have as many values. `start` and `end`
-    bound the search: the fault's activation, and the hazard or the end of the run.
+    `t` has the simulated time (s) of each step; a step lasts `step_s`. `golden` and `faulty` have a value for
+    each step. The search is from `start`, the activation of the fault, to `end`, the hazard or the end of the
+    run.
     """
 
     t: np.ndarray
@@ -36,19 +37,19 @@ class Pair:
     step_s: float
     start: float
     end: float
-    alert: float | None  # first after activation
+    alert: float | None  # time of the first alert after activation
 
     @classmethod
     def of(
         cls, golden: Trace, faulty: Trace, record: Record, time: str, step_s: float, hazard: str | None
     ) -> "Pair":
-        """The runs of an experiment with an activated fault, up to `hazard` or the end.
+        """The pair of an experiment with an activated fault, up to `hazard` or the end of the run.
 
         `time` is the name of the time channel.
         """
         steps = min(len(golden[time]), len(faulty[time]))
         t = faulty[time][:steps]
-        assert record.activation is not None  # required by the query
+        assert record.activation is not None  # the query finds only activated faults
         return cls(
             t=t,
             golden={name: values[:steps] for name, values in golden.items()},
@@ -60,16 +61,17 @@ class Pair:
         )
 
     def applied(self, channel: str) -> tuple[Steps, Steps]:
-        """Steps between `start` and `end` in which golden, and faulty, apply gas or brake."""
+        """The steps between `start` and `end` in which golden applies gas or brake, and those in which faulty
+        does."""
         within = (self.t >= self.start) & (self.t <= self.end)
         return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
 
     def seconds(self, steps: Steps) -> float:
-        """The duration of these steps."""
+        """The duration of the steps, s."""
         return float(steps.sum() * self.step_s)
 
 
-Look = Callable[[Pair], Steps | None]  # the steps that show it; None: not shown
+Look = Callable[[Pair], Steps | None]  # the steps that show the action; None if there are none
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,17 +80,18 @@ class Wanted:
 
     name: str
     title: str
-    query: str  # over the columns of results.csv: candidate runs
-    order: str  # candidates are tried by this column, largest first
-    confirmed: str  # what the look finds, as text
+    query: str  # finds candidate runs by the columns of results.csv
+    order: str  # candidates are examined in the order of this column, largest first
+    confirmed: str  # text that says what the look finds
     look: Look
-    actions: tuple[str, ...]  # channels of the action; their panels are shaded
+    actions: tuple[str, ...]  # channels of the action, whose panels are shaded
     panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
-    hazard: str | None  # end of the search; None: end of the run
+    hazard: str | None  # the search ends here; None: at the end of the run
 
 
 def brake_too_short(pair: Pair) -> Steps | None:
-    """The steps in which only golden brakes, if faulty brakes at most half of golden's time."""
+    """The steps in which only golden brakes; None unless faulty brakes, but at most half as long as
+    golden."""
     golden, faulty = pair.applied("brake")
     if not BRAKE_S <= pair.seconds(faulty) <= SHORT * pair.seconds(golden):
         return None
@@ -96,7 +99,8 @@ def brake_too_short(pair: Pair) -> Steps | None:
 
 
 def at_a_wrong_time(channel: str) -> Look:
-    """The steps in which only faulty gives gas (or brakes), if they last long enough."""
+    """A look for the steps in which only faulty applies `channel` (gas or brake), if they last long
+    enough."""
 
     def look(pair: Pair) -> Steps | None:
         golden, faulty = pair.applied(channel)
@@ -107,8 +111,8 @@ def at_a_wrong_time(channel: str) -> Look:
 
 
 def both_unavailable(pair: Pair) -> Steps | None:
-    """The steps after faulty's last gas or brake, if that is soon after the alert and golden still uses
-    both."""
+    """The steps after the last gas or brake of the faulty run; None unless that was soon after the alert and
+    golden still uses both."""
     used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
     last = pair.t[used].max(initial=pair.start)
     gone: Steps = pair.t > last

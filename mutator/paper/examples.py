@@ -1,4 +1,5 @@
-"""Figures of single experiments: found by a query over the results, confirmed on traces, drawn."""
+"""Draws figures of single experiments, which are found by a query over the results and confirmed on
+traces."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
@@ -17,7 +18,7 @@ from mutator.store.run_folder import RunFolder
 from mutator.workspace import Workspace
 
 QUERY = "Query over results.csv"
-LOOKED_AT = 5  # candidates for each figure
+LOOKED_AT = 5  # maximum of candidates examined for each figure
 
 
 def example_drawings(
@@ -26,10 +27,10 @@ def example_drawings(
     workspace: Workspace | None,
     wanted: Sequence[Wanted] = WANTED,
 ) -> tuple[Drawing, ...]:
-    """A drawing for each wanted figure; a missing figure has a reason.
+    """Make a drawing for each wanted figure. If a figure is missing, its drawing has the reason.
 
     `frame` comes from `statistics.frame.load`. Without a workspace there are no traces. Traces come from the
-    experiments' series; nothing is rerun.
+    series of the experiments, so nothing is rerun.
     """
     traces = Traces(workspace, folder) if workspace else None
     made = []
@@ -42,8 +43,8 @@ def example_drawings(
 
 
 def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
-    """The rows that the query finds, in order of examination; empty if the target lacks the hazard or
-    channel."""
+    """The rows that the query finds, in the order in which they are examined. Empty if the target lacks the
+    hazard or channel."""
     numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
     try:
         found = numbers.query(wanted.query, engine="python")
@@ -101,7 +102,7 @@ def _none(wanted: Wanted, why: str) -> Drawing:
 
 
 def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
-    """What is shown, how it was found, and what the traces show."""
+    """A note that says what the figure shows and how it was found."""
     fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "

@@ -1,8 +1,8 @@
-"""The measures that published observations are evaluated with, over a frame of results, each with an
-interval.
+"""Measures that evaluate published observations on a frame of results, each with an interval.
 
-`runs` comes from `mutator.statistics.frame.load`; `of`, `part` and `against` are pandas queries on it, where
-an empty one means all runs. A report shows each claim as the evaluated call, which works in a Python session:
+`runs` comes from `mutator.statistics.frame.load`. `of`, `part` and `against` are pandas queries on it; an
+empty query selects all runs. For each claim, a report shows the call that was evaluated. You can repeat it in
+a Python session:
 
     from mutator.paper.measures import *
     from mutator.statistics.frame import load
@@ -33,13 +33,13 @@ __all__ = [
 ]
 
 
-_BOUNDS_A_MEDIAN = 6  # fewer runs are on one side of their median in over 5 % of cases
+_BOUNDS_A_MEDIAN = 6  # fewer runs all lie on one side of the true median in more than 5 % of cases
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """An estimate with its 95 % interval (NaN: none) from `n` runs or pairs. `count`: those with the
-    property, if countable. `text`: everything as text."""
+    """An estimate with its 95 % interval (NaN: none) from `n` runs or pairs. `count` is the number of those
+    with the property, if they can be counted. `text` shows everything."""
 
     estimate: float
     low: float
@@ -53,22 +53,24 @@ class Estimate:
 
 
 def share(runs: pd.DataFrame, *, of: str, part: str) -> Estimate:
-    """The share of the runs of `of` that are also in `part`; Wilson interval."""
+    """The share of runs in `of` that are also in `part`, with Wilson's interval."""
     return of_share(_share(runs, of, part))
 
 
 def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Estimate:
-    """The share of `part` among runs of `of` minus that among `against`; Newcombe interval."""
+    """The share of `part` among the runs in `of`, minus that among the runs in `against`, with Newcombe's
+    interval."""
     return of_difference(_share(runs, of, part), _share(runs, against, part))
 
 
 def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Hazard rate of guided minus random runs; whole faults (location and value) are resampled."""
+    """The hazard rate of guided runs minus that of random runs. The interval resamples whole faults (location
+    and value)."""
     chosen = _query(runs, of)
     one, other = (
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
     )
-    found = contrasts.resampled(chosen, "injected")  # already selected
+    found = contrasts.resampled(chosen, "injected")  # `chosen` are already the runs to count
     return Estimate(
         estimate=found.difference,
         low=found.low,
@@ -79,7 +81,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Common odds of a hazard over fault types, guided against random (Mantel-Haenszel)."""
+    """The common odds ratio of a hazard over fault types, guided against random (Mantel-Haenszel)."""
     parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
     found = contrasts.mantel_haenszel(parts)
     said = f"- ({found.strata} fault types)"
@@ -98,9 +100,9 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Among guided-random pairs that differ in having a hazard, the share in which the guided run has it.
-    Clopper-Pearson interval, which agrees with McNemar's exact test. `of` is a query on pairs: column names
-    end in `_guided` and `_random`."""
+    """Among guided-random pairs in which only one run has a hazard, the share in which it is the guided run.
+    The Clopper-Pearson interval agrees with McNemar's exact test. `of` is a query on pairs, with column names
+    that end in `_guided` and `_random`."""
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     matched = contrasts.mcnemar(_query(contrasts.pairs(runs), of))
@@ -121,7 +123,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
-    """Mean of `end - start` in s over the runs of `of` that have both; Student's t interval."""
+    """The mean of `end - start` in s over the runs in `of` that have both, with Student's t interval."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
     chosen = _query(runs, of)
@@ -135,8 +137,8 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
 
 
 def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Kaplan-Meier median of the time in s from the first alert to a hazard, censored at the end of the run
-    (column `t_end`, s of simulation). Infinite: most alerts are not followed by a hazard."""
+    """The Kaplan-Meier median of the time (s) from the first alert to a hazard, censored at the end of the
+    run (column `t_end`, simulated seconds). It is infinite if no hazard follows most alerts."""
     chosen = _query(runs, of)
     if chosen["t_end"].isna().any():
         nan = math.nan
@@ -154,12 +156,12 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def of_share(one: Share) -> Estimate:
-    """The estimate of a share."""
+    """A share as an estimate."""
     return Estimate(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, text=str(one))
 
 
 def of_difference(one: Share, other: Share) -> Estimate:
-    """The difference of two shares of different runs, first minus second (Newcombe, statsmodels)."""
+    """The difference of the shares of different runs, first minus second (Newcombe, statsmodels)."""
     from statsmodels.stats.proportion import confint_proportions_2indep
 
     low = high = math.nan

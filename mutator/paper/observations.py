@@ -1,6 +1,6 @@
-"""Tests published observations: each claim is a query on the results, and a rule gives the verdict.
+"""Tests published observations. Each claim is a query on the results, and a rule decides the verdict.
 
-Claims, queries and rules are data of the fault library (`references/paper_observations.yaml`). Reports show
+Claims, queries and rules are data in the fault library (`references/paper_observations.yaml`). Reports show
 the evaluated calls; see `mutator.paper.measures`.
 """
 
@@ -19,7 +19,7 @@ from mutator.statistics.shares import share
 
 FILE = "paper_observations.yaml"
 SCHEMA = "paper_observations/1"
-FEWEST = 10  # runs needed to trust an interval
+FEWEST = 10  # minimum of runs for a verdict from an interval
 
 
 class Verdict(StrEnum):
@@ -31,10 +31,12 @@ class Verdict(StrEnum):
 
 
 class Rule(StrictModel):
-    """The condition for a claim; exactly one field is set. Shares and differences are fractions, times in s.
+    """The condition under which a claim holds. Exactly one field is set. Shares and differences are
+    fractions; times are in s.
 
-    `above, below, within`: where the whole interval must lie (within: plus or minus). `some`: at least one
-    run must have it; `never`: none may. If none has it, the interval must end at or below this share.
+    `above`, `below` and `within` (plus or minus) are bounds for the whole interval. With `some`, at least one
+    run must have the property; with `never`, none may. If no run has it, a verdict needs an interval that
+    ends at or below this share.
     """
 
     above: float | None = None
@@ -55,7 +57,7 @@ class Rule(StrictModel):
             return self._seen(found)
         if found.n < FEWEST:
             return Verdict.UNDECIDED
-        low, high = found.low, found.high  # NaN: comparisons are false
+        low, high = found.low, found.high  # comparisons with NaN are false
         if self.within is not None:
             holds, fails = -self.within < low and high < self.within, low > self.within or high < -self.within
         elif self.above is not None:
@@ -84,8 +86,8 @@ class _Each(StrictModel):
 
 
 class Claim(StrictModel):
-    """One claim; the head of the file of observations explains it. Without a measure, results cannot decide
-    it, and `see` names what might."""
+    """One claim; the head of the file of observations explains the fields. Without a measure, results cannot
+    decide the claim, and `see` names what might."""
 
     says: str
     measure: str | None = None
@@ -113,7 +115,8 @@ class Claim(StrictModel):
         return self
 
     def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
-        """The measure's arguments by group (one with an empty name if there are no groups)."""
+        """Yield each group with the arguments of the measure. Without groups, there is one group with an
+        empty name."""
         named = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
         # an empty `of` means all runs
         arguments = {name: text for name, text in named.items() if text is not None}
@@ -133,7 +136,7 @@ class Claim(StrictModel):
 
 
 class Observation(StrictModel):
-    """One observation, split into claims."""
+    """One observation, divided into claims."""
 
     title: str
     claims: list[Claim] = Field(min_length=1)
@@ -148,7 +151,7 @@ class Observations(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """One query and its result; `group` is empty if the claim has no groups."""
+    """One query and its result. `group` is '' if the claim has no groups."""
 
     group: str
     query: str
@@ -158,13 +161,13 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class JudgedClaim:
-    """A claim, its results and verdict; `why` adds reasons beyond the rule."""
+    """A claim with its results and verdict. `why` has reasons in addition to the rule."""
 
-    number: str  # 1.2: the second claim of the first observation
+    number: str  # "1.2" is the second claim of the first observation
     claim: Claim
     answers: tuple[Answer, ...]
     verdict: Verdict
-    paper: Verdict | None  # the same rule on the published counts
+    paper: Verdict | None  # verdict of the same rule on the published counts
     why: str
 
 
@@ -181,11 +184,11 @@ class JudgedObservation:
 def judge(
     path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
 ) -> tuple[JudgedObservation, ...]:
-    """Judge a file's observations on a frame of results; with `only_needed` only the claims that they depend
-    on.
+    """Judge the observations in a file on a frame of results. With `only_needed`, judge only the claims on
+    which observations depend.
 
-    `lacks`: how the runs differ from the paper's mixture of faults. MutatorError with file and line for an
-    invalid file or query.
+    `lacks` says how the runs differ from the paper's mixture of faults. Raise MutatorError with file and line
+    if the file or a query is invalid.
     """
     model, source = read(path, Observations, SCHEMA)
     made = []
@@ -203,7 +206,8 @@ def judge(
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
-    """All must hold: one that fails decides against; otherwise one without enough data leaves it open."""
+    """The verdict of several verdicts together. If one fails, all fail. Otherwise, if one lacks data, all
+    lack data."""
     for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict

@@ -26,7 +26,7 @@ HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdic
 
 
 def table(observation: JudgedObservation) -> Table:
-    """One row for each claim, and one for each of its groups."""
+    """The table of an observation: a row for each claim, and a row for each of its groups."""
     made = []
     for one in observation.claims:
         rule = str(one.claim.holds or "")
@@ -42,13 +42,13 @@ def table(observation: JudgedObservation) -> Table:
 
 
 def published(one: JudgedClaim) -> str:
-    """The paper's statement, counts first."""
+    """What the paper says on a claim, counts first."""
     found = one.claim.published()
     return "; ".join(text for text in (found.text if found else "", one.claim.told) if text) or "-"
 
 
 def session(ends: Sequence[tuple[str, float]]) -> str:
-    """The Python lines that the queries need first."""
+    """The Python lines to run before the queries."""
     if not ends:
         return SESSION
     times = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
@@ -85,7 +85,7 @@ def rules() -> str:
 
 
 def sheet(observations: Sequence[JudgedObservation]) -> Sheet:
-    """One line for each query, with each number in its own column."""
+    """The sheet with a line for each query and a column for each number."""
     return Sheet(
         name="observations",
         title="The paper's observations",

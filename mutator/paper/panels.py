@@ -1,4 +1,4 @@
-"""The published observations in a run's report: judged on its results, written, shown."""
+"""Judges the published observations on the results of a run, writes them, and shows them in the report."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -50,11 +50,12 @@ _HTML = """\
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """The observations that the library cites, with observations.md and tables/observations.csv; with several
-    seeds also counts by seed, with tables/observations_by_seed.csv.
+    """The panel of the observations that the library cites. Writes observations.md and
+    tables/observations.csv. With several seeds, it also shows counts by seed and writes
+    tables/observations_by_seed.csv.
 
-    None if the library cites none, if the run has none of the published fault types, or if its experiments
-    decide no observation. Decided observations come first.
+    None if the library cites no observations, if the run has none of the published fault types, or if its
+    experiments decide no observation. Decided observations come first.
     """
     if run.workspace is None:
         return None
@@ -68,7 +69,7 @@ def observations_panel(run: ReportedRun) -> Panel | None:
         return None
     ends = run.ends() or {}
     words = re.findall(r"\w+", file.read_text(encoding="utf-8"))
-    frame = slim(run.frame, *words)  # queries use no other columns
+    frame = slim(run.frame, *words)  # the queries use only columns that the file names
     frame = frame.assign(t_end=frame["scenario"].map(ends))
     judged = observations.judge(file, frame, list(_lacks(run, missing)))
     coverage = _coverage(run, len(kinds), missing)
@@ -110,7 +111,7 @@ def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
 
 
 def _lacks(run: ReportedRun, missing: list[str]) -> Iterator[str]:
-    """How the run differs from the paper's mixture of faults. A shard is also incomplete."""
+    """Yield how the run differs from the paper's mixture of faults. A shard counts as incomplete."""
     if missing:
         yield f"{len(missing)} of the paper's fault types are missing"
     if run.done < (planned := int(run.folder.head["experiments"])):

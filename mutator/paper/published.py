@@ -1,4 +1,4 @@
-"""The published numbers, as cited in the fault library's `references/`."""
+"""The published numbers, as cited in `references/` of the fault library."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,17 +14,17 @@ FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paper:
-    """The published counts. `summary` is by (method, scenario); `coverage` by (method, module/fault type) has
-    only injected, activated and hazards."""
+    """The published counts. `summary` is by (method, scenario). `coverage` is by (method, module/fault type)
+    and has only injected, activated and hazards."""
 
     summary: dict[tuple[str, str], Tally]
     coverage: dict[tuple[str, str], Tally]
     driver_reaction_s: float
-    least_alert_to_hazard_s: float  # mean in the scenarios with the least, and the most
+    least_alert_to_hazard_s: float  # means in the scenarios with the shortest and the longest time
     most_alert_to_hazard_s: float
 
     def published(self) -> Published:
-        """The counts for tables next to those of a run."""
+        """The counts in the form that tables show next to those of a run."""
         least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
         return Published(
             source="paper",
@@ -83,7 +83,7 @@ class _Times(StrictModel):
 
 
 def load_paper(references: Path) -> Paper:
-    """Load the cited numbers of a folder; MutatorError with file and line for impossible counts."""
+    """Load the cited numbers of a folder. Raise MutatorError with file and line if counts are impossible."""
     summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
     coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
     times, _ = read(references / FILES[2], _Times, "paper_times/1")
@@ -117,7 +117,8 @@ def has_paper(references: Path) -> bool:
 
 
 def _check(tally: Tally, source: Source, row: int) -> None:
-    """Parts must fit their whole, and both countings of hazards with and without alert must agree."""
+    """Raise MutatorError if a part is larger than its whole, or if the counts of hazards with alert
+    contradict those of alerts with hazard."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     fits = tally.activated <= tally.injected and max(parts) <= tally.activated
     if tally.alerts is not None:

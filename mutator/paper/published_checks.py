@@ -1,4 +1,4 @@
-"""Checks that the published numbers in the library agree with themselves and with the library."""
+"""Checks that the published numbers in the library are consistent with each other and with the library."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -12,15 +12,15 @@ from mutator.statistics.tallies import Tally, total
 from mutator.workspace import Workspace
 
 _METHODS = ("guided", "random")
-_SUMS = ("injected", "activated", "hazards")  # counted in both tables
+_SUMS = ("injected", "activated", "hazards")  # counts that both tables have
 _REMEDY = "compare with the published table"
 
 
 def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
-    """Every problem of `references/paper_*.yaml` in a library whose campaigns ask for the study.
+    """Yield every problem of `references/paper_*.yaml` in a library with campaigns that ask for the study.
 
-    Missing files, impossible numbers (`load_paper`), duplicate rows, unknown methods, scenarios and fault
-    types, and sums over scenarios that differ from those over fault types.
+    Problems are missing files, impossible numbers (`load_paper`), duplicate rows, unknown methods, scenarios
+    and fault types, and sums over scenarios that differ from those over fault types.
     """
     references = workspace.library / "references"
     if missing := [name for name in FILES if not (references / name).is_file()]:
@@ -77,7 +77,8 @@ def _unknown(
 
 
 def _sums(paper: Paper, coverage: Source, summary: Path) -> Iterator[MutatorError]:
-    """Both tables count the same experiments, by fault type and by scenario."""
+    """Yield differences between the sums of both tables, which count the same experiments, by fault type and
+    by scenario."""
 
     def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
         return total(tally for (how, _), tally in counts.items() if how == method)

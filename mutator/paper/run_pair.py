@@ -1,5 +1,5 @@
-"""Draws a fault-free and a faulty run on one time axis: dashed and solid line, events marked, a period
-shaded."""
+"""Draws a fault-free run (dashed) and a faulty run (solid) on one time axis, with marked events and a shaded
+period."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -23,16 +23,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-BEFORE_S, AFTER_S = 4.0, 1.0  # shown before activation and after the hazard
+BEFORE_S, AFTER_S = 4.0, 1.0  # time that is shown before activation and after the hazard
 SHADE = "#bbbbbb"
-LEAST_RANGE = 0.1  # of a vertical axis: less would magnify noise
-LABEL_SHARE = 0.12  # width of a mark's label, of the time axis
+LEAST_RANGE = 0.1  # minimum range of a vertical axis; less would magnify noise
+LABEL_SHARE = 0.12  # width of a mark's label as a share of the time axis
 
 
 def draw(
     pair: Pair, steps: Steps, wanted: Wanted, marks: Iterable[Mark], manifest: TargetManifest
 ) -> "Figure":
-    """A panel for each of `wanted.panels` that both runs have; `steps` are shaded in those of its actions."""
+    """Draw a panel for each of `wanted.panels` that both runs have. In the panels of `wanted.actions`, shade
+    `steps`."""
     units = {channel.name: channel.unit for channel in (*manifest.compared, *manifest.plotted)}
     panels = [(c, what) for c, what in wanted.panels if c in pair.golden and c in pair.faulty]
     first = max(float(pair.t[0]), pair.start - BEFORE_S)
@@ -57,7 +58,7 @@ def draw(
 
 
 def first_ones(marks: Iterable[Mark]) -> list[Mark]:
-    """The marks in order, with only the first alert."""
+    """Yield the marks in order, with only the first alert."""
     kept: list[Mark] = []
     for mark in marks:
         if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in kept):
@@ -66,7 +67,7 @@ def first_ones(marks: Iterable[Mark]) -> list[Mark]:
 
 
 def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
-    """Golden dashed above the solid faulty line, so that both are visible if equal."""
+    """Draw golden dashed above the solid faulty line, so that both are visible where they are equal."""
     t = pair.t[shown]
     axis.plot(t, finite(pair.faulty[channel][shown]), "-", color=FAULTY_COLOUR, linewidth=1.6, label="faulty")
     axis.plot(
@@ -77,15 +78,16 @@ def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
 
 
 def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
-    """A grey band over each run of `steps`."""
+    """Draw a grey band over each series of consecutive `steps`."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
         axis.axvspan(t[begin], t[end - 1], color=SHADE, alpha=0.45, linewidth=0)
 
 
 def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
-    """A line through all panels for each mark, with names above the first panel, as low as possible."""
-    free: list[float] = []  # the end of each level of names
+    """Draw a line through all panels for each mark. The names are above the first panel, each as low as
+    possible."""
+    free: list[float] = []  # the end of the last name on each level
     end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
     for mark in marks:
         for axis in axes:
@@ -95,7 +97,7 @@ def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
                 linestyle=MARK_LINES[mark.kind],
                 linewidth=1.8 if mark.kind is MarkKind.HAZARD else 1.1,
             )
-        fits = mark.t + room <= end  # else the name ends at its mark
+        fits = mark.t + room <= end  # else the name ends at its mark instead of beginning there
         begin = mark.t if fits else mark.t - room
         level = next((i for i, taken in enumerate(free) if taken <= begin), len(free))
         free[level : level + 1] = [begin + room]

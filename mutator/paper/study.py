@@ -1,4 +1,4 @@
-"""The study, as provided by its entry point in `mutator.studies`."""
+"""The study that the entry point in `mutator.studies` provides."""
 
 from mutator.figures.figures import Drawing
 from mutator.paper.examples import example_drawings
@@ -10,7 +10,8 @@ from mutator.statistics.published import Published
 
 
 def published(run: ReportedRun) -> Published | None:
-    """The paper's counts; None if the library cites none, or if the run has none of its fault types."""
+    """The counts of the paper. None if the library cites none, or if the run has none of the paper's fault
+    types."""
     references = run.workspace.library / "references" if run.workspace else None
     if references is None or not has_paper(references):
         return None
@@ -20,7 +21,8 @@ def published(run: ReportedRun) -> Published | None:
 
 
 def drawings(run: ReportedRun) -> tuple[Drawing, ...]:
-    """Unsafe control actions in single experiments, only for finished runs of published fault types."""
+    """The figures of unsafe control actions in single experiments, only for finished runs with published
+    fault types."""
     if published(run) is None or len(run.texts) != run.folder.planned:
         return ()
     return example_drawings(run.folder, run.frame, run.workspace)
