@@ -61,7 +61,7 @@ class ClusterModel(StrictModel, title="A cluster file"):
         description="The queueing system that starts the workers as jobs, or Kubernetes with Dask's operator."
     )
     workers: Annotated[int, Field(ge=1, le=100_000)] = Field(
-        description="Number of worker processes, with one thread each. The run begins when the first is ready."
+        description="Number of worker processes of one thread each. The run begins when the first is ready."
     )
     options: dict[str, Any] = Field(
         default={},
