@@ -149,7 +149,7 @@ class Engines:
         )
 
     def run(self, name: str, job: Job) -> tuple[Execution, dict[str, bytes]]:
-        """The result of a job, and the files that it left."""
+        """Return the result of a job and the files that it left."""
         ((_, execution),) = [
             (job, replace(done, log=done.log)) for job, done in self._kept(self.made[name], [job])
         ]
@@ -175,7 +175,7 @@ def three(
 
 
 def values(three: Engines, path: str) -> list[FaultLocation]:
-    """Every anchor of every value in a file of the toy."""
+    """Return every anchor of every value in a file of the toy."""
     found, seen = [], Counter[tuple[str, AnchorKind, str, str | None]]()
     for function, known in parsed(three.manifest.tree, path).expressions.items():
         for kind, name, which in (role for one in known for role in dict.fromkeys(one.roles)):
@@ -220,8 +220,9 @@ def test_same_bytes(three: Engines, model: str) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
-    """Every fault model under every kind of trigger gives the reference engine's bytes; a trigger that never
-    holds gives them without a run.
+    """Every fault model under every kind of trigger gives the reference engine's bytes.
+
+    A trigger that never holds gives them without a run.
     """
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
@@ -271,7 +272,7 @@ def test_every_bad_end(three: Engines, model: str) -> None:
 
 
 def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
-    """The reference engine reruns what does not end well, and the engine's server continues."""
+    """The reference engine reruns what does not end well. The engine's server continues."""
     job = three.job(fault("crash", GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"])
     execution, _ = three.run("fork", job)
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
@@ -284,7 +285,7 @@ def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
 def test_the_limit_of_steps_counts_golden_ones(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A fork that exceeds the limit of steps times out after as many steps as in any engine."""
+    """A fork that exceeds the limit of steps times out after as many steps as in any other engine."""
     few = Engines(copy_toycar(tmp_path), tmp_path, replace(LIMITS, steps=100))
     try:
         job = few.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])

@@ -149,9 +149,7 @@ def everything(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Work
 
 
 def test_nothing_is_left_out(everything: Workspace) -> None:
-    """The campaign has every kind of anchor, and every fault model except the operators' own, with its
-    location.
-    """
+    """The campaign has every kind of anchor and every fault model, except the operators' own."""
     anchors = {kind for kind in AnchorKind for fault in FAULTS if kind.value in fault["at"]}
     assert anchors == set(AnchorKind)
     shipped = {model.name for model in everything.fault_models() if not model.name.startswith("operator_")}
@@ -161,7 +159,7 @@ def test_nothing_is_left_out(everything: Workspace) -> None:
 
 @pytest.mark.slow
 def test_engines_agree_on_everything(everything: Workspace, tmp_path: Path) -> None:
-    """The tables of the whole campaign are the same bytes on each engine."""
+    """The tables of the whole campaign have the same bytes on each engine."""
     tables = {}
     for engine in ("reference", "warm", "fork"):
         out = tmp_path / engine

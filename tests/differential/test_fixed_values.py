@@ -1,4 +1,4 @@
-"""Constants and defaults that the probe sets give the same bytes on each engine, and change the drive."""
+"""Constants and defaults that the probe sets give the same bytes on each engine and change the result."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -97,8 +97,9 @@ def fault(*locations: FaultLocation) -> Fault:
 
 
 def test_all_at_once(three: Engines) -> None:
-    """A mutant that switches all of them on and off is forked, counts each active step once for each, and
-    gives the reference engine's bytes.
+    """A mutant that switches all values on and off is forked and gives the reference engine's bytes.
+
+    Each active step counts once for each value.
     """
     job = three.job(fault(*PLACES.values()), TRIGGERS["off and on"])
     execution = check_same(three, job, RunMode.FORK)

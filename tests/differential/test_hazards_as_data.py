@@ -1,4 +1,4 @@
-"""The hazards of the shipped target's manifest equal those of its own checker, at the same times."""
+"""The hazards in the shipped target's manifest occur at the times that its own checker finds."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Injections limited to one instance or some executions give the same bytes on each engine."""
+"""Injections into one instance or some executions give the same bytes on each engine."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -49,8 +49,9 @@ def fault(*injections: Injection) -> Fault:
 
 
 def test_all_at_once(three: Engines) -> None:
-    """A mutant limited to one instance, to some executions, and to both is forked, gives the reference
-    engine's bytes, and counts the activations.
+    """A mutant with limited injections is forked, gives the reference engine's bytes and counts activations.
+
+    They are limited to one instance, to some executions, and to both.
     """
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
     assert execution.probe is not None
@@ -64,6 +65,6 @@ def test_all_at_once(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("injection", INJECTIONS, ids=["instance", "value", "guard"])
 def test_each_under_every_trigger(three: Engines, injection: Injection, trigger: str) -> None:
-    """Each of them under every kind of trigger gives the reference engine's bytes."""
+    """Each limited injection, under every kind of trigger, gives the reference engine's bytes."""
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     check_same(three, three.job(fault(injection), TRIGGERS[trigger]), how)

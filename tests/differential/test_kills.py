@@ -1,4 +1,4 @@
-"""Killed at random moments, a campaign reaches the same results and leaves nothing behind."""
+"""A campaign killed at random moments reaches the same results and leaves nothing behind."""
 
 import os
 import random
@@ -31,7 +31,7 @@ def contents(tree: Path) -> dict[str, bytes]:
 
 
 def struck(command: Command, kill: Kill, after_s: float) -> bool:
-    """Kill it, or one of its workers, after that time; return false if it ended before."""
+    """Kill the command, or one of its workers, after that time. Return false if it ended before."""
     try:
         command.process.wait(after_s)
         return False
@@ -49,7 +49,7 @@ def struck(command: Command, kill: Kill, after_s: float) -> bool:
 
 
 def scratch(out: Path) -> list[Path]:
-    """Files that a run folder may contain only while a command works there."""
+    """Return files that a run folder may contain only while a command works there."""
     return [path for path in out.rglob("*") if path.name == "work" or is_half_written(path.name)]
 
 
@@ -58,7 +58,7 @@ def results_digest(out: Path) -> str:
 
 
 def stage(out: Path) -> str:
-    """How far a run is: `start`, `checks`, `experiments` or `results`."""
+    """Return how far a run is: `start`, `checks`, `experiments` or `results`."""
     if (out / "results.csv").exists():
         return "results"
     if any((out / "records").glob("*.jsonl")):
@@ -81,7 +81,7 @@ class Campaign:
         self.longest_s = time.monotonic() - began
 
     def kill_and_resume(self, kills: Sequence[Kill]) -> None:
-        """Do runs, each in a new folder with its own checks, until all kills have come."""
+        """Run in new folders, each with its own checks, until all kills have happened."""
         left, number = list(kills), count()
         while left:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results
@@ -120,7 +120,7 @@ def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) 
 
 
 def test_kills_on_the_controller_that_ships(tmp_path: Path) -> None:
-    """The shipped controller does the same: 30 experiments without frames, killed six times."""
+    """The same holds for the shipped controller: 30 experiments without frames, killed six times."""
     for name in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["-m", "mutator", "run", "paper_reference", "-n", "2", "--limit", "30"]

@@ -1,4 +1,4 @@
-"""A run's process ends, and leaves files and processes, in the same way in every engine."""
+"""A run's process ends in the same way in every engine, with the same files and processes left."""
 
 import os
 import signal
@@ -108,8 +108,9 @@ def lives(pid: int) -> bool:
 
 
 def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
-    """Ten daemons of a mutant (in separate sessions, ignoring signals, some with children, some forking
-    repeatedly) are all gone after the run, in any engine.
+    """Ten daemons of a mutant are all gone after the run, in any engine.
+
+    They are in separate sessions and ignore signals. Some have children, and some fork repeatedly.
     """
     notes = tmp_path / "notes"
     notes.mkdir()
@@ -126,7 +127,7 @@ def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
 def test_daemons_of_a_killed_engine(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str
 ) -> None:
-    """When an engine's process is killed in the middle of a run, the run's daemons end, too."""
+    """If an engine's process is killed during a run, the run's daemons end, too."""
     notes = tmp_path / "notes"
     notes.mkdir()
     trouble = DAEMONS.format(notes=str(notes)) + "\n(NOTES.parent / 'all').touch()\ntime.sleep(60)\n"
@@ -191,8 +192,9 @@ def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
 
 
 def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) -> None:
-    """An `atexit` handler that the loaded target registers is called once a run in each engine, in the run's
-    output folder, and never in the waiting processes.
+    """An `atexit` handler of the loaded target runs once in each run, in the run's output folder.
+
+    It never runs in the waiting processes.
     """
     calls = tmp_path / "calls"
     head = (
@@ -207,7 +209,7 @@ def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) ->
 
 
 def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
-    """A run with an `atexit` handler that never returns is a timeout in each engine."""
+    """In each engine, a run with an `atexit` handler that never returns is a timeout."""
     waits = "import atexit, time\natexit.register(time.sleep, 100)"
     told = misbehave(waits, limits=replace(LIMITS, wall_s=2))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "wall time limit of 2 s")}
@@ -215,7 +217,7 @@ def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
 
 
 def test_a_handler_that_fails(misbehave: Misbehave) -> None:
-    """A failure at the end of a run that has reported is not a crash, in any engine."""
+    """In no engine is a failure at the end of a run that has reported a crash."""
     told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 

@@ -32,7 +32,7 @@ DERIVED = ("results.csv", "results.parquet", "propagation.parquet", "plan.csv", 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Runs:
-    """The small campaign whole (`whole`), and as two shards (`1/2`, `2/2`) in separate folders."""
+    """The small campaign as a whole (`whole`) and as two shards (`1/2`, `2/2`) in separate folders."""
     folder = tmp_path_factory.mktemp("shards")
     toy = copy_toycar(folder)
     made = {"whole": folder / "whole", "1/2": folder / "one", "2/2": folder / "two"}
@@ -46,7 +46,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
 
 @pytest.fixture
 def copies(runs: Runs, tmp_path: Path) -> Runs:
-    """Copies of them that a test may break."""
+    """Copies of these runs that a test may damage."""
     return {name: Path(shutil.copytree(path, tmp_path / path.name)) for name, path in runs.items()}
 
 
@@ -56,9 +56,7 @@ def change_head(run: Path, **values: object) -> None:
 
 
 def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """Results, plan, patches and series equal those of the single run, byte for byte, in any order
-    of shards.
-    """
+    """Results, plan, patches and series equal the single run's byte for byte, in any order of shards."""
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
@@ -95,7 +93,7 @@ def test_a_merged_run_folder_has_series_from_the_first(
 
 
 def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """The seal does not depend on the number of machines; a shard has a different seal."""
+    """The seal does not depend on the number of machines. A shard has a different seal."""
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
@@ -104,8 +102,9 @@ def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
 def test_shards_have_the_engine_of_the_whole(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the whole plan is large enough to fork, every shard is forked, however small: the merged run has the
-    proof and the seal of the whole.
+    """If the whole plan is large enough to fork, every shard is forked, however small.
+
+    The merged run has the proof and the seal of the whole run.
     """
     monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
@@ -124,7 +123,7 @@ def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
 
 
 def test_shards_are_disjoint_and_all(runs: Runs) -> None:
-    """Every experiment is run by exactly one shard; the shards' plan digest is that of the whole."""
+    """Every experiment is run by exactly one shard. The shards' plan digest is that of the whole run."""
     one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
     assert not one & two
     assert one | two == whole
@@ -132,7 +131,7 @@ def test_shards_are_disjoint_and_all(runs: Runs) -> None:
 
 
 def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
-    """A shard resumes without naming it again; another shard is refused in its folder."""
+    """A shard resumes without naming it again. Its folder refuses another shard."""
     summary = run_campaign(toy, "small", copies["1/2"])
     assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
     with pytest.raises(MutatorError, match="shard 2/2"):
@@ -155,7 +154,7 @@ def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> No
     ],
 )
 def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str) -> None:
-    """A missing shard, a duplicate one, or a whole run is refused, and nothing is written."""
+    """A missing shard, a duplicate shard or a whole run is refused, and nothing is written."""
     with pytest.raises(MutatorError, match=told):
         merge([runs[name] for name in given], tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -164,7 +163,7 @@ def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...
 def test_shards_of_something_else_are_told(
     copies: Runs, toy: Workspace, tmp_path: Path, reseal: Reseal
 ) -> None:
-    """Another plan, other sources or another number of shards is refused with the folder's name."""
+    """Another plan, other sources or another number of shards is refused. The error names the folder."""
     two = copies["2/2"]
     head = json.loads((two / "run.json").read_text())
     for change, told in (
@@ -182,7 +181,7 @@ def test_shards_of_something_else_are_told(
 
 
 def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
-    """A shard that lacks a record, or holds one of another shard, is refused with the reason."""
+    """A shard that lacks a record, or has one of another shard, is refused with the reason."""
     one, two = copies["1/2"], copies["2/2"]
     path = next((one / "records").iterdir())
     lines = path.read_bytes().splitlines(keepends=True)
@@ -212,8 +211,9 @@ def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, re
 def test_a_shard_whose_proof_failed_is_told(
     copies: Runs, tmp_path: Path, broken: str, reseal: Reseal
 ) -> None:
-    """If the reference engine contradicts one experiment of any shard, nothing is merged; the error names
-    experiment and folder.
+    """If the reference engine contradicts an experiment of any shard, nothing is merged.
+
+    The error names experiment and folder.
     """
     for path in (copies["1/2"], copies["2/2"]):
         shutil.copytree(path / "records", path / "proof")
@@ -241,7 +241,7 @@ def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> N
 
 
 def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
-    """The same command completes a killed merge at any stage, and does not delete other people's files."""
+    """The same command completes a merge killed at any stage, and deletes no other files."""
     out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
     for name in (".run.json.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
@@ -259,7 +259,7 @@ def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
 def test_a_merge_that_fails_leaves_nothing(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If results cannot be built, no files are left, and the command can be repeated."""
+    """If results cannot be built, no files are left and the command can be repeated."""
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr("mutator.outcomes.results.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")

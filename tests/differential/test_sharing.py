@@ -1,4 +1,4 @@
-"""Runs common to several scenarios are run once, counted in each, and proved equal first."""
+"""Runs common to several scenarios run once, count in each, and are first proved to be equal."""
 
 import csv
 import json
@@ -52,7 +52,7 @@ def two_scenarios(toy: Workspace, changes: str) -> Workspace:
 
 @pytest.fixture(scope="module")
 def driven() -> dict[str, list[str]]:
-    """Names of the runs that were run for each of `runs`, including the checks' runs."""
+    """Return the names of the runs that were run for each of `runs`, including the checks' runs."""
     return {"shared": [], "apart": []}
 
 
@@ -80,8 +80,9 @@ def runs(
 
 
 def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
-    """Results with shared runs equal those of running everything, byte for byte; each scenario has
-    its row.
+    """With shared runs, the results equal those of running everything, byte for byte.
+
+    Each scenario has its row.
     """
     shared, apart = runs
     for name in ("results.csv", "results.parquet"):
@@ -93,7 +94,7 @@ def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
 
 
 def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
-    """Two guided runs are shared by two scenarios each; random runs have separate times."""
+    """Two guided runs are shared by two scenarios each. Random runs have separate times."""
     shared, apart = (load_plan(RunFolder.open(run)) for run in runs)
     assert (len(shared.experiments), shared.runs) == (8, 6)
     assert (len(apart.experiments), apart.runs) == (8, 8)
@@ -110,14 +111,15 @@ def test_they_are_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]
 
 
 def test_the_checks_prove_it(runs: tuple[Path, Path]) -> None:
-    """The fault-free runs of scenarios declared equal are compared, and the check is kept."""
+    """The fault-free runs of scenarios declared equal are compared. The check is kept."""
     checks = json.loads((runs[0] / "checks.json").read_text())["results"]
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
 
 
 def test_part_of_a_shared_run_is_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """If a kill or a split leaves one experiment of a shared run, a worker runs its own golden run and keeps
-    its record.
+    """If one experiment of a shared run is left, a worker runs its own golden run and keeps its record.
+
+    A kill or a split of the work can leave one experiment.
     """
     folder = RunFolder.open(runs[0])
     toy = Workspace(
@@ -139,7 +141,7 @@ def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
 
 
 def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> None:
-    """A manifest that declares different scenarios equal is refused before any run, with their names."""
+    """A manifest that declares different scenarios equal is refused with their names before any run."""
     two_scenarios(toy, SHARED)
     edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)

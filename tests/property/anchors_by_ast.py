@@ -72,7 +72,7 @@ def _statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _effects(statement: ast.stmt) -> Iterator[tuple[str, str]]:
-    """(verb, name) of everything that a statement assigns, calls and returns."""
+    """Return (verb, name) of everything that a statement assigns, calls and returns."""
     called = None
     if isinstance(statement, ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return):
         value = statement.value

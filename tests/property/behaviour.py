@@ -12,7 +12,7 @@ MOST_STEPS = 1000
 
 
 def behaviour(data: bytes) -> object:
-    """What a module does with a probe that is never active: its trace, output, ending and variables."""
+    """Return what a module does with a probe that is never active: trace, output, ending and variables."""
     run = _Run()
     names: dict[str, Any] = {
         "T": run.trace,
@@ -143,7 +143,7 @@ class _Later:
 
 
 def _ended(result: Any) -> Any:
-    """The outcome of a call: a coroutine's result, a generator's first values."""
+    """Return the outcome of a call: a coroutine's result or a generator's first values."""
     if isinstance(result, types.CoroutineType):
         try:
             result.send(None)
@@ -163,7 +163,7 @@ async def _next(values: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """A value that can be compared between runs."""
+    """Return a value that can be compared between runs."""
     if isinstance(value, int | float | str | bytes | None):
         return value
     if isinstance(value, list | tuple):

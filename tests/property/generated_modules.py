@@ -1,6 +1,7 @@
-"""Modules of every shape that Python allows, made from a seed; they run, terminate, and trace what they did.
+"""Generated modules of every shape that Python allows. They run, terminate and trace what they did.
 
-They need the names that `behaviour` provides, such as `T`, which records and returns a value, and `call`.
+A seed determines the module. Modules need the names that `behaviour` provides, such as `T`, which records and
+returns a value, and `call`.
 """
 
 import sys

@@ -1,7 +1,7 @@
 """What must hold for mutants of any source, proved by `ast`, bytecode and execution, without LibCST.
 
-`prove` splices at every anchor of a source, and counts the tries and the refusals by reason. It raises Wrong
-if a property fails or a refusal is unnecessary.
+`prove` splices at every anchor of a source and counts tries and refusals by reason. It raises Wrong if a
+property fails or a refusal is unnecessary.
 """
 
 import ast
@@ -120,7 +120,7 @@ def _expect(holds: bool, what: str, mutant: bytes = b"") -> None:
 
 
 def _reason(error: MutatorError) -> str:
-    """The reason of a refusal, without what differs between cases; it must name the file."""
+    """Return the reason of a refusal without what differs between cases. It must name the file."""
     _expect(error.where is not None, f"no file: {error}")
     text = re.sub(
         r"'[^']*'|`[^`]*`|\d+", "_", re.sub(r"(error: [a-z ]+).*", r"\1", error.got, flags=re.DOTALL)
@@ -187,7 +187,7 @@ def _line(file: ParsedFile, number: int) -> bytes:
 
 
 def _check_site(file: ParsedFile, site: Site, spot: Spot) -> None:
-    """The lines of the site are those where `ast` sees the statement."""
+    """Check that the lines of the site are those where `ast` sees the statement."""
     end = spot.node.end_lineno or 0
     if spot.kind in AFTER:
         between = b"".join(file.lines[end : site.last]).strip(b" \t\f\r\n\\;")
@@ -210,8 +210,9 @@ def _spliced(file: ParsedFile, group: Sequence[_Placed]) -> bytes:
 
 
 def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
-    """Each injected statement is next to its anchored one; without them the tree's dump equals the
-    original's.
+    """Check that each injected statement is next to its anchored one.
+
+    Without the injected statements, the tree's dump equals the original's.
     """
     lines, changed = Lines.of(mutant), ast.parse(mutant)
     found: dict[str, Beside] = {}
@@ -271,7 +272,7 @@ def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
 
 
 def _forced(file: ParsedFile, spot: Spot, model: str, params: dict[str, Any]) -> bytes:
-    """The mutant that was refused."""
+    """Return the mutant that was refused."""
     site, code = file.resolve(spot.location), snippet(_MODELS.get(model), params, "abcd0123")
     make = splicing.guard if _MODELS.get(model).kind is SnippetKind.GUARD else splicing.insertion
     return splicing.joined(splicing.apply_edits(file, [make(file, site, code, "abcd0123")]))

@@ -24,7 +24,7 @@ TIME = st.sampled_from([2.0, 2.5, 3.0, 7.25])
 
 @st.composite
 def rows(draw: st.DrawFn) -> Row:
-    """Any row that a campaign can leave, and some that it cannot."""
+    """Return any row that a campaign can leave, and some that it cannot."""
     names = draw(st.lists(st.sampled_from(["H1", "H2"]), unique=True))
     hazards = tuple(sorted(((name, draw(TIME)) for name in names), key=lambda h: h[1]))
     status = draw(st.sampled_from(Status))
@@ -51,7 +51,7 @@ def test_a_run_does_not_differ_from_itself(row: Row) -> None:
 
 @given(rows(), rows())
 def test_what_is_worse_one_way_is_better_the_other(a: Row, b: Row) -> None:
-    """Swapping the runs reverses every change; a different hazard may count as a change either way."""
+    """Swapping the runs reverses every change. A different hazard can count as a change either way."""
     there = Pair(None, None, a, b).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
     back = Pair(None, None, b, a).changes - {Change.OTHER_HAZARD}  # type: ignore[arg-type]
     assert {MIRROR[change] for change in there} == back

@@ -1,4 +1,4 @@
-"""Conditions: one canonical text, and a decision for every observation."""
+"""Each condition has one canonical text and decides every observation."""
 
 import ast
 import re
@@ -76,7 +76,7 @@ def test_any_text_is_answered(text: str) -> None:
 @settings(max_examples=200, deadline=None)
 @given(CONDITIONS, st.lists(OBSERVED, min_size=1, max_size=6))
 def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, float]]) -> None:
-    """Over a whole trace a condition holds in exactly the steps in which it holds alone."""
+    """Over a whole trace, a condition holds in exactly the steps in which it holds for the single step."""
     try:
         canonical = check_condition(text, variables=VARIABLES)
     except MutatorError as error:
@@ -88,7 +88,7 @@ def test_a_trace_is_decided_as_its_steps_are(text: str, steps: list[dict[str, fl
 
 
 def test_formulas_over_a_trace() -> None:
-    """Formulas over a trace equal hand-computed numbers: a choice, division by 0, the rate of change."""
+    """Formulas over a trace equal numbers computed by hand: a choice, division by 0, the rate of change."""
     trace = {
         "t": np.array([0.0, 0.5, 1.5]),
         "gap": np.array([3.0, 2.0, -1.0]),

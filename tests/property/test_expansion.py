@@ -35,7 +35,7 @@ def library(seed: int, reading: str) -> list[Fault]:
 def test_draws_lie_in_their_ranges(
     seed: int, key: str, ranges: tuple[tuple[float, float], ...], kind: str, cap: int | None
 ) -> None:
-    """There is one value from each range, integer if the range is, up to the cap, and the same every time."""
+    """Each range has one value, up to the cap. It is an integer if the range is, and the same every time."""
     draw = Draw(key=key, name="x", unit="m", kind=kind, ranges=ranges, decimals=None, cap=cap)
     values = draw_values(draw, seed)
     assert len(values) == len(ranges)

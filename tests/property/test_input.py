@@ -37,7 +37,7 @@ PLAIN = st.recursive(
     | st.text("a: -[]{}#&*!|>'\"\n\t%@", max_size=60).map(str.encode)
 )
 def test_any_bytes(tmp_path: Path, data: bytes) -> None:
-    """Arbitrary bytes are strict YAML, or a MutatorError that names the file."""
+    """Arbitrary bytes are read as strict YAML or raise a MutatorError that names the file."""
     path = tmp_path / "x.yaml"
     path.write_bytes(data)
     try:
@@ -90,7 +90,7 @@ def test_a_damaged_spec(tmp_path: Path, data: st.DataObject) -> None:
 @given(st.binary(max_size=100) | st.text("def f(x):\n=1#\"'\\ \t;", max_size=80).map(str.encode))
 @example(b"#\x80")  # LibCST has no line for it
 def test_any_source(data: bytes) -> None:
-    """Arbitrary bytes are Python that can be spliced, or a MutatorError."""
+    """Arbitrary bytes are read as Python that can be spliced, or raise a MutatorError."""
     try:
         file = parse_file("x.py", data, Path("root"))
     except MutatorError as error:
@@ -144,9 +144,7 @@ SHAPES = {
 
 @pytest.mark.parametrize("shape", SHAPES)
 def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
-    """A file with a shape that would take long to read, or end the interpreter, is refused at once with its
-    line.
-    """
+    """A file that takes long to read, or ends the interpreter, is refused at once with its line."""
     path = tmp_path / "x.yaml"
     path.write_text(SHAPES[shape], encoding="utf-8")
     began = time.process_time()
@@ -163,7 +161,7 @@ def test_a_shape_that_would_take_long(tmp_path: Path, shape: str) -> None:
     st.data(),
 )
 def test_any_shape(tmp_path: Path, words: list[str], data: st.DataObject) -> None:
-    """Brackets, dashes and line endings in any order and number are soon read or refused."""
+    """Brackets, dashes and line endings in any order and number are read or refused quickly."""
     text = "".join(word * data.draw(st.sampled_from([1, 1, 1, 1000, 50_000])) for word in words)
     path = tmp_path / "x.yaml"
     path.write_text(text, encoding="utf-8")
@@ -188,8 +186,9 @@ NESTED = {
 
 @pytest.mark.parametrize("nested", NESTED)
 def test_nested_expressions(nested: str) -> None:
-    """Conditions and filters of any depth and length are soon read or refused; those read can be
-    evaluated.
+    """Conditions and filters of any depth and length are read or refused quickly.
+
+    Those that are read can be evaluated.
     """
     began = time.process_time()
     with suppress(MutatorError):

@@ -64,7 +64,7 @@ def triggers(draw: st.DrawFn) -> Trigger:
 
 @st.composite
 def varied(draw: st.DrawFn) -> Fault:
-    """A fault of the library with any other numbers in it."""
+    """Return a fault of the library with other numbers in it."""
     fault = draw(st.sampled_from(faults()))
     injections = []
     for injection in fault.injections:
@@ -106,7 +106,7 @@ def values(param: ParamSchema, names: list[str]) -> st.SearchStrategy[Value]:
 
 
 def made(way: object, fault: Fault, trigger: Trigger) -> Mutant | tuple[type, str]:
-    """The mutant, or the reason it is refused."""
+    """Return the mutant or the reason for its refusal."""
     try:
         return way(*paper(), fault, trigger)
     except MutatorError as error:

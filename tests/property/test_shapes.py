@@ -1,4 +1,4 @@
-"""Patches grouped by shape: each patch can be restored for any values, and one label means one shape."""
+"""Patches grouped by shape can be restored for any values, and one label means one shape."""
 
 import math
 from dataclasses import replace

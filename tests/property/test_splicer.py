@@ -1,4 +1,4 @@
-"""The splicer on generated sources: it restores every byte, and does what LibCST's insertion does."""
+"""On generated sources, the splicer restores every byte and does what LibCST's insertion does."""
 
 import ast
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""The splicer on thousands of sources: every mutant that it does not refuse is correct.
+"""On thousands of sources, every mutant that the splicer does not refuse is correct.
 
 `pytest -m slow -n 2 -rP tests/property/test_splicer_at_large.py` tries all and prints the figures.
 """
@@ -93,9 +93,7 @@ READS = b"def f(a):\n    b = T(1, abs(a) + max(a, 1))\n    return b\ncall(f, 2)\
 def test_a_broken_splicer_is_found(
     place: ModuleType, name: str, source: bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without one of its checks, or with a wrong end of a statement or a wrong depth, the splicer fails a
-    proof.
-    """
+    """Without one of its checks, or with a wrong statement end or depth, the splicer fails a proof."""
     assert not proved([("", source)], behaviour, 20).wrong
     broken = {
         "libcst_module": without_check_of_bytes,

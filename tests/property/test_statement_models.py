@@ -1,4 +1,4 @@
-"""Statements that fault models repeat or exchange, throughout the shipped controller."""
+"""Fault models that repeat or exchange statements, tried throughout the shipped controller."""
 
 import ast
 from collections import Counter
@@ -53,8 +53,9 @@ def locations(file: ParsedFile) -> Iterator[FaultLocation]:
 )
 @pytest.mark.parametrize("model", ["reordering", "repetition"])
 def test_statements_of_the_controller(model: str, files: list[Path], least: int) -> None:
-    """Wherever two statements are exchanged, or one is repeated, the file compiles, un-splices to its bytes,
-    and equals the original to `ast` without the active branch; refusals have a reason.
+    """Wherever statements are exchanged or repeated, the file compiles and un-splices to its bytes.
+
+    Without the active branch, it equals the original to `ast`. Refusals have a reason.
     """
     models, made = Workspace.find(root=CLONE).fault_models(), 0
     for path in files:

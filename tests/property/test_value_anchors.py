@@ -79,7 +79,7 @@ def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
 
 
 def active(node: ast.expr) -> bool:
-    """Whether it asks the probe if a fault is active."""
+    """Whether the node asks the probe if a fault is active."""
     return isinstance(node, ast.Call) and ast.unparse(node.func) == "_fi.active"
 
 
@@ -163,8 +163,9 @@ def checked(names: Sequence[str], count: int) -> int:
 
 
 def test_a_changed_value_is_all_that_differs() -> None:
-    """A mutant compiles, un-splices to every byte, calls the probe once for each value, and acts like the
-    module while no fault is active; each anchor leads to its own expression.
+    """A changed value compiles, un-splices to every byte and calls the probe once for each value.
+
+    While no fault is active, it acts like the module. Each anchor leads to its own expression.
     """
     assert checked(FEW, 300) == 300
 

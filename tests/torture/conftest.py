@@ -1,4 +1,4 @@
-"""Common to all torture tests: their seeds, and a place for their tables."""
+"""The seeds and tables that all torture tests share."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,7 +9,7 @@ from .tally import Tally
 
 @pytest.fixture
 def seeds(request: pytest.FixtureRequest) -> Callable[[int], Sequence[int]]:
-    """The seeds of that many cases; `--tries` overrides the number, `--seed` picks one seed."""
+    """Return the seeds of that many cases. `--tries` overrides the number, `--seed` picks one seed."""
     tries, seed = request.config.getoption("tries"), request.config.getoption("seed")
     return lambda usual: [seed] if seed is not None else range(tries or usual)
 

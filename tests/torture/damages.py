@@ -1,4 +1,4 @@
-"""Damage to files on a disk: each damage is a function of the file, its neighbours and chance."""
+"""Damage to files on a disk. Each damage is a function of the file, its neighbours and chance."""
 
 import json
 import os
@@ -115,13 +115,13 @@ def become_a_folder(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def become_a_link(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """A link to nowhere, to itself, or to another file or folder."""
+    """Replace the file by a link to nowhere, to itself, or to another file or folder."""
     path.unlink()
     path.symlink_to(chance.choice([path.with_name("nowhere"), path, path.parent, *others]))
 
 
 def become_a_pipe(path: Path, others: Sequence[Path], chance: Chance) -> None:
-    """A pipe or a socket: a reader must not wait for data that never comes."""
+    """Replace the file by a pipe or a socket. A reader must not wait for data that never comes."""
     path.unlink()
     if chance.random() < 0.7:
         os.mkfifo(path)
@@ -149,7 +149,7 @@ def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def changed(value: Any, chance: Chance, strange: Sequence[object] = STRANGE) -> Any:
-    """A value with one nested value changed, at any depth."""
+    """Return the value with one nested value changed, at any depth."""
     inside = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     if not inside or chance.random() < 0.1:
         return chance.choice(strange)
@@ -176,7 +176,7 @@ DAMAGES: dict[str, Damage] = {
 
 
 def contents(folder: Path) -> dict[str, bytes | str]:
-    """The contents of a folder by name: bytes of files, targets of links."""
+    """Return the contents of a folder by name: bytes of files, targets of links."""
     return {
         path.relative_to(folder).as_posix(): str(path.readlink()) if path.is_symlink() else path.read_bytes()
         for path in sorted(folder.rglob("*"))
@@ -187,8 +187,9 @@ def contents(folder: Path) -> dict[str, bytes | str]:
 def damage(
     folder: Path, names: Sequence[str], chance: Chance, damages: Sequence[str]
 ) -> tuple[str, list[str]]:
-    """Damage one of these files in one of these ways until it differs; return how, and the names of all
-    changed files.
+    """Damage one of these files in one of these ways until it differs.
+
+    Return the way and the names of all changed files.
     """
     before = contents(folder)
     while True:

@@ -29,20 +29,20 @@ SHAPES = (
 
 
 def change_a_value(text: str, chance: Chance) -> str:
-    """Well-formed YAML with another value somewhere."""
+    """Return well-formed YAML with another value somewhere."""
     data = changed(yaml.safe_load(text), chance, WILD)
     return yaml.safe_dump(data, allow_unicode=True, sort_keys=False)
 
 
 def insert_a_shape(text: str, chance: Chance) -> str:
-    """Something that is hard to parse, at the end of a word."""
+    """Insert something that is hard to parse at the end of a word."""
     places = [place for place, letter in enumerate(text) if letter in " \n"] or [0]
     place = chance.choice(places)
     return text[: place + 1] + chance.choice(SHAPES) + text[place + 1 :]
 
 
 def repeat_a_line(text: str, chance: Chance) -> str:
-    """A line, thousands of times."""
+    """Repeat a line thousands of times."""
     lines = text.splitlines(keepends=True) or ["a\n"]
     place = chance.randrange(len(lines))
     return "".join([*lines[:place], lines[place] * chance.choice([2, 3000]), *lines[place + 1 :]])
@@ -60,7 +60,7 @@ MALFORMS: dict[str, Malform] = {
 
 
 def malform(path: Path, chance: Chance) -> str:
-    """Damage a hand-written file, half of the time in a way specific to its kind; return how."""
+    """Damage a hand-written file, half of the time in a way specific to its kind. Return the way."""
     text = path.read_text(encoding="utf-8")
     ways = [*MALFORMS] if path.suffix == ".yaml" else [*MALFORMS][1:]
     # reading is mostly about values

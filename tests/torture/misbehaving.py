@@ -92,8 +92,9 @@ chunk: 2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Misdeed:
-    """What a mutant does when its fault is first active, the statuses that its experiment may have, and
-    whether its fault model declares that it raises.
+    """A misdeed: what a mutant does when its fault is first active, and the statuses that are allowed.
+
+    It also says whether the fault model declares that it raises.
     """
 
     name: str
@@ -106,7 +107,7 @@ class Misdeed:
         return self.name.replace(" ", "_").lower()
 
     def write(self, workspace: Workspace) -> None:
-        """Write its fault model and its fault spec."""
+        """Write the misdeed's fault model and fault spec."""
         imports = [f"import {name}" for name in MODULES]
         body = ["    " + line for line in (*imports, *self.lines)]
         # what looks like Jinja2 in them is Python
@@ -135,8 +136,9 @@ def misdeeds() -> dict[str, Misdeed]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Came:
-    """A campaign's result: exit code, output, the lines of results.csv by experiment, those of misdeeds by
-    fault type, and what is wrong with the files it left.
+    """The result of a campaign: exit code, output and what is wrong with the files it left.
+
+    It has the lines of results.csv by experiment, and those of misdeeds by fault type.
     """
 
     code: int
@@ -149,7 +151,7 @@ class Came:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A campaign: its engine, its workers, the method that triggers its faults, its misdeeds."""
+    """A campaign as drawn: its engine, its workers, its trigger method and its misdeeds."""
 
     engine: str
     workers: int
@@ -179,7 +181,7 @@ class Misbehaving:
         return Drawn(engine=engine, workers=workers, method=method, names=tuple(names))
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """A campaign with some misdeeds on some engine: a case for each of them."""
+        """Run a campaign with some misdeeds on some engine. Each misdeed is a case."""
         drawn = self.drawn[seed]
         came = self._came(drawn, LONGEST_S)
         problem = self._problem(came, drawn.method)
@@ -194,7 +196,7 @@ class Misbehaving:
         return Case(kind=misdeed.name, damage=str(status), reader=reader, end=end, story=story)
 
     def _problem(self, came: Came, method: str) -> str:
-        """What is wrong with a campaign, whatever its misdeeds; empty if nothing."""
+        """Return what is wrong with a campaign, whatever its misdeeds, or an empty text."""
         if came.left:
             return came.left
         if "Traceback" in came.said or "defect of mutator" in came.said:
@@ -207,7 +209,7 @@ class Misbehaving:
         return "".join(f"{came.rows.get(name)}, not {right.get(name)}" for name in changed)
 
     def _difference(self, misdeed: Misdeed, method: str, came: Came) -> str:
-        """What is wrong with a misdeed's result; empty if nothing."""
+        """Return what is wrong with a misdeed's result, or an empty text."""
         status, row = came.status.get(misdeed.model), came.bad.get(misdeed.model)
         if status not in misdeed.ends:
             return f"not one of {', '.join(sorted(misdeed.ends))}: {row}"
@@ -218,7 +220,7 @@ class Misbehaving:
         return "" if row == right else f"{row}, not {right} as on the reference engine"
 
     def _reference(self, method: str) -> Came:
-        """The results of all drawn misdeeds in one campaign on the reference engine."""
+        """Return the results of all drawn misdeeds in one campaign on the reference engine."""
         if method not in self._right:
             drawn = [one for one in self.drawn.values() if one.method == method]
             names = sorted({name for one in drawn for name in one.names})
@@ -266,7 +268,7 @@ class Misbehaving:
         return came
 
     def _left(self) -> str:
-        """What a command left behind wrongly; empty if nothing."""
+        """Return what a command wrongly left behind, or an empty text."""
         left = [*(self.at / "tmp").iterdir()]
         left += [
             path for path in (self.at / "run").glob("*") if path.name == "work" or is_half_written(path.name)
@@ -276,7 +278,7 @@ class Misbehaving:
         return "" if contents(self.tree) == self.before else "the tree of the user is another one"
 
     def table(self) -> str:
-        """The verdicts of each misdeed on each engine."""
+        """Return the verdicts of each misdeed on each engine."""
         names = sorted({name for name, _ in self.verdicts})
         rows = [
             (name, *(", ".join(sorted(self.verdicts[name, one])) or "-" for one in ENGINES)) for name in names

@@ -47,7 +47,7 @@ PATTERNS = {
 
 
 class Inputs:
-    """A library, with templates and target; each case has one malformed file."""
+    """A library with templates and target. Each case has one malformed file."""
 
     def __init__(self, root: Path) -> None:
         self.root, self.home = root, root.with_name("genuine")
@@ -74,7 +74,7 @@ class Inputs:
         return [Case(kind=kind, damage=how, reader=verb, end=end, story=story)]
 
     def _told(self, verb: str) -> tuple[Told, float]:
-        """A verb's output, and its CPU time in s."""
+        """Return a verb's output and its CPU time in s."""
         began = time.process_time()
         with limited(LONGEST_S):
             code, out, err = cli(*VERBS[verb])

@@ -1,6 +1,4 @@
-"""A command killed at any moment, as a whole or in part, reaches the same results when repeated, and leaves
-no process behind.
-"""
+"""A command killed at any moment reaches the same results when repeated and leaves no process."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -35,7 +33,7 @@ def test_kills(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The command completes with the undisturbed result after any kills."""
+    """After any kills, the command completes with the undisturbed result."""
     monkeypatch.setenv("MUTATOR_ROOT", str(CLONE if name == SHIPPED_RUN else toy.library.parent))
     monkeypatch.chdir(tmp_path)
     scene = next(one for one in scenes(toy, tmp_path / "homes", tmp_path / "case") if one.name == name)

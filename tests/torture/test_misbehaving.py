@@ -1,5 +1,6 @@
-"""Whatever mutants do, the command ends in time, ordinary experiments have their results, every engine gives
-the same verdict, and nothing is left behind.
+"""With any misbehaving mutants, the command ends in time and leaves nothing behind.
+
+Ordinary experiments have their results, and every engine gives the same verdict.
 """
 
 import resource
@@ -28,7 +29,7 @@ def test_misbehaving(
     print_tally: Callable[[Tally | str], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Misdeeds do not disturb the ordinary faults next to them, on any engine."""
+    """Misdeeds do not disturb the ordinary faults in the same campaign, on any engine."""
     monkeypatch.chdir(tmp_path)
     limits = resource.getrlimit(resource.RLIMIT_AS)
     wanted = seeds(TRIES)

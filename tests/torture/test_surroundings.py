@@ -1,5 +1,6 @@
-"""In any surroundings a campaign gives the same bytes or is refused with a remedy; once that is applied, the
-same command gives them.
+"""In any surroundings a campaign gives the same bytes or is refused with a remedy.
+
+After the remedy, the same command gives these bytes.
 """
 
 import random

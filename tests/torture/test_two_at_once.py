@@ -1,5 +1,6 @@
-"""A second command in the folder of a running campaign: each gives the right result or is refused because the
-folder is in use, and the folder ends up complete.
+"""A second command in the folder of a running campaign does no harm.
+
+Each command gives the right result or is refused because the folder is in use. The folder ends up complete.
 """
 
 import random
@@ -61,7 +62,7 @@ class Pair:
         }
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """One begins, then the other; sometimes a signal hits one of them; then the command runs alone."""
+        """One command begins, then the other. Sometimes a signal hits one. Then the command runs alone."""
         chance = random.Random(seed)
         name = chance.choice(sorted(self.others))
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -91,7 +92,7 @@ class Pair:
         return [Case(kind=name, damage=f"{len(both)} to their ends", reader="run", end=end, story=story)]
 
     def _judge(self, command: Command, said: str, name: str) -> tuple[End, str]:
-        """How one of them ended; output about an unfinished run is valid, too."""
+        """Return how one of the commands ended. Output about an unfinished run is valid, too."""
         code = command.process.returncode
         end, why = judged(Told(code=code, said=said), Told(code=0, said=""), [""])
         if end is End.REFUSED and name == "verify" and code == 1:

@@ -1,4 +1,4 @@
-"""Run folders to damage: each case gets a copy of one, always at the same path."""
+"""Run folders to damage. Each case gets a copy of one, always at the same path."""
 
 import random
 import shutil
@@ -54,9 +54,9 @@ class World:
         return [Case(kind=kind, damage=how, reader=reader, end=end, story=story)]
 
     def _resealed(self, reader: str) -> Told:
-        """A reader's output for a folder with recomputed digests, if the damage allows that.
+        """Return a reader's output for a folder with recomputed digests, if the damage allows that.
 
-        Only the seal reveals another result.
+        Only the seal reveals a changed result.
         """
         assert self.reseal
         with suppress(MutatorError, AttributeError, KeyError, TypeError, ValueError):
@@ -88,7 +88,7 @@ class World:
 
 
 def kinds_of(home: Path) -> dict[str, list[str]]:
-    """The files below a folder by kind: the files in one subfolder of a run folder are one kind."""
+    """Return the files below a folder by kind. The files in one subfolder of a run folder are one kind."""
     found = defaultdict(list)
     for path in sorted(home.rglob("*")):
         if path.is_file():
@@ -114,7 +114,7 @@ def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
 
 
 def _difference(told: Told, right: Told) -> str:
-    """What differs, in short."""
+    """Return a short description of the difference."""
     if isinstance(right.result, list) and isinstance(told.result, list):
         pairs = [pair for pair in zip(told.result, right.result, strict=False) if pair[0] != pair[1]]
         return "; ".join(f"{_first(*pair)}" for pair in pairs)
@@ -125,14 +125,17 @@ def _difference(told: Told, right: Told) -> str:
 
 
 def _first(told: object, right: object) -> str:
-    """The first line in which two texts differ."""
+    """Return the first line in which two texts differ."""
     lines = zip(str(told).splitlines(), str(right).splitlines(), strict=False)
     one, other = next((pair for pair in lines if pair[0] != pair[1]), (told, right))
     return f"{one!s:.500}, not {other!s:.500}"
 
 
 class TooLong(Exception):
-    """Something exceeds its time. Not a TimeoutError: that is an OSError, which readers expect."""
+    """A time limit is exceeded.
+
+    This is not a TimeoutError, because that is an OSError, which readers expect.
+    """
 
 
 @contextmanager
