@@ -1,6 +1,5 @@
-"""A server in this process, on a toy library and a made-up run folder, and a client that can send
-anything.
-"""
+"""A server in this process, with a toy library and a made-up run folder, and a client that can send any
+request."""
 
 import http.client
 import json
@@ -47,7 +46,8 @@ class Answer:
 
 @dataclass(frozen=True)
 class Client:
-    """A client of the server. No response may contain the token, the secret, or a path on the disk."""
+    """A client of the server. It checks that no response contains the token, the secret, or a path on the
+    disk."""
 
     port: int
     place: Path
@@ -66,7 +66,8 @@ class Client:
         *,
         chunked: bool = False,
     ) -> Answer:
-        """Send a request like the server's page, except for `headers`: None leaves one out."""
+        """Send a request as the server's page does, except for `headers`, in which None leaves a header
+        out."""
         own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
         if method == "POST":
             own |= {"Origin": self.origin, "Content-Type": "application/json"}
@@ -81,7 +82,7 @@ class Client:
                 sent["Content-Length"] = str(len(data))
             for name, value in sent.items():
                 connection.putheader(name, value)
-            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before everything was sent
+            with suppress(BrokenPipeError, ConnectionResetError):  # it was refused before it was all sent
                 connection.endheaders(data, encode_chunked=chunked)
             answer = connection.getresponse()
             found = Answer(answer.status, {k.lower(): v for k, v in answer.getheaders()}, answer.read())
@@ -100,7 +101,7 @@ class Client:
         return self.ask("POST", path, body=body)
 
     def ended(self, job: str, within_s: float = 300.0) -> dict[str, Any]:
-        """Wait until the job has ended, and return it."""
+        """Wait until the job ends, and return it."""
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             found = next(one for one in self.get("/api/jobs").json["jobs"] if one["id"] == job)
@@ -138,7 +139,8 @@ def client(
     copy_toycar: Callable[[Path], Workspace],
     served_at: Callable[[Workspace, Path], Any],
 ) -> Iterator[Client]:
-    """A server of a copy of the toy's library and of the made-up run `night`, with a secret next to it."""
+    """A server for a copy of the toy's library and the made-up run `night`, with a secret file in the
+    folder above."""
     place = tmp_path_factory.mktemp("served")
     workspace = copy_toycar(place)
     shutil.rmtree(workspace.library / "faults" / "hostile")
@@ -147,6 +149,6 @@ def client(
     night.mkdir(parents=True)
     make_run(night)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(figures, "drawings", lambda frame: ())  # they take seconds, and are tested elsewhere
+        patch.setattr(figures, "drawings", lambda frame: ())  # these take seconds and are tested elsewhere
         with served_at(workspace, place / "runs") as client:
             yield client

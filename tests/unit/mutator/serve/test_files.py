@@ -1,4 +1,4 @@
-"""Only files of reports are served from a run folder and the disk, whatever the trick."""
+"""From a run folder and the disk, only files of reports are served, whatever the request."""
 
 import json
 import shutil
@@ -44,7 +44,7 @@ SECRETS = ("secret.csv", "runs/night/run.json")
     ],
 )
 def test_no_address_leads_out(client: Client, address: str) -> None:
-    """Any name in an address is the name of something served, or nothing."""
+    """A name in an address is either the name of something that is served, or it is not found."""
     ways = [f"{step}/" * 2 + secret for step in STEPS for secret in SECRETS]
     for way in (*ways, *map(str, (client.place / secret for secret in SECRETS)), "/etc/passwd"):
         for path in (address.format(way), address.format(quote(way, safe=""))):
@@ -57,7 +57,7 @@ def test_no_address_leads_out(client: Client, address: str) -> None:
 
 @pytest.mark.parametrize("spec", ["../../secret.csv", "toy/fault_library/targets/toycar.yaml", "/etc/passwd"])
 def test_a_spec_is_no_path(client: Client, spec: str) -> None:
-    """On the command line a spec may be a file; in an address it is a name in the library."""
+    """A spec in an address is the name of one in the library. A file, as on the command line, is refused."""
     for given in (spec, quote(spec, safe="")):
         answer = client.get(f"/api/review/toycar?spec={given}")
         assert answer.status in (400, 404)
@@ -80,7 +80,8 @@ def test_only_what_a_report_shows_is_served(client: Client, name: str) -> None:
 
 
 def test_files_of_a_report_are_served(client: Client) -> None:
-    """Images and tables are served with their types, and parts of a film on request."""
+    """Images and tables are served with their types. A part of a film is served if the request asks for a
+    range."""
     assert client.get("/runs/night/results.csv").headers["content-type"].startswith("text/csv")
     picture = client.get(f"/runs/night/plots/{'0' * 16}-14.50s.jpg")
     assert (picture.headers["content-type"], picture.data) == ("image/jpeg", b"picture")
@@ -93,7 +94,7 @@ def test_files_of_a_report_are_served(client: Client) -> None:
 
 @pytest.fixture
 def linked(client: Client) -> Iterator[Path]:
-    """A separate run folder to put links into."""
+    """A separate run folder, in which a test may put links."""
     folder = client.place / "runs" / "linked"
     folder.mkdir()
     yield make_run(folder)
@@ -104,7 +105,7 @@ def linked(client: Client) -> Iterator[Path]:
     "name", ["plots/a.svg", "report/tables/a.csv", "results.csv", "series/index.js", "series/kept/a.js"]
 )
 def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: str) -> None:
-    """A link in a run folder is not followed, whether its target is outside or inside."""
+    """A link in a run folder is not followed, wherever its target is."""
     path = linked / name
     path.parent.mkdir(parents=True, exist_ok=True)
     for end in (client.place / "secret.csv", linked / "plan.csv"):
@@ -115,9 +116,8 @@ def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: st
 
 @pytest.mark.parametrize("name", ["plots", "report", "series"])
 def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: str) -> None:
-    """A linked folder on the way is not followed either; no report is built and no job started that would
-    write there.
-    """
+    """A linked folder in the path is not followed. No report is built and no job is started that would
+    write there."""
     outside = client.place / "outside"
     outside.mkdir(exist_ok=True)
     for kind in ("a.svg", "a.html", "index.js"):
@@ -136,7 +136,7 @@ def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: 
 
 @pytest.mark.parametrize("name", ["report/figures/a.svg", "records/a.jsonl", "series/kept/.a.js.1"])
 def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linked: Path, name: str) -> None:
-    """A link at any depth prevents a command, whose output would follow the link."""
+    """A link at any depth prevents a command, because its output would follow the link."""
     end = client.place / "secret.csv"
     (linked / name).parent.mkdir(parents=True, exist_ok=True)
     (linked / name).symlink_to(end)
@@ -148,7 +148,7 @@ def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linke
 
 
 def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
-    """A link in a folder of runs is not a run."""
+    """A link in the folder of runs is not served as a run."""
     elsewhere = client.place / "elsewhere"
     elsewhere.mkdir()
     make_run(elsewhere)
@@ -173,7 +173,8 @@ def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
 )
 @pytest.mark.parametrize("name", ["series/index.js", "series/kept/0123456789abcdef.js"])
 def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: str) -> None:
-    """Series are scripts of this server's origin, so only a call with one plain string is served."""
+    """A series is a script of this server's origin, so it is served only if it is one call with one plain
+    string."""
     path = client.place / "runs/night" / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text.replace("NAME", path.stem))
@@ -182,7 +183,8 @@ def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: 
 
 
 def test_series_are_served_as_they_are(client: Client) -> None:
-    """Every byte is served unchanged and without an encoding, as the page's lengths require."""
+    """A series is served byte by byte and without an encoding, because the page relies on lengths in
+    bytes."""
     path = client.place / "runs/night/series/kept/0123456789abcdef.js"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(script_of(path.stem, bytes(range(256)) + b'");alert(1);("'))
@@ -193,9 +195,8 @@ def test_series_are_served_as_they_are(client: Client) -> None:
 
 
 def test_a_hostile_report_runs_no_script(client: Client, linked: Path) -> None:
-    """A page that poses as the newest report, including its stamp, gets a policy that none of its scripts
-    fits.
-    """
+    """A page that claims to be the newest report, including the stamp, gets a policy that allows none of
+    its scripts."""
     assert client.get("/runs/linked/report/index.html").status == 200
     page = linked / "report" / "index.html"
     page.write_text(
@@ -205,7 +206,7 @@ def test_a_hostile_report_runs_no_script(client: Client, linked: Path) -> None:
     stamp["files"]["index.html"] = digest(page.read_bytes())
     (linked / "report/made_from.json").write_text(json.dumps(stamp))
     answer = client.get("/runs/linked/report/index.html")
-    assert "alert(2)" in answer.text  # otherwise this would prove nothing
+    assert "alert(2)" in answer.text  # without this, the test would prove nothing
     scripts = answer.headers["content-security-policy"].split("script-src ")[1].split(";")[0]
     assert "unsafe" not in scripts and "http" not in scripts and "data:" not in scripts
     assert blocks(answer.text, "script")
@@ -218,7 +219,7 @@ HOSTILE = "<img src=x onerror=alert(1)>"
 
 
 def test_names_and_words_of_runs_are_text(client: Client) -> None:
-    """A run folder's name, a campaign's name and a run's errors are escaped everywhere."""
+    """The names of run folders and campaigns, and the errors of runs, are escaped everywhere."""
     folder = client.place / "runs" / HOSTILE
     folder.mkdir()
     make_run(folder, campaign=HOSTILE)
@@ -251,5 +252,5 @@ def test_names_and_words_of_runs_are_text(client: Client) -> None:
     ],
 )
 def test_places_are_left_out(text: str, told: str) -> None:
-    """Of an absolute path only the last part is shown; other slashes stay."""
+    """Of an absolute path, only the last part is shown. Other slashes stay as they are."""
     assert without_places(text) == told

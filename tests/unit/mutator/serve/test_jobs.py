@@ -1,4 +1,4 @@
-"""Jobs, from the request to the files in the run folder; all tests share one small campaign of the toy."""
+"""Jobs, from the request to the files in the run folder. All tests share one small campaign of the toy."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -49,7 +49,7 @@ def experiment(client: Client) -> str:
 
 
 def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
-    """Its run folder is complete, is served, and can be compared with itself."""
+    """The run folder of a job is complete, is served, and can be compared with itself."""
     assert RunFolder.open(busy.place / "runs/first").finished
     [run] = busy.get("/api/runs").json["runs"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
@@ -66,7 +66,7 @@ def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
 
 @pytest.mark.slow
 def test_an_exact_plot_is_kept_in_the_run(busy: Client) -> None:
-    """Trace, plot and series are where `rerun --trace` puts them, and are served."""
+    """Trace, plot and series are stored where `rerun --trace` stores them, and they are served."""
     about = {"run": "first", "experiment": experiment(busy)}
     answer = busy.post("/api/jobs", {"kind": "plot", **about})
     job = busy.ended(answer.json["id"])
@@ -78,7 +78,7 @@ def test_an_exact_plot_is_kept_in_the_run(busy: Client) -> None:
 
 @pytest.mark.slow
 def test_a_try_has_its_plot(busy: Client) -> None:
-    """The try goes into try/ next to the runs and is no run; the job links to its plot."""
+    """A try is stored in try/, next to the runs, and is not a run. The job links to its plot."""
     order = {"kind": "try", "spec": "sensor/lane", "scenario": "A", "trigger": "2", "value": 2.4}
     job = busy.ended(busy.post("/api/jobs", order).json["id"])
     assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json
@@ -88,7 +88,7 @@ def test_a_try_has_its_plot(busy: Client) -> None:
 
 
 def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
-    """Jobs run one at a time: the second waits, and both can be cancelled; afterwards no process is left."""
+    """Jobs run one at a time, so the second job waits. Both can be cancelled, and no process is left."""
     order = {"kind": "campaign", "campaign": "toy", "name": "second", "limit": 20, "workers": 2}
     first, second = (busy.post("/api/jobs", order).json["id"] for _ in range(2))
     states = {job["id"]: job["state"] for job in busy.get("/api/jobs").json["jobs"]}
@@ -105,7 +105,7 @@ def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
 
 @pytest.mark.slow
 def test_a_job_that_fails_says_why(busy: Client) -> None:
-    """The reason is the command line's error line, without paths on the disk."""
+    """A job fails with the error line of the command line, without paths on the disk."""
     target = busy.place / "toy/tree/toycar/sensing.py"
     whole = target.read_text()
     target.write_text(whole + "# changed\n")
@@ -122,9 +122,8 @@ def job(**given: Any) -> Job:
 
 
 def test_what_a_job_prints_is_text() -> None:
-    """Control characters and paths are removed, markup stays text, and the beginning of excessive output is
-    cut.
-    """
+    """Control characters and paths are removed from a message, and markup stays text. If the output is too
+    long, its beginning is cut."""
     made = job()
     made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
     made.hear(b"\xff\xfe\n")
@@ -136,7 +135,7 @@ def test_what_a_job_prints_is_text() -> None:
 
 
 def test_progress_is_that_of_the_stage() -> None:
-    """A stage that counts has a share, another one has none."""
+    """The progress of a stage that counts is a share. Other stages have none."""
     made = job()
     made.hear(b"golden runs 1/4, 2.0 a second\n")
     assert made.progress == 0.25
@@ -145,7 +144,7 @@ def test_progress_is_that_of_the_stage() -> None:
 
 
 def test_only_so_many_jobs_wait() -> None:
-    """The number of waiting jobs is limited, so that no page can fill the memory."""
+    """The number of waiting jobs is limited, so that a page cannot fill the memory."""
     jobs = Jobs(0, lambda work: None)
     for _ in range(50):
         assert jobs.submit(job().work).state is State.QUEUED

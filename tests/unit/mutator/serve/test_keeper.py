@@ -1,4 +1,5 @@
-"""A job's keeper: no process of a command outlives the server, which holds the other end of its pipe."""
+"""The keeper of a job ends a command's processes when the server ends. The server holds the other end of
+its pipe."""
 
 import os
 import signal
@@ -10,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-# A keeper of another command than mutator, with a shorter timeout.
+# A keeper for a command that is not mutator, with a shorter timeout.
 KEEPER = """
 import os, sys
 from mutator.serve import keeper
@@ -19,7 +20,7 @@ execv = os.execv
 keeper.os.execv = lambda path, words: execv(path, [path, "-c", *words[4:]])
 sys.exit(keeper.main())
 """
-# Starts a process in another session, reports it, and waits; `{}` is its reaction to a request to end.
+# Starts a process in another session, reports it, and waits. `{}` is the reaction to a request to end.
 COMMAND = """
 import pathlib, signal, subprocess, sys, time
 def end(number, frame):
@@ -41,7 +42,7 @@ def eventually(holds: Callable[[], bool]) -> bool:
 
 
 def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
-    """A keeper of a script, and its server's end of the pipe."""
+    """Start the keeper of a script; return it and the server's end of the pipe."""
     watched, hold = os.pipe()
     words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
     keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)
@@ -58,13 +59,13 @@ def is_gone(pid: int) -> bool:
 
 
 def child_of(folder: Path) -> int:
-    """The process that the command started."""
+    """The process id of the process that the command started."""
     assert eventually((folder / "started").exists)
     return int((folder / "started").read_text())
 
 
 def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
-    """When the pipe is closed, the command is asked to end, and its children end, too."""
+    """When the pipe is closed, the command is asked to end, and its children end as well."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     os.close(hold)
@@ -74,7 +75,7 @@ def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
 
 
 def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
-    """After a timeout the command is killed with all its children."""
+    """After a timeout, the command and all its children are killed."""
     keeper, hold = kept(tmp_path, COMMAND.format("pass"), patience_s=0.2)
     child = child_of(tmp_path)
     os.close(hold)
@@ -91,12 +92,12 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
     keeper.wait()
     assert eventually(lambda: is_gone(int(command)))
     os.close(hold)
-    os.kill(child, signal.SIGKILL)  # the script's own: it does not look after its child
+    os.kill(child, signal.SIGKILL)  # the child's process: the script does not end it
 
 
 @pytest.mark.parametrize("code", [0, 1, 3])
 def test_the_exit_code_is_the_commands(tmp_path: Path, code: int) -> None:
-    """The exit code lets the server distinguish failed jobs."""
+    """The keeper's exit code is that of the command, so that the server recognizes failed jobs."""
     keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
     assert keeper.wait(20) == code
     os.close(hold)

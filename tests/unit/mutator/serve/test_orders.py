@@ -1,4 +1,4 @@
-"""Requests for jobs: names, ids and numbers, all checked before anything starts."""
+"""Requests for jobs. Their names, ids and numbers are all checked before anything starts."""
 
 import math
 from pathlib import Path
@@ -85,7 +85,7 @@ ABSENT = "0" * 16
     ],
 )
 def test_a_hostile_order_starts_nothing(client: Client, order: Any) -> None:
-    """A hostile request is refused as wrong input and creates no job."""
+    """A hostile request is refused as invalid input and creates no job."""
     answer = client.ask("POST", "/api/jobs", body=order)
     assert answer.status in (400, 404), answer.text
     assert answer.json["error"]["got"]
@@ -96,7 +96,7 @@ def test_a_hostile_order_starts_nothing(client: Client, order: Any) -> None:
     "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", ""]
 )
 def test_an_order_is_json(client: Client, kind: str) -> None:
-    """Data that a form of another site could send is not accepted as JSON."""
+    """Data that a form on another site could send are not accepted as JSON."""
     assert client.ask("POST", "/api/jobs", {"Content-Type": kind}, TRY).status == 415
     assert client.get("/api/jobs").json == {"jobs": []}
 
@@ -115,9 +115,8 @@ def work(desk: Desk, **order: Any) -> Work:
 
 
 def test_orders_are_command_lines(desk: Desk) -> None:
-    """Each request becomes a verb of the command line, on this library, with each value as a
-    separate word.
-    """
+    """Each request becomes a verb of the command line, for this library, with each value as a separate
+    argument."""
     run = desk.runs.folder("first")
     experiment = next(plan_file.ids(run))
     place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
@@ -147,12 +146,12 @@ def test_orders_are_command_lines(desk: Desk) -> None:
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
 def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
-    """A trigger is a context, with or without its table, a time, always, or a condition."""
+    """A trigger is a context with or without its table, a time, `always`, or a condition."""
     assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
 
 
 def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
-    """A campaign never runs into a link in the folder of runs, or into one in an existing folder."""
+    """A campaign does not run into a link in the folder of runs, or into a link inside an existing folder."""
     (tmp_path / "runs" / "new").symlink_to(tmp_path)
     with pytest.raises(MutatorError, match="a link"):
         work(desk, **CAMPAIGN)
@@ -162,6 +161,6 @@ def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
 
 
 def test_numbers_are_finite(desk: Desk) -> None:
-    """JSON cannot make a fault's value infinite."""
+    """A fault's value in JSON cannot be infinite."""
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)

@@ -1,4 +1,5 @@
-"""Reviews for the page's script: when the response arrives, the decision is in the library's file."""
+"""The requests of the review page's script. When the response arrives, the decision is in the library's
+file."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -21,14 +22,14 @@ API = "/api/review/toycar"
 def reviewed(
     toycar: Workspace, tmp_path: Path, served_at: Callable[[Workspace, Path], Any]
 ) -> Iterator[tuple[Client, list[str]]]:
-    """A server of a writable library, and the ids of its groups, for the lane specs only."""
+    """A server of a writable library, and the ids of its groups of lane specs."""
     (tmp_path / "runs").mkdir()
     with served_at(toycar, tmp_path / "runs") as client:
         yield client, list(client.get(f"{API}?spec=sensor/*").json["groups"])
 
 
 def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more: Any) -> Any:
-    """The response to changes (group, kind) by somebody with the current view."""
+    """The response to changes, given as group and kind, by a reviewer with the current view."""
     groups = client.get(f"{API}?spec=sensor/*").json["groups"]
     body = {
         "changes": [{"group": group, "kind": kind, "text": more.get("text", "")} for group, kind in changes],
@@ -56,9 +57,8 @@ def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Wor
 
 
 def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """A newer decision of somebody else is reported, nothing is written, and after seeing it the reviewer may
-    decide.
-    """
+    """If somebody else has decided since, this is reported and nothing is written. A reviewer who has seen
+    the other decision may decide."""
     client, (first, second, *_) = reviewed
     group = next(
         one for one in of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",)) if one.id == first
@@ -76,7 +76,7 @@ def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: W
 def test_another_diff_than_the_page_shows_is_not_approved(
     reviewed: tuple[Client, list[str]], toycar: Workspace
 ) -> None:
-    """A page from before a change of the target cannot decide about what it does not show."""
+    """A page loaded before the target changed cannot be used to decide about lines that it does not show."""
     client, [*names] = reviewed
     before = client.get(f"{API}?spec=sensor/*").json["groups"]
     sensing = toycar.library.parent / "tree/toycar/sensing.py"
@@ -121,7 +121,7 @@ def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toyc
 
 
 def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
-    """A script in a name, a remark or an address never becomes markup; the page's data are packed."""
+    """Scripts in a name, a remark or an address do not become markup. The data of the page are packed."""
     client, (first, *_) = reviewed
     assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
     answer = client.get(f"{API}?spec=sensor/*")
@@ -134,7 +134,7 @@ def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
 
 
 def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[str]]) -> None:
-    """A group without images, an unknown level and an unknown run give "not found"."""
+    """A group without images, an unknown level and an unknown run are "not found"."""
     client, (first, *_) = reviewed
     assert client.get(f"/review/toycar/{first}/picture/most-after.jpg?spec=sensor/*").status == 404
     assert client.get(f"{API}/{first}/typical?spec=sensor/*&run=none").status == 404
@@ -144,7 +144,7 @@ def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[st
 
 
 def test_a_review_file_is_no_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """A linked review file is neither shown nor written."""
+    """A review file that is a link is neither shown nor written."""
     client, (first, *_) = reviewed
     other = client.place / "secret.txt"
     other.write_text(SECRET)

@@ -1,4 +1,4 @@
-"""Requests from elsewhere are refused, whatever they ask for."""
+"""Requests from elsewhere are refused, whatever they request."""
 
 import base64
 import hashlib
@@ -19,23 +19,22 @@ ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", 
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_another_host_is_refused(client: Client, path: str, host: str | None) -> None:
-    """A page under another name that resolves to this machine reads nothing, although the browser sends its
-    request here.
-    """
+    """A page under another name that resolves to this machine can read nothing, although the browser sends
+    its requests to this server."""
     answer = client.get(path, Host=host and host.format(port=client.port))
     assert answer.status in (400, 403)
     assert "<" not in answer.text
 
 
 def test_both_names_of_this_machine_will_do(client: Client) -> None:
-    """The address may also use localhost."""
+    """The address may have localhost as its host."""
     assert client.get("/", Host=f"localhost:{client.port}").status == 200
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://{own}", ""])
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_another_origin_is_refused(client: Client, method: str, origin: str) -> None:
-    """Whatever a browser sends for a page of another origin, nothing is read or done."""
+    """A page of another origin can read and do nothing, whatever headers its browser sends."""
     own = origin.format(own=f"127.0.0.1:{client.port}")
     answer = client.ask(method, "/api/jobs", {"Origin": own}, b"{}" if method == "POST" else None)
     assert answer.status == 403
@@ -43,7 +42,7 @@ def test_another_origin_is_refused(client: Client, method: str, origin: str) -> 
 
 
 def test_what_changes_anything_says_where_it_comes_from(client: Client) -> None:
-    """A POST without an origin, or marked by the browser as cross-site, is refused."""
+    """A POST is refused if it has no origin, or if the browser marks it as cross-site."""
     assert client.ask("POST", "/api/jobs", {"Origin": None}, b"{}").status == 403
     for site in ("cross-site", "same-site", "anything"):
         assert client.get("/api/jobs", Sec_Fetch_Site=site).status == 403
@@ -55,16 +54,16 @@ def test_what_changes_anything_says_where_it_comes_from(client: Client) -> None:
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_without_the_token_nothing_is_answered(client: Client, path: str, cookie: str | None) -> None:
-    """Without the right cookie there is no page, file or error; another server's cookie does not count."""
+    """Without the right cookie, no page, file or error is sent. The cookie of another server is not
+    accepted."""
     answer = client.get(path, Cookie=cookie and cookie.format(port=client.port))
     assert answer.status == 403
     assert "the server printed" in answer.text
 
 
 def test_the_token_becomes_a_cookie(client: Client) -> None:
-    """The first address sets a cookie that scripts cannot read and other sites do not send, and redirects to
-    an address without the token.
-    """
+    """The first address sets a cookie that scripts cannot read and that other sites do not send. It
+    redirects to an address without the token."""
     answer = client.get(f"/?token={TOKEN}", Cookie=None)
     assert (answer.status, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"].lower()
@@ -76,7 +75,7 @@ def test_the_token_becomes_a_cookie(client: Client) -> None:
     "query", ["token=wrong", "token=", f"token={TOKEN}&token=wrong", f"token={TOKEN[:-1]}", "token=%ff"]
 )
 def test_a_wrong_token_is_refused(client: Client, query: str) -> None:
-    """A wrong token opens nothing, even with a valid cookie."""
+    """A wrong token gives no access, even with a valid cookie."""
     answer = client.get(f"/?{query}")
     assert answer.status == 403
     assert "set-cookie" not in answer.headers
@@ -84,7 +83,7 @@ def test_a_wrong_token_is_refused(client: Client, query: str) -> None:
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "PROPFIND"])
 def test_other_methods_are_refused(client: Client, method: str) -> None:
-    """Only GET and POST are accepted; a cross-origin preflight gets no permission."""
+    """Only GET and POST are accepted. A preflight from another origin gets no permission."""
     answer = client.ask(method, "/api/jobs")
     assert answer.status == 405
     assert not [name for name in answer.headers if name.startswith("access-control")]
@@ -92,20 +91,20 @@ def test_other_methods_are_refused(client: Client, method: str) -> None:
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_long_body_is_refused(client: Client, chunked: bool) -> None:
-    """A body above the limit is refused, with or without a stated length."""
+    """A body above the limit is refused, whether or not its length is stated."""
     body = b'{"kind": "' + b"x" * (MOST_BYTES + 10) + b'"}'
     assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 413
 
 
 @pytest.mark.parametrize("length", ["99999999999999999999999", "1000001"])
 def test_a_length_that_is_told_is_believed(client: Client, length: str) -> None:
-    """A stated length above the limit is refused before the body arrives."""
+    """If the stated length is above the limit, the request is refused before the body arrives."""
     answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
     assert answer.status in (400, 413)
 
 
 def test_a_body_within_the_limit_is_read(client: Client) -> None:
-    """A body within the limit is read, in one piece or several, and its errors are reported."""
+    """A body within the limit is read, in one part or several, and its errors are reported."""
     body = b'{"kind": "' + b"x" * (MOST_BYTES - 100) + b'"}'
     for chunked in (False, True):
         assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 400
@@ -113,9 +112,8 @@ def test_a_body_within_the_limit_is_read(client: Client) -> None:
 
 @pytest.mark.parametrize("path", [*ASKED, "/runs/night/results.csv", "/?token=wrong"])
 def test_every_answer_has_the_policy(client: Client, path: str) -> None:
-    """Pages, files, refusals and errors all have the policy: only our scripts, no framing, no type
-    guessing.
-    """
+    """The policy is part of every response: pages, files, refusals and errors. It allows only our scripts,
+    no framing, and no guessing of types."""
     headers = client.get(path).headers
     policy = headers["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self' 'sha256-")
@@ -130,13 +128,13 @@ def test_every_answer_has_the_policy(client: Client, path: str) -> None:
 
 
 def blocks(page: str, tag: str) -> list[str]:
-    """The content of the page's elements of that kind that a browser would run or apply."""
+    """The content of the page's elements of this kind, as far as a browser would run or apply it."""
     found = re.findall(rf"<{tag}( type=[^>]*)?>(.*?)</{tag}>", page, re.DOTALL)
     return [text for kind, text in found if not kind]
 
 
 def check_policy(answer: Answer) -> None:
-    """Fail on a page with a script or a style sheet outside the policy."""
+    """Fail if the page has a script or a style sheet that the policy does not allow."""
     carried = blocks(answer.text, "script") + blocks(answer.text, "style")
     assert carried
     for text in carried:
@@ -147,7 +145,7 @@ def check_policy(answer: Answer) -> None:
 
 @pytest.mark.parametrize("path", ["/runs/night/report/index.html", "/review/toycar"])
 def test_pages_run_by_the_policy(client: Client, path: str) -> None:
-    """The policy covers every script and style sheet of our pages."""
+    """The policy allows every script and style sheet of our pages."""
     answer = client.get(path)
     assert answer.status == 200, answer.text
     check_policy(answer)

@@ -1,6 +1,6 @@
-"""A report's statistics computed a second time in plain Python, from formulas, without the harness.
+"""The statistics of a report, computed a second time in plain Python from formulas, without the harness.
 
-Rows are dicts as `made_up` draws them; missing times are absent.
+Rows are dicts as `made_up` draws them. Times that are missing are absent from the dict.
 """
 
 import math
@@ -18,9 +18,8 @@ ALERTS = ("fcw", "steer_saturated", "driver_distracted")
 
 
 def made_up(seed: int) -> list[dict[str, Any]]:
-    """A campaign of guided and random runs: faults in scenarios and context rows, some without a partner,
-    some crashed; times lie on a grid of 0.1 s, so that there are ties.
-    """
+    """Draw a campaign of guided and random runs: faults in scenarios and context rows, some without a
+    partner, some crashed. Times are multiples of 0.1 s, so that there are ties."""
     draw = random.Random(seed)
     faults = draw.randint(4, 30)
     scenarios = list(ENDS)[: draw.randint(1, 3)]
@@ -30,7 +29,7 @@ def made_up(seed: int) -> list[dict[str, Any]]:
     for fault, scenario, context in product(range(faults), scenarios, ("C1", "C2")):
         kind = list(harm)[fault % len(harm)]
         for method in ("guided", "random"):
-            if draw.random() < 0.05:  # not run yet
+            if draw.random() < 0.05:  # this run is still missing
                 continue
             module, fault_type = kind.split("/")
             trigger = context if method == "guided" else f"random/{context}"
@@ -78,7 +77,7 @@ def hazard_at(row: Row) -> float | None:
 
 
 def counts(rows: Sequence[Row]) -> dict[str, int]:
-    """Counts by the summary's names."""
+    """The counts, by the names in the summary."""
     hazard = [hazard_at(row) is not None for row in rows]
     alert = ["t_alert" in row for row in rows]
     return {
@@ -102,11 +101,11 @@ def wilson(count: int, of: int) -> tuple[float, float]:
     return (rate + c / 2 - half) / (1 + c), (rate + c / 2 + half) / (1 + c)
 
 
-Fourfold = tuple[int, int, int, int]  # guided: hazard, none; random: hazard, none
+Fourfold = tuple[int, int, int, int]  # guided with and without hazard, random with and without
 
 
 def fourfolds(rows: Sequence[Row], whole: str) -> dict[str, Fourfold]:
-    """The fourfold tables by fault type, for those with runs of both methods."""
+    """The fourfold table of each fault type with runs of both methods."""
     found = {}
     for kind in sorted({kind_of(row) for row in rows}):
         cells: list[int] = []
@@ -152,7 +151,7 @@ def _cochran(tables: Sequence[Fourfold]) -> float:
 
 
 def _breslow_day(table: Fourfold, ratio: float) -> float:
-    """The squared distance of a cell from its value at the common odds ratio, by bisection."""
+    """The squared distance of a cell from its value at the common odds ratio, found by bisection."""
     a, b, c, d = table
     low, high = float(max(0, a - d)), float(min(a + b, a + c))
     for _ in range(200):
@@ -163,7 +162,7 @@ def _breslow_day(table: Fourfold, ratio: float) -> float:
 
 
 def chi_squared_tail(x: float, df: int) -> float:
-    """From the recurrence in the degrees of freedom (Abramowitz and Stegun 26.4.4 and 26.4.5)."""
+    """The recurrence in the degrees of freedom (Abramowitz and Stegun 26.4.4 and 26.4.5)."""
     tail = math.erfc(math.sqrt(x / 2)) if df % 2 else math.exp(-x / 2)
     for k in range(3 if df % 2 else 4, df + 1, 2):
         tail += math.exp((k / 2 - 1) * math.log(x / 2) - x / 2 - math.lgamma(k / 2))
@@ -171,7 +170,7 @@ def chi_squared_tail(x: float, df: int) -> float:
 
 
 def fisher(table: Fourfold) -> float:
-    """The probability of all tables with these margins that are at most as likely as this one."""
+    """The probability of all tables with these margins that are no more likely than this one."""
     a, b, c, d = table
     first, hazards, n = a + b, a + c, a + b + c + d
     ways = {
@@ -182,7 +181,7 @@ def fisher(table: Fourfold) -> float:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The k-th smallest times m - k + 1, and none below an earlier one."""
+    """Holm: the k-th smallest p-value times m - k + 1, but not less than an earlier one."""
     order = sorted(range(len(p_values)), key=lambda i: p_values[i])
     adjusted, least = [0.0] * len(p_values), 0.0
     for rank, i in enumerate(order):
@@ -192,7 +191,7 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def matched(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
-    """Guided run and random partner."""
+    """The pairs of a guided run and its random partner."""
     by_key: dict[tuple[str, ...], dict[str, Row]] = {}
     for row in rows:
         key = (row["fault_id"], row["scenario"], row["trigger"].removeprefix("random/"))
@@ -201,7 +200,7 @@ def matched(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
 
 
 def sign_test(first: int, second: int) -> float:
-    """Two-sided sign test: at most as many heads or tails in that many throws."""
+    """Two-sided sign test: the probability of at most as many heads, or tails, in this number of throws."""
     n, least = first + second, min(first, second)
     return min(1.0, 2 * sum(math.comb(n, k) for k in range(least + 1)) / 2**n)
 
@@ -209,7 +208,7 @@ def sign_test(first: int, second: int) -> float:
 def bootstrap(
     clusters: Sequence[Sequence[Row]], rate: Callable[[Sequence[Row]], float], draws: int
 ) -> tuple[float, float]:
-    """Percentiles of a rate over as many clusters, resampled."""
+    """Percentiles of a rate, from resamples with the same number of clusters."""
     draw = random.Random(99)
     found = sorted(
         rate([row for cluster in draw.choices(clusters, k=len(clusters)) for row in cluster])
@@ -219,7 +218,7 @@ def bootstrap(
 
 
 def rate_difference(rows: Sequence[Row]) -> float:
-    """Hazards by runs, guided less random."""
+    """The share of guided runs with a hazard, less that of random runs."""
     hits, runs = {"guided": 0, "random": 0}, {"guided": 0, "random": 0}
     for row in rows:
         runs[row["method"]] += 1
@@ -228,7 +227,7 @@ def rate_difference(rows: Sequence[Row]) -> float:
 
 
 def spread(times: Sequence[float]) -> list[float]:
-    """N, mean, quartiles."""
+    """Number, mean and quartiles."""
     if len(times) < 2:
         return [len(times), *(list(times) or [math.nan]) * 4]
     lower, median, upper = statistics.quantiles(times, n=4, method="inclusive")
@@ -236,7 +235,8 @@ def spread(times: Sequence[float]) -> list[float]:
 
 
 def kaplan_meier(times: Sequence[tuple[float, bool]]) -> list[tuple[float, float, float, float]]:
-    """(time, share, low, high) of each step: Kaplan and Meier (1958), Greenwood's variance, log-log."""
+    """Each step as (time, share, low, high): Kaplan and Meier (1958), with Greenwood's variance and
+    log-log intervals."""
     steps, share, greenwood = [], 1.0, 0.0
     for at in sorted({time for time, came in times if came}):
         risk = sum(time >= at for time, _ in times)
@@ -252,7 +252,7 @@ def kaplan_meier(times: Sequence[tuple[float, bool]]) -> list[tuple[float, float
 
 
 def median_time(times: Sequence[tuple[float, bool]]) -> tuple[float, float, float]:
-    """Median and its interval; NaN: not reached."""
+    """The median and its interval. NaN means that the curve does not reach one half."""
     steps = kaplan_meier(times)
     at_half = [t for t, share, _, _ in steps if math.isclose(share, 0.5)]
     below = [t for t, share, _, _ in steps if share < 0.5 and not math.isclose(share, 0.5)]

@@ -13,7 +13,7 @@ import lifelines
 from lifelines import KaplanMeierFitter
 from lifelines.utils import median_survival_times
 
-Sample = list[tuple[float, int]]  # times; 1: an event, 0: censored
+Sample = list[tuple[float, int]]  # times; 1 is an event, 0 is censored
 
 
 def events(*times: float) -> Sample:
@@ -25,7 +25,7 @@ def censored(*times: float) -> Sample:
 
 
 def drawn(seed: int, size: int, mean: float, until: float, digits: int) -> Sample:
-    """Exponential times, censored at uniform ones; few digits make ties."""
+    """Exponential times, censored at uniform times, with few digits, so that there are ties."""
     draw = random.Random(seed)
     pairs = [(draw.expovariate(1 / mean), draw.uniform(0.1, until)) for _ in range(size)]
     return [(max(round(min(t, end), digits), 10**-digits), int(t <= end)) for t, end in pairs]

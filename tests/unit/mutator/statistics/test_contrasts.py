@@ -1,4 +1,4 @@
-"""Guided against random triggers."""
+"""Contrasts between guided and random triggers."""
 
 import math
 import random
@@ -27,7 +27,8 @@ def pair(fault: str, guided: dict[str, object], random: dict[str, object]) -> li
 
 @pytest.fixture(scope="module")
 def frame() -> pd.DataFrame:
-    """Five pairs: both hit; guided only; random only (c, and d with an inactive guided fault); neither."""
+    """Five pairs: a hazard in both runs; in the guided run only; in the random run only (c, and d with an
+    inactive guided fault); in neither."""
     made = [
         *pair("a", HIT, HIT),
         *pair("b", HIT, RAN),
@@ -35,7 +36,7 @@ def frame() -> pd.DataFrame:
         *pair("d", {}, HIT),
         *pair("e", RAN, RAN),
     ]
-    return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one without a partner so far
+    return results(*made, {"fault_id": "f", "trigger": "C1"} | HIT)  # and one guided run without a partner
 
 
 def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
@@ -53,7 +54,8 @@ def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
 
 
 def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
-    """A type without hazards contributes nothing to the odds; if all types are so, the result is unknown."""
+    """A type without hazards does not affect the odds ratio. If no type has hazards, the result is
+    unknown."""
     one = stratum((10, 20), (5, 20))
     pooled = contrasts.mantel_haenszel([one, stratum((0, 9), (0, 9))])
     assert pooled.odds_ratio == pytest.approx(contrasts.mantel_haenszel([one]).odds_ratio)
@@ -61,15 +63,16 @@ def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:
-    """The smallest of three is tripled, the next doubled, and none is below an earlier one."""
+    """The smallest of three p-values is tripled and the next is doubled. No adjusted value is below an
+    earlier one."""
     assert contrasts.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
     assert contrasts.holm([]) == ()
 
 
 def test_holm_adjusts_as_statsmodels_does() -> None:
-    """The result has the same bits for all p-values: ties, 0 and 1, and tests without a result."""
+    """The result has the same bits for all p-values, including ties, 0, 1, and tests without a result."""
     draw = random.Random(1)
-    for _ in range(20):  # that takes 50 ms for one
+    for _ in range(20):  # a single one that takes 50 ms
         p_values = [
             draw.choice((0.0, 1.0, 0.01, math.nan, draw.random(), draw.random() / 100))
             for _ in range(draw.randint(1, 20))
@@ -78,22 +81,21 @@ def test_holm_adjusts_as_statsmodels_does() -> None:
 
 
 def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
-    """Every guided run is paired with its random partner by the name of the row; one without a partner is
-    left out.
-    """
+    """Every guided run is paired with its random partner by the name of the context row. Runs without a
+    partner are left out."""
     found = contrasts.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
     assert contrasts.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
 
 
 def test_mcnemar_is_exact() -> None:
-    """Eight discordant pairs, all to one side: twice a half to the eighth."""
+    """If all eight discordant pairs have the same sign, p is twice a half to the eighth."""
     made = [row for i in range(8) for row in pair(str(i), HIT, RAN)]
     assert contrasts.mcnemar(contrasts.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
 
 
 def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.DataFrame) -> None:
-    """Both are reported, in total and by fault type."""
+    """Both results are reported, in total and by fault type."""
     lines = [line[:7] for line in pairs_sheet(frame).lines]
     assert lines == [
         ("all", "total", 5, 1, 1, 2, 1),
@@ -104,7 +106,7 @@ def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.Dat
 
 
 def test_resampling_draws_whole_faults() -> None:
-    """Copies of a run in other scenarios add no information: the interval is that of the faults."""
+    """Copies of a run in other scenarios add no information, so the interval is that of the faults."""
     once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
     often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
     single, copied = (contrasts.resampled(results(*rows), "injected") for rows in (once, often))
@@ -114,9 +116,8 @@ def test_resampling_draws_whole_faults() -> None:
 
 
 def test_faults_that_all_say_the_same_have_no_interval() -> None:
-    """If three faults all did no harm, or did harm only when guided, that does not bound what others would
-    do.
-    """
+    """Three faults that all did no harm, or harm only when guided, do not bound what other faults would
+    do. There is no interval."""
     for guided in (RAN, HIT):
         rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
         found = contrasts.resampled(results(*rows), "injected")
@@ -126,7 +127,8 @@ def test_faults_that_all_say_the_same_have_no_interval() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_an_interval_needs_both_methods_in_every_draw() -> None:
-    """If each fault has runs of one method only, some draws have no difference, so there is no interval."""
+    """If each fault has runs of one method only, some resamples have no difference, so there is no
+    interval."""
     found = contrasts.resampled(
         results(HIT | {"fault_id": "a"}, RAN | {"fault_id": "b", "method": "random"}), "activated"
     )
@@ -135,7 +137,7 @@ def test_an_interval_needs_both_methods_in_every_draw() -> None:
 
 
 def test_a_difference_needs_runs_of_both_methods() -> None:
-    """Without random runs there is no difference and no interval."""
+    """Without random runs, there is no difference and no interval."""
     found = contrasts.resampled(results(HIT, RAN), "activated")
     assert math.isnan(found.difference)
     assert math.isnan(found.low)

@@ -1,4 +1,4 @@
-"""Metrics, severity and times to the hazard as tables."""
+"""Tables of metrics, severity and times to the hazard."""
 
 import math
 
@@ -30,9 +30,8 @@ FRAME = pd.DataFrame(
 
 
 def test_the_spread_of_each_metric_by_fault_type() -> None:
-    """Median, worse quartile and worst equal hand-computed ones; experiments without activation or value are
-    left out.
-    """
+    """Median, worse quartile and worst value equal those computed by hand. Experiments without activation
+    or value are left out."""
     sheet = metrics_sheet(FRAME, METRICS)
     told = [(*line[:6], *line[8:]) for line in sheet.lines]
     assert told == [
@@ -46,7 +45,7 @@ def test_the_spread_of_each_metric_by_fault_type() -> None:
 
 
 def test_without_a_value_there_is_no_line() -> None:
-    """A target without metrics, or a run without values or hazards, has no such tables."""
+    """A target without metrics has no such tables, nor has a run without values or hazards."""
     frame = FRAME[FRAME["kind"] == "a/y"]
     assert metrics_sheet(frame, []).lines == ()
     assert tolerant_times_sheet(frame).lines == ()
@@ -54,7 +53,7 @@ def test_without_a_value_there_is_no_line() -> None:
 
 
 def test_classes_of_severity_by_fault_type() -> None:
-    """Each class is counted among the activated faults, and any contact comes before the classes."""
+    """Each class is counted among the activated faults. The count of any contact comes before the classes."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
@@ -66,7 +65,7 @@ def test_classes_of_severity_by_fault_type() -> None:
 
 
 def test_times_to_the_hazard() -> None:
-    """Only events before the hazard have a time to it; an alert at the same time has none."""
+    """Only an event before the hazard has a time to it. An alert at the same time has none."""
     told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
@@ -80,9 +79,9 @@ def test_times_to_the_hazard() -> None:
 def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The interval equals that of a plain loop that copies the runs of each drawn fault."""
+    """The interval equals that of a simple loop that copies the runs of each fault that is drawn."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
-    monkeypatch.setattr(medians, "_CELLS", 300)  # several batches
+    monkeypatch.setattr(medians, "_CELLS", 300)  # this takes several batches
     rng = np.random.default_rng(3)
     cluster = pd.Series(rng.integers(0, 6, 30))
     first, second = pd.Series(rng.normal(0, 1, 30)), pd.Series(rng.normal(1, 1, 30).round(1))
@@ -102,7 +101,7 @@ def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
 
 
 def test_where_nothing_can_be_said_of_a_median() -> None:
-    """One fault, or equal runs, have no interval; without pairs there is no difference."""
+    """For one fault, or for equal runs, there is no interval. Without pairs, there is no difference."""
     ones, faults = pd.Series([1.0, 1.0, 1.0]), pd.Series(["a", "b", "c"])
     assert all(map(math.isnan, median_interval(ones, faults)))
     assert all(map(math.isnan, median_interval(pd.Series([1.0, 2.0]), pd.Series(["a", "a"]))))

@@ -1,4 +1,4 @@
-"""The mutation score of a closed loop, compared with hand counts."""
+"""The mutation score of a closed loop, compared with counts by hand."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -20,14 +20,14 @@ HEADS = ("of", "counted", "fault", "number", "not activated", "actuator changed"
 
 
 def drive(mutant: str, became: dict[str, Any], **given: str) -> dict[str, Any]:
-    """A permanent drive of an operator's mutant, with the given changes."""
+    """A drive with a permanent mutant of an operator, with the given changes."""
     told = {"module": OPERATORS, "fault_type": "arithmetic", "trigger": "always", "fault_id": mutant}
     return told | became | given
 
 
 @pytest.fixture
 def faults(experiment: Callable[..., Experiment]) -> dict[str, Fault]:
-    """Four mutants: the first two in one function."""
+    """Four mutants, of which the first two are in one function."""
     one = experiment().fault
     (injection,) = one.injections
     found = {}
@@ -38,15 +38,14 @@ def faults(experiment: Callable[..., Experiment]) -> dict[str, Fault]:
 
 
 def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
-    """The lines by subject, unit of counting and duration of the faults."""
+    """The lines by subject, unit of the count, and duration of the faults."""
     assert sheet.heads[: len(HEADS)] == HEADS
     return {line[:3]: dict(zip(sheet.heads, line, strict=True)) for line in sheet.lines}
 
 
 def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]) -> None:
-    """Two drives of a mutant, one with a hazard, count as one mutant with a hazard, and as two drives with
-    one.
-    """
+    """A mutant with two drives, one of which has a hazard, counts as one mutant with a hazard, and as two
+    drives with one hazard."""
     frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
     found = lines(score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]
@@ -61,9 +60,8 @@ def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]
 
 
 def test_permanent_mutants_stand_beside_transient_ones(faults: dict[str, Fault]) -> None:
-    """A mutant that harms only when permanent is harmless as a transient one, and counts once in
-    the total.
-    """
+    """A mutant that does harm only when permanent is harmless as a transient one. The total counts it
+    once."""
     frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -73,7 +71,8 @@ def test_permanent_mutants_stand_beside_transient_ones(faults: dict[str, Fault])
 
 
 def test_an_alert_counts_if_golden_does_not_raise_it(faults: dict[str, Fault]) -> None:
-    """Alerts of the fault-free run are not attributed to a mutant; if they are unknown, there is no share."""
+    """Alerts of the fault-free run are not attributed to a mutant. If these alerts are unknown, there is
+    no share."""
     frame = results(
         drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
     )
@@ -88,7 +87,8 @@ def test_an_alert_counts_if_golden_does_not_raise_it(faults: dict[str, Fault]) -
 
 
 def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
-    """A mutant with only harness errors appears only in the note; a crash was active and is no hazard."""
+    """A mutant that has only harness errors appears only in the note. A crash counts as active and not as
+    a hazard."""
     frame = results(
         drive("a", CHANGED),
         drive("b", {}, status="crashed"),
@@ -105,9 +105,8 @@ def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
 
 
 def test_the_note_tells_of_several_draws(faults: dict[str, Fault]) -> None:
-    """If selections were drawn from populations of different sizes, the note says that an overall share
-    estimates none of them.
-    """
+    """If selections were drawn from populations of different sizes, the note says that the overall share
+    estimates none of them."""
     small, large = "a: 4 draws of 9 mutants of operators", "b: 4 draws of 900 mutants of operators"
     frame = results(drive("a", HIT))
     assert "without weights" in score_sheet(frame, faults, GOLDEN, [small, large]).note
@@ -115,7 +114,7 @@ def test_the_note_tells_of_several_draws(faults: dict[str, Fault]) -> None:
 
 
 def test_by_operator(faults: dict[str, Fault]) -> None:
-    """Each operator has its own line; faults of specs have none."""
+    """Each operator has a line. Faults of specs have none."""
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -124,14 +123,13 @@ def test_by_operator(faults: dict[str, Fault]) -> None:
 
 
 def test_a_run_without_operators_has_no_score(faults: dict[str, Fault]) -> None:
-    """Without operators there is no table, so the report is unchanged."""
+    """Without operators there is no table, so the report does not change."""
     assert not score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
 
 
 def test_intervals_of_drives_are_between_mutants(faults: dict[str, Fault]) -> None:
-    """Drives of one mutant are similar, so 20 drives of two mutants have a wider interval than 20 independent
-    ones.
-    """
+    """Drives of one mutant are similar. So 20 drives of two mutants have a wider interval than 20
+    independent drives."""
     frame = results(*(drive(name, HIT if name == "a" else ACTIVE) for name in "ab" for _ in range(10)))
     found = lines(score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert (found.low, found.high) == (0.0, 1.0)

@@ -1,4 +1,4 @@
-"""Statistics of pairs."""
+"""Statistics of paired runs."""
 
 import math
 from itertools import product
@@ -15,14 +15,14 @@ def flags(text: str) -> pd.Series:
 
 
 def test_mcnemar_looks_at_pairs_that_differ() -> None:
-    """The counts are those of the pairs, the p-value the exact binomial one of the differing pairs."""
+    """The counts are those of the pairs. The p-value is the exact binomial one of the pairs that differ."""
     found = mcnemar(flags("1111111100"), flags("1000000010"))
     assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
     assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
 
 
 def test_nothing_differs() -> None:
-    """Equal flags have p 1 and a difference of 0, without an interval."""
+    """Equal flags have a p-value of 1 and a difference of 0, without an interval."""
     same = flags("1100")
     assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
@@ -31,24 +31,24 @@ def test_nothing_differs() -> None:
 
 
 def test_whole_faults_are_drawn_anew() -> None:
-    """Ten equal pairs of each of few faults have the wide interval of few faults."""
+    """With few faults, the interval is as wide as for few faults, even if each has ten equal pairs."""
     first, second = flags("0" * 40), flags("1" * 10 + "0" * 30)
     alike = rate_difference(first, second, pd.Series([i // 10 for i in range(40)]))
     apart = rate_difference(first, second, pd.Series(range(40)))
     assert alike.difference == apart.difference == 0.25
     assert alike.high - alike.low > 1.5 * (apart.high - apart.low)
-    assert rate_difference(first, second, pd.Series(range(40))) == apart  # the same each time
+    assert rate_difference(first, second, pd.Series(range(40))) == apart  # the same result each time
 
 
 def test_one_fault_has_no_interval() -> None:
-    """With a single fault there is nothing to resample."""
+    """With a single fault, nothing can be resampled."""
     found = rate_difference(flags("00"), flags("10"), pd.Series(["a", "a"]))
     assert found.difference == 0.5
     assert math.isnan(found.low)
 
 
 def test_times_of_pairs() -> None:
-    """Medians and their difference cover the pairs with both times; the interval is exact."""
+    """The medians and their difference use only pairs with both times. The interval is exact."""
     first = pd.Series([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, None, 9.0])
     second = first + pd.Series([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.0, None])
     found = times(first, second)
@@ -58,7 +58,7 @@ def test_times_of_pairs() -> None:
 
 
 def test_equal_and_missing_times() -> None:
-    """If no time differs there is nothing to test; without times there are no numbers."""
+    """If no time differs, there is no test. Without times, there are no numbers."""
     same = pd.Series([1.0, 0.1 + 0.2])
     assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
     none = times(pd.Series([None], dtype=float), pd.Series([1.0]))
@@ -68,7 +68,7 @@ def test_equal_and_missing_times() -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
-    """Five faults have 5^5 resamples: the interval ends between their percentiles around 2.5 and 97.5 %."""
+    """Five faults have 5^5 resamples. The interval ends between their percentiles near 2.5 and 97.5 %."""
     draw = np.random.default_rng(seed)
     cluster = pd.Series(np.repeat(range(5), [1, 2, 3, 5, 8]))
     first, second = (pd.Series(draw.random(19) < chance) for chance in (0.3, 0.6))
@@ -82,9 +82,8 @@ def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [5, 6, 9, 10, 30])
 def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
-    """The interval drops as many differences as 95 % coverage allows: the sign test by hand, none for fewer
-    than six.
-    """
+    """The interval drops as many differences as 95 % coverage allows, as in a sign test by hand. With
+    fewer than six differences, there is none."""
     change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
     found = times(pd.Series(np.zeros(size)), change).median
     tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]
@@ -98,7 +97,8 @@ def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
 
 @pytest.mark.parametrize("size", [4, 7, 10])
 def test_wilcoxon_is_exact_for_few_pairs(size: int) -> None:
-    """The p-value is the share of all sign assignments at least as extreme as the observed one."""
+    """The p-value is the share of all assignments of signs that are at least as extreme as the observed
+    one."""
     change = pd.Series(np.random.default_rng(size).normal(0.5, 1.0, size))
     ranks = change.abs().rank()
     sums = [

@@ -1,4 +1,4 @@
-"""Worked examples from the literature: each test or interval of a report gives the published numbers."""
+"""Worked examples from the literature: each test and interval of a report gives the published numbers."""
 
 import math
 
@@ -16,7 +16,7 @@ from .results_frame import results
 
 
 def stratum(a: int, b: int, c: int, d: int) -> Stratum:
-    """Hazard and none of guided, then of random runs."""
+    """The four counts: guided with and without hazard, random with and without hazard."""
     return Stratum(kind="k", guided_hazards=a, guided=a + b, random_hazards=c, random=c + d)
 
 
@@ -118,7 +118,7 @@ def test_student() -> None:
 
 
 def test_by_hand_gives_the_published_numbers_too() -> None:
-    """The reference for the ten tables reproduces the numbers of the literature."""
+    """The second implementation, which checks the ten tables, gives the numbers in the literature."""
     odds = by_hand.pooled_odds(BERKELEY)
     assert (odds["odds ratio"], odds["low"]) == pytest.approx((0.9046968, 0.7719074), abs=1e-7)
     assert by_hand.fisher((3, 1, 1, 3)) == pytest.approx(0.4857, abs=5e-5)

@@ -1,4 +1,4 @@
-"""The spread between seeds: hand-made frames with known results."""
+"""The spread between seeds, for frames made by hand with known results."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ COLUMNS = ("share", "low", "high", "least", "its", "largest", "other", "seeds")
 
 
 def seed(number: int, hazards: int, runs: int = 10, **more: Any) -> list[dict[str, Any]]:
-    """That many activated runs of a seed; the first ones have H1."""
+    """This number of activated runs of a seed, of which the first ones have H1."""
     ran = {"seed": number, "t_activation": 1.0, **more}
     return [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(runs)]
 
@@ -26,15 +26,14 @@ def cells(sheet: Sheet, *names: str) -> dict[str, Any]:
 
 
 def test_one_seed_has_no_spread() -> None:
-    """A run with one seed has no line, whatever its results."""
+    """A run with one seed has no line about seeds, whatever its results."""
     frame = results(*seed(7, 3))
     assert seeds_sheet(frame).lines == kinds_sheet(frame).lines == ()
 
 
 def test_the_least_and_the_largest_seed() -> None:
-    """The pooled share of all seeds is shown with those of the lowest and highest seed, the lower seed in a
-    tie; seeds sort numerically.
-    """
+    """The share over all seeds is shown with those of the lowest and the highest seed. In a tie, the seed
+    with the lower number is shown. Seeds sort as numbers."""
     frame = results(*seed(10, 1), *seed(9, 6, runs=20), *seed(2, 5), *seed(30, 1))
     assert seeds_of(frame) == ["2", "9", "10", "30"]
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
@@ -44,9 +43,9 @@ def test_the_least_and_the_largest_seed() -> None:
 
 
 def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
-    """Two seeds of equal size, 0.2 and 0.6: a draw of two is 0.2, 0.4 or 0.6, in 1, 2 and 1 of 4 cases, so
-    the middle 95 % go from 0.2 to 0.6. The interval of twenty seeds equals that of numpy's draws.
-    """
+    """For two seeds of equal size with 0.2 and 0.6, a draw of two is 0.2, 0.4 or 0.6, in 1, 2 and 1 of 4
+    cases. So the middle 95 % go from 0.2 to 0.6. The interval of twenty seeds equals that of numpy's
+    draws."""
     found = cells(seeds_sheet(results(*seed(1, 2), *seed(2, 6))), "all", "hazards", "activated")
     assert (found["low"], found["high"]) == pytest.approx((0.2, 0.6))
     hazards = [(7 * k) % 10 for k in range(20)]
@@ -59,7 +58,7 @@ def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
 
 
 def test_seeds_that_say_the_same_have_no_interval() -> None:
-    """If all seeds agree there is no interval; a seed with nothing to count is in no share."""
+    """If all seeds agree, there is no interval. A seed with nothing to count does not enter a share."""
     frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])
@@ -69,7 +68,7 @@ def test_seeds_that_say_the_same_have_no_interval() -> None:
 
 
 def test_methods_and_fault_types_by_themselves() -> None:
-    """Each method and each fault type has its own lines; without alerts there are none of them."""
+    """Each method and each fault type has its own lines. Without alerts, there are no lines about alerts."""
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )

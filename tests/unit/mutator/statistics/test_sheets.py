@@ -13,9 +13,8 @@ ALERTS = {"0": (("fcw", 8.0),), "1": ()}
 
 
 def test_a_run_of_both_methods_has_all_tables() -> None:
-    """A run of both methods has summary and coverage of each, the comparison, and the times; alerts only with
-    their records.
-    """
+    """With both methods, a run has a summary and coverage for each, the comparison, and the times. It has
+    alerts only if their records exist."""
     expected = [
         *("summary_guided", "summary_random", "coverage_guided", "coverage_random"),
         *("guided_against_random", "guided_against_random_by_fault_type", "matched_pairs"),
@@ -30,14 +29,12 @@ def test_a_run_of_both_methods_has_all_tables() -> None:
 
 
 def test_no_tables_where_they_say_nothing_more() -> None:
-    """With one method and nothing published, the report's counts suffice."""
+    """With one method and without published numbers, only the tables of counts exist."""
     assert run_sheets(results(GUIDED), None, {}, {"S1": 30.0}) == ()
 
 
 def test_numbers_are_written_plainly() -> None:
-    """Unknown values are empty or a dash, a tiny p-value is not shown as zero, and a p-value in the CSV is a
-    number.
-    """
+    """Unknown values are empty or a dash. A tiny p-value is not shown as zero, and is a number in the CSV."""
     sheet = Sheet(name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, P(1e-20), None),))
     assert sheet.table().rows == [["-", "< 0.0001", "-"]]
     assert sheet.csv() == "a,b,c\n,1e-20,\n"

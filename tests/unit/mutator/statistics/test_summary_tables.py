@@ -1,4 +1,4 @@
-"""Summaries by scenario and fault type, and the frame that they are made from."""
+"""Summaries by scenario and fault type, and the frame that they use."""
 
 from pathlib import Path
 
@@ -16,14 +16,15 @@ HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
 
 
 def test_wilson_interval_of_a_published_example() -> None:
-    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3); none of 20 begins at zero."""
+    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3). The interval for none of 20
+    begins at zero."""
     assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
     assert share(0, 20).low == 0
     assert str(share(0, 0)) == "- (0/0)"
 
 
 def test_a_table_without_published_counts_has_only_ours() -> None:
-    """Without published counts there are no empty lines and no mention of a publication."""
+    """Without published counts, the summary has no empty lines and does not mention a publication."""
     coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
     assert [line[1] for line in coverage.lines] == ["here", "here"]
     summary = summary_sheet("guided", by_scenario(results(HIT)), None)
@@ -32,7 +33,7 @@ def test_a_table_without_published_counts_has_only_ours() -> None:
 
 
 def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
-    """Runs without information about their fault are left out; a crash alone does not count as activated."""
+    """Runs that say nothing about their fault are left out. A crash alone does not count as activated."""
     frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
     assert by_scenario(frame)["guided", "S1"] == Tally(
         injected=2,
@@ -46,7 +47,7 @@ def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
 
 
 def test_a_file_that_is_no_results_table_is_told(tmp_path: Path) -> None:
-    """A missing file and a missing column are a user's error, with the file's name."""
+    """A missing file or column is a user's error that gives the file's name."""
     with pytest.raises(MutatorError, match=r"results\.csv"):
         load(tmp_path / "results.csv")
     (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")

@@ -1,4 +1,4 @@
-"""Censored times agree with lifelines 0.30.3, with published curves, and with a hand-computed median."""
+"""Censored times agree with lifelines 0.30.3, with published curves, and with a median computed by hand."""
 
 import json
 import math
@@ -23,7 +23,7 @@ ALERT_S = 5.0
 
 
 def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
-    """Reaction times of runs with an alert at 5 s, then a hazard or the end of their scenario."""
+    """Reaction times of runs with an alert at 5 s, followed by a hazard or by the end of the scenario."""
     rows, ends = [], {}
     for i, (time, event) in enumerate(zip(sample["times"], sample["status"], strict=True)):
         ends[f"S{i}"] = ALERT_S + time
@@ -34,7 +34,7 @@ def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
 def test_the_curve_is_that_of_lifelines(sample: dict[str, Any]) -> None:
-    """The share of alerts without a hazard is lifelines' Kaplan-Meier curve at each of its steps."""
+    """The share of alerts without a hazard equals lifelines' Kaplan-Meier curve at each of its steps."""
     found = [reaction(sample, at).survival for at in sample["at"]]
     assert found == pytest.approx(sample["survival"], abs=1e-12)
     assert reaction(sample, sample["at"][0] / 2).survival == 1.0
@@ -42,9 +42,8 @@ def test_the_curve_is_that_of_lifelines(sample: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize(("name", "sample"), LIFELINES.items(), ids=LIFELINES)
 def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: dict[str, Any]) -> None:
-    """If the curve stays at one half for a while, lifelines returns its beginning, and the report
-    its middle.
-    """
+    """If the curve stays at one half for some time, lifelines returns the beginning of that time, and the
+    report its middle."""
     found = reaction(sample)
     assert (found.at_risk, found.events) == (len(sample["times"]), sum(sample["status"]))
     if name in FLAT:
@@ -65,7 +64,7 @@ def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any])
     high = sample["median_high"]
     if high == sample["at"][-1] and sample["survival"][-1] == 0.0:
         high = math.inf
-    if math.isnan(found.median_low):  # never near one half
+    if math.isnan(found.median_low):  # at no time near one half
         assert min(sample["low"]) > 0.5 and math.isnan(found.median_high)
     else:
         assert found.median_low == pytest.approx(sample["median_low"])
@@ -89,20 +88,21 @@ def test_the_published_medians_of_miller() -> None:
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 20, 21, 50, 51])
 def test_without_censoring_the_median_is_the_ordinary_one(size: int) -> None:
-    """For an even number of times it is the mean of the middle two."""
+    """For an even number of times, the median is the mean of the middle two."""
     drawn = np.random.default_rng(size).uniform(0.5, 9.0, size).round(3)
     sample = {"times": drawn, "status": [1] * size}
     assert reaction(sample).median == pytest.approx(np.median(drawn))
 
 
 def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> None:
-    """The end of the half is unknown, so the median is its beginning, not infinity."""
+    """If the end of the half is unknown, the median is its beginning, and not infinity."""
     assert reaction(LIFELINES["one half to the end"]).median == 2.0
 
 
 @pytest.mark.parametrize("name", ["ties", "large"])
 def test_the_curve_is_that_of_scipy(name: str) -> None:
-    """A second implementation, with ties and many steps: every step and its log-log interval."""
+    """A second implementation gives the same steps and the same log-log intervals, for data with ties and
+    many steps."""
     sample = LIFELINES[name]
     frame = pd.DataFrame({"time": sample["times"], "event": sample["status"]})
     known, cut = frame[frame["event"] == 1]["time"], frame[frame["event"] == 0]["time"]

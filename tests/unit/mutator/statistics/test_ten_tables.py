@@ -1,4 +1,4 @@
-"""Every number in a report's tables, for ten made-up campaigns, is computed a second time by hand."""
+"""Every number in the tables of a report is computed a second time by hand, for ten made-up campaigns."""
 
 import math
 from collections import Counter
@@ -49,7 +49,7 @@ def campaign(seed: int) -> Campaign:
     return Campaign(by_hand.usable(made), {sheet.name: sheet for sheet in sheets})
 
 
-# Three for each change, all ten in the slow tests.
+# Three for each change. The slow tests run all ten.
 SEEDS = [pytest.param(seed, marks=pytest.mark.slow if seed > 2 else ()) for seed in range(10)]
 
 
@@ -59,7 +59,7 @@ def made(request: pytest.FixtureRequest) -> Campaign:
 
 
 def same(found: Sequence[object], expected: Sequence[object]) -> bool:
-    """Equal cells: texts and counts exactly, numbers to 9 digits, a share with its interval."""
+    """Cells are equal: texts and counts exactly, numbers to 9 digits, a share together with its interval."""
     assert len(found) == len(expected)
     for cell, wanted in zip(found, expected, strict=True):
         if isinstance(cell, Share):
@@ -75,7 +75,7 @@ def same(found: Sequence[object], expected: Sequence[object]) -> bool:
 
 @pytest.mark.slow
 def test_there_are_ten_campaigns_with_every_table() -> None:
-    """Large and small ones, and all eleven tables of a report in each."""
+    """The campaigns are large and small, and each has all eleven tables of a report."""
     made = [campaign(seed) for seed in range(10)]
     assert all(len(one.sheets) == 11 for one in made)
     assert min(len(one.rows) for one in made) < 40 and max(len(one.rows) for one in made) > 200
@@ -83,7 +83,7 @@ def test_there_are_ten_campaigns_with_every_table() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_summary_by_scenario(made: Campaign, method: str) -> None:
-    """Counts of each measure and their Wilson intervals, by scenario and in total."""
+    """The counts of each measure and their Wilson intervals agree, by scenario and in total."""
     lines = made.lines(f"summary_{method}")
     scenarios = sorted({row["scenario"] for row in made.of(method)})
     groups = [by_hand.counts(made.of(method, scenario=s)) for s in scenarios]
@@ -95,7 +95,8 @@ def test_summary_by_scenario(made: Campaign, method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
-    """Activated of injected, hazards of activated and of injected, by fault type and in total."""
+    """The shares of activated faults, and of hazards per activated and per injected fault, agree by fault
+    type and in total."""
     kinds = sorted({by_hand.kind_of(row) for row in made.of(method)})
     for (name, _, *cells), kind in zip(made.lines(f"coverage_{method}"), [*kinds, "total"], strict=True):
         told = by_hand.counts([r for r in made.of(method) if kind in ("total", by_hand.kind_of(r))])
@@ -105,7 +106,8 @@ def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
 
 
 def test_guided_against_random(made: Campaign) -> None:
-    """Rates, Mantel-Haenszel odds ratio with its interval, Cochran's and Breslow and Day's tests."""
+    """The rates, the Mantel-Haenszel odds ratios with intervals, and the tests by Cochran and by Breslow
+    and Day agree."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         tables = by_hand.fourfolds(made.rows, whole)
         odds = by_hand.pooled_odds(tables.values())
@@ -115,7 +117,8 @@ def test_guided_against_random(made: Campaign) -> None:
 
 
 def test_resampled_difference_of_rates(made: Campaign) -> None:
-    """The difference exactly; its interval as near as another resampling of whole faults comes."""
+    """The difference agrees exactly. Its interval agrees as closely as another resampling of whole faults
+    can."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         rows = [row for row in made.rows if whole == "injected" or "t_activation" in row]
         faults = {row["fault_id"] for row in rows}
@@ -129,7 +132,7 @@ def test_resampled_difference_of_rates(made: Campaign) -> None:
 
 
 def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
-    """Fisher's exact p of each type, and Holm's adjustment over the types."""
+    """Fisher's exact p-value of each type agrees, and so does Holm's adjustment over the types."""
     lines = made.lines("guided_against_random_by_fault_type")
     expected: list[tuple[Any, ...]] = []
     for whole in WHOLES:
@@ -144,7 +147,8 @@ def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
 
 
 def test_matched_pairs(made: Campaign) -> None:
-    """Pairs with a hazard in both, one or neither run, and McNemar's exact p, with Holm by fault type."""
+    """The pairs with a hazard in both, one or neither run agree, with McNemar's exact p-value and Holm's
+    adjustment by fault type."""
     pairs = by_hand.matched(made.rows)
     expected: list[list[Any]] = []
     for which, some in (
@@ -173,7 +177,7 @@ def _pair_counts(pairs: list[tuple[Row, Row]]) -> list[Any]:
 
 
 def test_propagation_times(made: Campaign) -> None:
-    """N, mean and quartiles of each time, by method and scenario."""
+    """Number, mean and quartiles of each time agree, by method and scenario."""
     steps = {
         "activation to manifest": lambda r: _span(r, "t_activation", "t_manifest"),
         "activation to alert": lambda r: _span(r, "t_activation", "t_alert"),
@@ -189,7 +193,8 @@ def test_propagation_times(made: Campaign) -> None:
 
 
 def test_from_alert_to_hazard(made: Campaign) -> None:
-    """Kaplan-Meier median, its interval and the share after the driver's time, by method and scenario."""
+    """The Kaplan-Meier median, its interval, and the share after the driver's time agree, by method and
+    scenario."""
     lines = iter(made.lines("alert_to_hazard"))
     for method, scenario, rows in _groups(made):
         alerted = [row for row in rows if "t_alert" in row and row["status"] == "ok"]
@@ -209,7 +214,8 @@ def test_from_alert_to_hazard(made: Campaign) -> None:
 
 
 def test_alerts_before_hazards(made: Campaign) -> None:
-    """The number of runs with a hazard that each alert, any, or none preceded."""
+    """The number of runs with a hazard agrees for those that each alert preceded, that any alert preceded,
+    and that none did."""
     expected: list[tuple[Any, ...]] = []
     for method, hazard in ((m, h) for m in METHODS for h in ("H1", "H3")):
         time = f"t_{hazard.lower()}"
@@ -225,7 +231,7 @@ def test_alerts_before_hazards(made: Campaign) -> None:
 
 
 def test_orders_of_hazards(made: Campaign) -> None:
-    """The number of runs with one hazard, both at once, or one after the other."""
+    """The number of runs agrees for one hazard, for both at once, and for one after the other."""
     counts: Counter[tuple[str, str, str]] = Counter()
     for row in made.rows:
         h1, h3 = row.get("t_h1"), row.get("t_h3")

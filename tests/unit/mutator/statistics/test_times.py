@@ -1,4 +1,4 @@
-"""Times from activation, censored reaction times, alerts before hazards, and hazards in order."""
+"""Times from the activation, censored reaction times, alerts before hazards, and the order of hazards."""
 
 import math
 from typing import Any
@@ -15,12 +15,12 @@ DRIVER_S = 1.8
 
 
 def run(alert: float | str = "", hazard: float | str = "", **more: Any) -> dict[str, Any]:
-    """A run activated at 5 s, with its first alert and H1 (s)."""
+    """A run that is activated at 5 s, with the times of its first alert and of H1, in seconds."""
     return {"t_activation": 5.0, "t_alert": alert, "alerts": "fcw" if alert else "", "t_h1": hazard} | more
 
 
 def test_times_count_from_activation() -> None:
-    """Manifestation, alert and hazard count from the activation, if they occurred."""
+    """Times of manifestation, alert and hazard count from the activation, if the event occurred."""
     found = times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, ""), run("", ""), {}))
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
     assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
@@ -29,7 +29,7 @@ def test_times_count_from_activation() -> None:
 
 
 def test_no_reaction_time_without_an_alert_that_came_first() -> None:
-    """An alert with or after the hazard leaves an empty reaction time: not 0, and not negative."""
+    """If the alert comes with the hazard or after it, the reaction time is empty, not 0 or negative."""
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run("", 9.0))
     assert times.propagation(frame)["alert to hazard"].n == 0
     found = times.reaction(frame, ENDS, DRIVER_S)
@@ -38,7 +38,8 @@ def test_no_reaction_time_without_an_alert_that_came_first() -> None:
 
 
 def test_kaplan_meier_of_a_textbook_sample() -> None:
-    """Hazards 1, 2, 2.5 and 4 s after the alert, one censored at 3 s: survival 0.8, 0.6, 0.4, 0.4, 0."""
+    """For hazards 1, 2, 2.5 and 4 s after the alert and one run censored at 3 s, the survival is 0.8, 0.6,
+    0.4, 0.4 and 0."""
     frame = results(
         *(run(10.0, hazard) for hazard in (11.0, 12.0, 12.5, 14.0)),
         run(17.0, "", scenario="S2"),
@@ -53,7 +54,8 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
 
 
 def test_the_censored_lengthen_the_median() -> None:
-    """Alerts without a later hazard raise the median, here beyond the observed times."""
+    """Alerts without a later hazard raise the median. Here it is beyond the observed times, so it is not
+    reached."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
     assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
     many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
@@ -62,24 +64,25 @@ def test_the_censored_lengthen_the_median() -> None:
 
 
 def test_alerts_without_any_hazard_are_no_median() -> None:
-    """With only censored runs there is no median."""
+    """If all runs are censored, there is no median."""
     found = times.reaction(results(run(10.0, "")), ENDS, DRIVER_S)
     assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
     assert math.isnan(found.median)
 
 
 def test_runs_that_did_not_end_well_are_not_censored_at_the_end_of_others() -> None:
-    """It is unknown how long a crashed run would have been observed."""
+    """A crashed run is left out, because it is unknown how long it would have been observed."""
     assert times.reaction(results(run(10.0, "", status="crashed")), ENDS, DRIVER_S).at_risk == 0
 
 
 def test_a_reaction_of_just_the_drivers_time_is_not_longer() -> None:
-    """11.8 - 10.0 is 1.8000000000000007 in floating point: still 1.8 s."""
+    """11.8 - 10.0 is 1.8000000000000007 in floating point and counts as 1.8 s."""
     assert times.reaction(results(run(10.0, 11.8)), ENDS, DRIVER_S).in_time.count == 0
 
 
 def test_the_alerts_before_each_hazard() -> None:
-    """Each hazard of a run counts separately: an alert between two hazards warned only of the second."""
+    """Each hazard of a run counts separately. An alert between two hazards came before the second one
+    only."""
     frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
     alerts = {
         "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
@@ -99,13 +102,13 @@ def test_the_alerts_before_each_hazard() -> None:
 
 
 def test_hazards_in_the_order_in_which_they_came() -> None:
-    """H1 alone, H3 before H1, and both at once are listed; runs without hazard are not."""
+    """The table lists H1 alone, H3 before H1, and both at once. Runs without a hazard are not listed."""
     frame = results(run("", 9.0), run("", 9.0, t_h3=7.0), run("", 9.0, t_h3=9.0), run())
     assert times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
 
 
 def test_the_sheets_are_by_method_and_scenario() -> None:
-    """Each method lists its scenarios, then their total; every line has a cell for each head."""
+    """Each method has its scenarios, then their total. Every line has a cell for each head."""
     frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
     sheets = (
         propagation_sheet(frame, None),
