@@ -1,4 +1,4 @@
-"""The glue of a target's entry module: opening, stepping, recording and writing a run."""
+"""The glue for a target's entry module: how a run is opened, stepped, recorded and written."""
 
 import json
 import random
@@ -13,7 +13,7 @@ from mutator.glue import GlueError, Run, read_scenario, seed_globals
 
 
 class Ball(Run):
-    """A ball that falls, and is caught at a given place."""
+    """A ball that falls until it is caught at a given place."""
 
     def __init__(self, scenario, seed):
         super().__init__(step_s=0.1, duration_s=scenario["duration_s"])
@@ -52,9 +52,8 @@ def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, obje
 
 
 def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
-    """The trace has time and every channel of every step; the record has when a hazard first came (null:
-    never) and when each alert began.
-    """
+    """The trace has the time and every channel of every step. The record has when each hazard first
+    occurred, or null, and when each alert began."""
     trace, record = driven(arguments)
     assert list(trace) == ["t", "height", "lies"]
     assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -71,7 +70,7 @@ def test_a_run_may_end_early(arguments: list[str]) -> None:
 
 
 def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
-    """Trace and record do not depend on when or how often they were written; no other files are left."""
+    """Trace and record do not depend on when or how often they were written. No other file is left."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -82,7 +81,7 @@ def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
 
 
 def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path: Path) -> None:
-    """An engine that steps a run, into a separate folder, gets the same bytes."""
+    """If an engine steps a run and writes it into another folder, the bytes are the same."""
     driven(arguments)
     run = Ball.open(arguments)
     while not run.done:
@@ -94,7 +93,7 @@ def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path
 
 @pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
 def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], flags: list[str]) -> None:
-    """An extra flag with a value replaces a key of the scenario, so a change needs no code."""
+    """An additional flag with a value replaces a key of the scenario, so that a change needs no code."""
     trace, _ = driven([*arguments, *flags])
     assert trace["height"][0] == -3.0
 
@@ -112,14 +111,14 @@ def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], fla
     ],
 )
 def test_a_wrong_argument_is_told(arguments: list[str], flags: list[str], words: str) -> None:
-    """A wrong argument is named with the expectation."""
+    """The error for an invalid argument names it and says what is expected."""
     with pytest.raises(GlueError) as told:
         Ball.main([*arguments, *flags])
     assert words in str(told.value)
 
 
 def test_values_of_a_scenario(tmp_path: Path) -> None:
-    """Values are read as JSON, otherwise as text, including colons."""
+    """Values are read as JSON if possible, and otherwise as text, which may have colons."""
     path = tmp_path / "a.yaml"
     path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
     expected = {
@@ -138,7 +137,7 @@ def test_values_of_a_scenario(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("line", ["- a", "a:", "  b: 1", "a 1", "first: 2"])
 def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> None:
-    """A line that is no `key: value`, or repeats a key, is reported with file and line."""
+    """A line that is not `key: value`, or that repeats a key, is reported with file and line."""
     path = tmp_path / "a.yaml"
     path.write_text(f"first: 1\n{line}\n")
     with pytest.raises(GlueError, match=r"a\.yaml:2: '.*'; expected `key: value`"):
@@ -147,7 +146,7 @@ def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> N
 
 @pytest.mark.parametrize("later", [{"b": 1.0}, {}, {"a": 1.0, "b": 2.0}])
 def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
-    """A step that records other channels than the first one is an error."""
+    """A step that does not record the same channels as the first step is an error."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0)
     with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
@@ -159,7 +158,7 @@ def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     [None, "1", "near", b"1", [1.0], np.zeros(1), np.zeros((2, 3)), 1j, pytest.param(10**400, id="huge")],
 )
 def test_what_is_recorded_is_a_number(value: object) -> None:
-    """A value that is no number is reported with its channel and time."""
+    """A value that is not a number is reported with its channel and time."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0, gap=2.0)
     with pytest.raises(GlueError, match=r"^at 0.5 s: gap is .*; expected a number$"):
@@ -178,7 +177,7 @@ def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("length", [0, -0.1, float("nan"), float("inf"), None])
 def test_steps_have_a_length(length: float) -> None:
-    """Infinite or zero steps are refused, at the start or later."""
+    """A step length that is infinite or zero is refused, at the start or later."""
     with pytest.raises(GlueError, match=r"step_s is .*; expected"):
         Run(step_s=length, duration_s=1.0)
     run = Run(step_s=0.5, duration_s=1.0)
@@ -189,7 +188,7 @@ def test_steps_have_a_length(length: float) -> None:
 def test_a_run_that_ends_before_it_began_is_told(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Calling `end` in the constructor is an error, because nothing is recorded."""
+    """Calling `end` in the constructor is an error, because nothing is recorded yet."""
 
     class Ended(Ball):
         def __init__(self, scenario, seed):
@@ -205,9 +204,8 @@ LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
 
 @pytest.mark.parametrize("first", [0.1, 0.7])
 def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
-    """A step that sets `step_s` before it records has that length, and the next begins after it; the run
-    keeps its duration, to the nearest step.
-    """
+    """If a step sets `step_s` before it records, it has that length, and the next step begins after it.
+    The run keeps its duration, to the nearest step."""
 
     class Uneven(Run):
         def __init__(self, scenario, seed):
@@ -227,9 +225,8 @@ def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
 
 
 def test_times_of_equal_steps_are_no_sums() -> None:
-    """With equal lengths, a step's time is its number times the length, to the last bit, even if each step
-    sets the length.
-    """
+    """If all lengths are equal, the time of a step is exactly its number times the length, even if each
+    step sets the length."""
     run = Run(step_s=0.1, duration_s=100.0)
     times = []
     while not run.done:
@@ -240,7 +237,7 @@ def test_times_of_equal_steps_are_no_sums() -> None:
 
 
 def test_time_is_recorded_anyhow() -> None:
-    """A channel named time is refused, because time would overwrite it."""
+    """A channel with the name `time` is refused, because the time would overwrite it."""
     with pytest.raises(GlueError, match="without t"):
         Run(step_s=0.5, duration_s=1.0).record(t=1.0)
 
@@ -254,7 +251,7 @@ def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytes
 
 
 def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
-    """A subclass that does not call `Run`'s constructor gets an error that says how."""
+    """The error for a subclass that does not call `Run`'s constructor says how to call it."""
 
     class Bare(Run):
         def __init__(self, scenario, seed):
@@ -283,7 +280,7 @@ def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
 
 
 def test_the_glue_needs_numpy_alone() -> None:
-    """Importing the glue loads none of the harness, and no package except numpy."""
+    """Importing the glue loads no other part of the harness, and no package except numpy."""
     code = (
         "import numpy, sys; known = set(sys.modules); import mutator.glue; print(*sys.modules.keys() - known)"
     )

@@ -1,4 +1,4 @@
-"""What `import mutator` offers."""
+"""The names that `import mutator` offers."""
 
 import subprocess
 import sys
@@ -9,7 +9,7 @@ import mutator
 
 
 def test_every_public_name_is_there() -> None:
-    """Each name of `__all__` is available, has a docstring and is in `dir`; no other one is."""
+    """Each name in `__all__` is available, has a docstring, and is in `dir`. No other name is."""
     assert list(mutator.__all__) == sorted(mutator.__all__, key=lambda n: (n.lower() == n, n))
     for name in mutator.__all__:
         assert getattr(mutator, name).__doc__, name
@@ -19,7 +19,7 @@ def test_every_public_name_is_there() -> None:
 
 
 def test_the_import_is_light() -> None:
-    """`import mutator` loads nothing slow: each name loads what it needs."""
+    """`import mutator` loads nothing that is slow. Using a name loads what it needs."""
     code = "import mutator, sys; dir(mutator); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}

@@ -28,9 +28,8 @@ SOURCES = Path(mutator.__file__).parent
     ],
 )
 def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
-    """The label has spec, value and unit; a plain number has no unit, and a fault without a value is its
-    spec.
-    """
+    """The label has the spec, the value and the unit. A plain number has no unit. The label of a fault
+    without a value is its spec."""
     assert fault_label("radar/chaff/distance", value, unit) == label
 
 
@@ -38,7 +37,7 @@ def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
 def test_a_fault_and_its_row_of_the_results_have_the_same_label(
     experiment: Callable[..., Experiment], record: Callable[..., object], value: float
 ) -> None:
-    """A fault has the same label from the plan and from results.csv."""
+    """The label of a fault is the same from the plan and from results.csv."""
     one = experiment(value=value)
     assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
 
@@ -50,5 +49,5 @@ def test_an_experiment_has_one_label(experiment: Callable[..., Experiment]) -> N
 
 
 def test_nobody_else_strips_a_unit() -> None:
-    """No other module combines value and unit, which once led to six different labels."""
+    """Only one module combines value and unit, because several once gave six different labels."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

@@ -1,4 +1,4 @@
-"""Where library, templates and targets are found."""
+"""Where the library, the templates and the targets are found."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ CLONE = Path(__file__).parents[3]
 
 @pytest.fixture
 def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A current folder outside any clone, with no environment set."""
+    """Set a current folder outside any clone, and clear the environment."""
     for name in ("ROOT", "LIBRARY", "TEMPLATES", "TARGET"):
         monkeypatch.delenv(f"MUTATOR_{name}", raising=False)
     place = tmp_path / "elsewhere"
@@ -22,7 +22,7 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_found_upward(toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From any folder inside a clone, the nearest library is found."""
+    """From any folder in a clone, the nearest library is found."""
     root = toy.library.parent
     (root / "templates").mkdir()
     (root / "deep" / "down").mkdir(parents=True)
@@ -34,7 +34,7 @@ def test_found_upward(toy: Workspace, elsewhere: Path, monkeypatch: pytest.Monke
 def test_options_go_before_the_environment(
     toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An option overrides a variable, and a single folder overrides the root."""
+    """An option overrides a variable. A folder for one part overrides the root."""
     root = toy.library.parent
     (root / "templates").mkdir()
     other = elsewhere / "library"
@@ -52,14 +52,16 @@ def test_options_go_before_the_environment(
 
 
 def test_outside_a_clone_there_is_what_ships(elsewhere: Path) -> None:
-    """With nothing named and no library in a parent folder, library and templates are the shipped ones."""
+    """Without options and variables, and without a library in a parent folder, library and templates are
+    the shipped ones."""
     found = Workspace.find()
     assert (found.library, found.templates) == (CLONE / "fault_library", CLONE / "templates")
     assert found.manifest("openpilot").root == CLONE / "target"
 
 
 def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> None:
-    """A folder found upward provides what it holds; a named root must hold both."""
+    """A library found in a parent folder may lack templates, and the shipped ones are used. A root that is
+    named must have both."""
     (elsewhere / "fault_library").mkdir()
     found = Workspace.find()
     assert (found.library, found.templates) == (elsewhere / "fault_library", CLONE / "templates")
@@ -68,13 +70,13 @@ def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> No
 
 
 def test_a_named_folder_must_be_there(elsewhere: Path) -> None:
-    """A missing named folder is an error with a remedy; the shipped one never replaces it."""
+    """A named folder that is missing is an error with a remedy. The shipped one is not used instead."""
     with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*`library`"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 
 
 def test_names_and_paths(toy: Workspace) -> None:
-    """Every item of the library is found by name or by the path of its file."""
+    """Every item of the library is found by name, or by the path of its file."""
     assert list(toy.targets) == ["toy"]
     assert list(toy.scenarios) == ["follow"]
     assert list(toy.context_tables) == ["pedals"]
@@ -93,13 +95,13 @@ def test_names_and_paths(toy: Workspace) -> None:
 
 
 def test_names_do_not_lead_out(toy: Workspace) -> None:
-    """A name with dots does not lead out of the library."""
+    """Dots in a name do not lead out of the library."""
     with pytest.raises(MutatorError, match="no fault spec"):
         toy.spec("../targets/toy")
 
 
 def test_specs_lie_where_their_names_say(toy: Workspace) -> None:
-    """A spec's file is named after its module and fault type, so that names are unique."""
+    """The name of a spec's file consists of its module and fault type, so that names are unique."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):
@@ -115,7 +117,8 @@ def test_it_is_shown_in_a_line_and_as_a_table(toycar: Workspace) -> None:
 
 
 def test_faults_to_iterate_over(toycar: Workspace) -> None:
-    """A pattern selects specs or variants; values depend on the seed; a file works like a name."""
+    """A pattern selects specs or variants, and the values depend on the seed. A file can be given in place
+    of a name."""
     names = {fault.spec for fault in toycar.faults("sensor/*")}
     assert names == {
         *("sensor/distance/longer", "sensor/distance/nearer"),
@@ -133,7 +136,7 @@ def test_faults_to_iterate_over(toycar: Workspace) -> None:
 
 
 def test_the_only_target_is_meant(toycar: Workspace) -> None:
-    """A single target need not be named."""
+    """If there is only one target, it need not be named."""
     assert toycar.target_name() == "toycar"
     other = toycar.library / "targets" / "other.yaml"
     other.write_bytes((toycar.library / "targets" / "toycar.yaml").read_bytes())

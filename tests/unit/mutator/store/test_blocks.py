@@ -1,4 +1,4 @@
-"""Files of checksummed blocks."""
+"""Files that consist of checksummed blocks."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def keys(path: Path) -> list[str]:
 
 
 def test_blocks_come_back_in_order(file: Path) -> None:
-    """Blocks have their kinds and the offsets of their content."""
+    """Blocks are read with their kinds and the offsets of their content."""
     found = read_blocks(file)
     assert [(one.kind, one.key, one.data) for one in found.blocks] == [
         (kind, key, data) for kind, (key, data) in enumerate(CONTENT.items())
@@ -35,7 +35,7 @@ def test_blocks_come_back_in_order(file: Path) -> None:
 
 
 def test_a_block_cut_short_is_no_damage(file: Path) -> None:
-    """Any prefix of the last block counts as unfinished, not as damage."""
+    """If only a part of the last block was written, it counts as unfinished, not as damaged."""
     whole = file.read_bytes()
     for length in range(len(whole) - len(as_block(2, "three", b"")), len(whole)):
         file.write_bytes(whole[:length])
@@ -44,7 +44,7 @@ def test_a_block_cut_short_is_no_damage(file: Path) -> None:
 
 
 def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
-    """A changed byte in a head, a key or the content costs only its block."""
+    """A changed byte in a head, a key or the content loses only its block."""
     whole = file.read_bytes()
     second = len(as_block(0, "one", CONTENT["one"]))
     for place in range(second, second + len(as_block(1, "two", CONTENT["two"]))):
@@ -54,6 +54,6 @@ def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
 
 
 def test_no_file_is_written_to_twice(file: Path) -> None:
-    """Each file has only one process."""
+    """Only one process can write a file."""
     with pytest.raises(FileExistsError):
         BlockWriter(file)

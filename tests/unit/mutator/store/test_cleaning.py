@@ -1,4 +1,4 @@
-"""Cleaning deletes exactly what a run wrote."""
+"""Cleaning deletes exactly the files that a run wrote."""
 
 import os
 import re
@@ -26,7 +26,8 @@ def contents(folder: Path) -> set[Path]:
 
 
 def test_all_that_a_run_wrote_goes(run: Path) -> None:
-    """A run folder is deleted whole, including half-written files of a kill and scratch of any shape."""
+    """A run folder is deleted completely, including half-written files left by a kill, and scratch folders
+    of any shape."""
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / ".REPORT.md.4711").touch()
     odd = run / "work" / "1-x" / "out"
@@ -59,7 +60,7 @@ def test_all_that_a_run_wrote_goes(run: Path) -> None:
     ],
 )
 def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
-    """A run folder that holds anything else stays unchanged, and the error names it."""
+    """A run folder with any other file stays unchanged, and the error names that file."""
     path = run / stranger
     path.parent.mkdir(parents=True, exist_ok=True)
     path.mkdir() if stranger.endswith("/") else path.touch()
@@ -73,7 +74,8 @@ def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
 
 
 def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
-    """A folder of other things with a run.json stays unchanged; so does one of another schema."""
+    """A folder of other files that has a run.json stays unchanged, and so does a folder with another
+    schema."""
     for head, names in (
         ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
         ('{"schema":"run/99"}', []),
@@ -93,7 +95,7 @@ def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
 
 
 def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
-    """A folder that is no run folder is reported as such, and nothing is written into it."""
+    """A folder that is not a run folder is reported as such, and nothing is written into it."""
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(MutatorError, match="not a run folder"):
         clean(tmp_path)
@@ -101,7 +103,7 @@ def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
 
 
 def test_the_reference_lists_what_may_be_in_it() -> None:
-    """The page about run folders lists the same names as cleaning, folder by folder."""
+    """The page about run folders lists the same names as cleaning does, folder by folder."""
     [listed] = re.findall(r"^DIR/\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     names = {name for line in listed.splitlines() for name in re.split(r" {2,}", line.strip())[0].split(", ")}
     inside = {name.partition("/")[0] for name in names if not name.startswith(".")}
@@ -109,7 +111,7 @@ def test_the_reference_lists_what_may_be_in_it() -> None:
 
 
 def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
-    """Links to a run folder and in one are not followed: their targets stay."""
+    """Links to a run folder, and links in one, are not followed. Their targets stay."""
     link = tmp_path / "latest"
     link.symlink_to(run)
     with pytest.raises(MutatorError, match=r"a link to .*; name the link.s target"):
@@ -130,7 +132,7 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
 
 
 def test_what_was_written_while_it_was_deleted_goes_too(run: Path) -> None:
-    """A report that another command was writing does not recreate the deleted folder."""
+    """If another command is writing a report, it does not create the deleted folder again."""
     assert not finish_deletion(run)
     clean(run)
     assert finish_deletion(run)

@@ -1,4 +1,4 @@
-"""The ledger of digests: what it accepts, and that the folder opens after any kill."""
+"""The ledger of digests: which ledgers are valid, and that the folder can be opened after any kill."""
 
 import json
 from collections.abc import Callable
@@ -16,12 +16,12 @@ from mutator.store.lines import LineWriter
 
 
 class Killed(BaseException):
-    """Stands for the end of the process."""
+    """Raised in place of a kill of the process."""
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A folder with a ledger of two files."""
+    """A folder with a ledger that lists two files."""
     for name in ("a", "b"):
         (tmp_path / name).write_text(f"old {name}")
     known = {name: Digest.of((tmp_path / name).read_bytes()) for name in ("a", "b")}
@@ -43,7 +43,7 @@ def segment(run: Path, name: str, *values: int) -> Path:
 
 
 def test_the_ledger_comes_back(run: Path) -> None:
-    """Files, announcements and the finished flag are read as written."""
+    """Files, announcements and the finished flag are read as they were written."""
     one = Digest(size=3, sha256="ab" * 32, lines=2)
     ledger = Ledger(files={"records/x.jsonl": one}, rewriting={"a": one, "b": None}, finished=True)
     digests.write(run, ledger)
@@ -51,7 +51,8 @@ def test_the_ledger_comes_back(run: Path) -> None:
 
 
 def test_every_change_of_the_ledger_is_found(run: Path) -> None:
-    """Any changed byte is refused with a clear error: its own checksum fails, or it is not JSON."""
+    """Any changed byte is refused with a clear error, because the checksum does not match or the file is
+    not JSON."""
     path = run / digests.FILE
     data = path.read_bytes()
     for place in range(len(data)):
@@ -62,7 +63,7 @@ def test_every_change_of_the_ledger_is_found(run: Path) -> None:
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
 def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
-    """A truncated file, one of another kind, or one of a newer schema is a user's error."""
+    """A truncated file, a file of another kind, and one with a newer schema are user's errors."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         digests.read(run)
@@ -72,7 +73,7 @@ def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
 
 
 def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
-    """A valid checksum alone does not make a ledger."""
+    """A file with a valid checksum is refused if its content is not a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
     with pytest.raises(MutatorError, match="no ledger"):
@@ -80,9 +81,8 @@ def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
 
 
 def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> int:
-    """Repeat `work`, killed before its first, second, ... write, until it completes, checking after each that
-    the folder is accepted. Return the number of kills.
-    """
+    """Repeat `work` with a kill before its first, second, ... write, until it completes. After each kill,
+    check that the folder is valid. Return the number of kills."""
     for survived in range(100):
         left = survived
 
@@ -105,14 +105,14 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_kill_while_a_file_is_rewritten(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Before, between and after the writes the file is the old or the new one, and both are accepted."""
+    """At any point of a kill, the file is the old or the new one, and both are valid."""
     assert kills(run, lambda: digests.rewrite(run, "a", b"new a"), monkeypatch) == 3
     assert accepted(run) and (run / "a").read_text() == "new a"
     assert digests.read(run).rewriting == {}
 
 
 def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a kill a file may be one of two versions, and no other."""
+    """After a kill, a file may be either of two versions, and no other one."""
     with monkeypatch.context() as patch, pytest.raises(Killed):
         patch.setattr(digests, "write_atomic", lambda path, data: (_ for _ in ()).throw(Killed))
         digests.rewrite(run, "a", b"new a")
@@ -122,7 +122,7 @@ def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.M
 
 
 def test_files_may_go(run: Path) -> None:
-    """A file announced for deletion may exist or not; afterwards it is unknown."""
+    """A file that is announced for deletion may exist or not. After that, it is unknown."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()
@@ -131,7 +131,7 @@ def test_files_may_go(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """The entry covers the valid bytes: a torn last line is cut, and later additions are found."""
+    """The entry covers the valid bytes. An incomplete last line is cut, and later additions are found."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
@@ -145,7 +145,7 @@ def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
 
 
 def test_a_damaged_segment_is_not_entered(run: Path) -> None:
-    """A line that differs from what was written is not vouched for."""
+    """If a line differs from what was written, its file is not entered."""
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):

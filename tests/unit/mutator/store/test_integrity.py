@@ -1,4 +1,4 @@
-"""Opening a run folder reports exactly the files that differ from what was written."""
+"""When a run folder is opened, exactly those files are reported that differ from what was written."""
 
 import json
 import random
@@ -57,7 +57,7 @@ SEALED = (
 @pytest.mark.parametrize("name", [name for name in SEALED if name != "run.json"])
 @pytest.mark.parametrize("what", ["folder", "loop"])
 def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
-    """A folder in the place of a file is reported by name, and so is a link to itself."""
+    """A folder or a link to itself in place of a file is reported by name."""
     (run / name).unlink()
     if what == "folder":
         (run / name).mkdir()
@@ -67,7 +67,7 @@ def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
 
 
 def test_what_is_sealed_is_all_of_it(run: Path) -> None:
-    """The folder opens, and the tests below cover all its files."""
+    """The folder opens, and the tests below cover all of its files."""
     folder = RunFolder.open(run)
     assert folder.verifiable and folder.finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
@@ -77,7 +77,8 @@ def test_what_is_sealed_is_all_of_it(run: Path) -> None:
 
 @pytest.mark.parametrize("name", SEALED)
 def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
-    """Flipped bits, lost and added ends, zeroed bytes, an empty and a missing file are reported by file."""
+    """Files with flipped bits, missing or added ends, zeroed bytes, or no content are reported, and so is
+    a missing file."""
     path = run / name
     data, draw = path.read_bytes(), random.Random(name)
     damaged = [data + b"\n", data + data, b"", data[: draw.randrange(len(data))]]
@@ -94,7 +95,7 @@ def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
 def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
-    """One digit in the middle of a long file is reported with its line number."""
+    """One changed digit in the middle of a long file is reported with its line number."""
     path = run / name
     lines = path.read_bytes().splitlines(keepends=True)
     lines[2] = lines[2].replace(b"0", b"1", 1)
@@ -103,7 +104,8 @@ def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
 
 
 def test_lost_lines_are_counted(run: Path) -> None:
-    """If a segment ends too early, at a line's end, the error gives both line counts."""
+    """If a segment ends too early, at the end of a line, the error has the expected and the actual number
+    of lines."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-2]))
@@ -123,14 +125,14 @@ def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
     "name", ["timings/x.jsonl", "traces/a", "plots/a.svg", "report/index.html", "notes.txt"]
 )
 def test_what_is_outside_the_seal_is_left_alone(run: Path, name: str) -> None:
-    """Timings, images, reports and the user's own files next to them are not checked."""
+    """Timings, images, reports and files of the user in the folder are not checked."""
     (run / name).parent.mkdir(exist_ok=True)
     (run / name).write_text("anything")
     assert RunFolder.open(run).finished
 
 
 def test_swapped_files_are_told(run: Path) -> None:
-    """Two swapped files are both reported."""
+    """If two files are swapped, both are reported."""
     a, b = run / "golden" / "A" / "log.npz", run / "golden" / "A" / "said.json"
     content = a.read_bytes()
     a.write_bytes(b.read_bytes())
@@ -139,7 +141,7 @@ def test_swapped_files_are_told(run: Path) -> None:
 
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
-    """The run as a killed session left it: `lines` are in an unclosed segment."""
+    """The run as a killed session left it, with these lines in an unclosed segment."""
     digests.close_segments(run, finished=False)
     head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
@@ -150,7 +152,8 @@ def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> P
 
 
 def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
-    """The segment's whole lines count, a torn last one does not, and a damaged one is reported."""
+    """The complete lines of the segment count, an incomplete last line does not, and a damaged line is
+    reported."""
     again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
     path = unsealed(run, again, again)
     path.write_bytes(path.read_bytes() + b'{"sum"')
@@ -166,13 +169,13 @@ def test_records_of_another_plan_are_told(run: Path) -> None:
 
 
 def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
-    """A record of an unplanned experiment is refused: 25 of 24 cannot be finished."""
+    """The record of an experiment that is not planned is refused: no run finishes 25 of 24."""
     path = unsealed(run, {"experiment_id": "0" * 16, "status": "ok"})
     assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
 
 
 def test_a_second_record_is_told(run: Path) -> None:
-    """An experiment has one final record; harness errors do not count."""
+    """An experiment has one final record. Harness errors are not final."""
     lines = (run / "records" / "0001-a.jsonl").read_text().splitlines()
     one = {k: v for k, v in json.loads(lines[1]).items() if k != "sum"}
     path = unsealed(run, one | {"status": Status.HARNESS_ERROR.value}, one)
@@ -180,7 +183,7 @@ def test_a_second_record_is_told(run: Path) -> None:
 
 
 def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A dropped record is reported, even with all digests recomputed."""
+    """A record that was removed is reported, even if all digests were recomputed."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], *lines[5:]]))
@@ -189,7 +192,8 @@ def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path],
 
 
 def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A plan with a duplicate, or with more or fewer experiments than its chunks, is refused."""
+    """A plan is refused if an experiment occurs twice, or if its chunks have a different number of
+    experiments."""
     path = run / plan_file.EXPERIMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
@@ -201,7 +205,7 @@ def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable
 
 
 def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
-    """A folder disguised as one from before digests is refused, with or without the ledger."""
+    """A folder made to look like one from before digests is refused, with or without the ledger."""
     head = run / "run.json"
     head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
     assert "run/1 in a folder with digests.json" in str(problem(run))
@@ -213,7 +217,8 @@ def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
 
 
 def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Opening a folder while its owner rewrites a file finds the old or the new one, never damage."""
+    """A folder that is opened while its owner rewrites a file has the old or the new file, and is never
+    reported as damaged."""
     real, seen = integrity.problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:
@@ -230,7 +235,7 @@ def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: 
 
 @pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
 def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> None:
-    """The run.json of an older version has no digest; invalid values are still reported by key."""
+    """An older version's run.json has no digest. Invalid values in it are still reported by key."""
     data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
     (run / digests.FILE).unlink()
     for value in (3, [3], [[3]], {"a": [None]}):
@@ -244,9 +249,8 @@ def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> 
 
 @pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
 def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
-    """Each stretch must have every key with a valid value, because an audit prints them before verifying
-    anything.
-    """
+    """Each stretch must have every key with a valid value, because an audit prints stretches before it
+    verifies anything."""
     data = json.loads((run / "run.json").read_text())
     [stretch] = data["stretches"]
     for value in (3, [3], {"a": [None]}, [{"library": "openblas"}], {"mutator": {"commit": "abc"}}):
@@ -254,7 +258,7 @@ def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
         (run / "run.json").write_text(json.dumps(data))
         with pytest.raises(MutatorError, match=r"run\.json: damaged at 'stretches'"):
             RunFolder.unverified(run)
-    if key == "machines":  # nothing is printed if there were no others
+    if key == "machines":  # nothing is printed if there are no others
         return
     data["stretches"] = [{name: value for name, value in stretch.items() if name != key}]
     (run / "run.json").write_text(json.dumps(data))

@@ -1,4 +1,4 @@
-"""Checksummed lines: no written line is lost, and no other one is accepted."""
+"""Checksummed lines: every written line can be read, and no other line is accepted."""
 
 import errno
 import json
@@ -26,7 +26,7 @@ def write(path: Path, *values: object) -> Path:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file of a head and six lines."""
+    """A file with a head and six lines."""
     return write(tmp_path / "records" / "0001-gw0.jsonl", *range(6))
 
 
@@ -35,7 +35,7 @@ def values(segment: Segment) -> list[object]:
 
 
 def test_lines_come_back_as_they_were(tmp_path: Path) -> None:
-    """Any JSON value is read as appended, each with its line number."""
+    """Any JSON value is read as it was appended, with its line number."""
     given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given
@@ -51,7 +51,7 @@ def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
 
 @pytest.mark.parametrize("bit", range(8))
 def test_every_flipped_bit_is_found_at_its_line(path: Path, bit: int) -> None:
-    """A flipped bit is reported with its line; at the end of the file it may count as torn."""
+    """A flipped bit is reported with its line. In the file's last byte, it makes the last line incomplete."""
     data = path.read_bytes()
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :])
@@ -75,7 +75,7 @@ CHANGES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], tuple[int, ...]]]
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_lines_that_are_not_where_they_were_are_found(path: Path, change: str) -> None:
-    """Only lines at the place of the damage are lost: later ones still verify."""
+    """Only the damaged lines are lost. Later lines are still verified."""
     lines = path.read_bytes().splitlines(keepends=True)
     make, damaged = CHANGES[change]
     path.write_bytes(b"".join(make(lines)))
@@ -87,7 +87,7 @@ def test_lines_that_are_not_where_they_were_are_found(path: Path, change: str) -
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
 def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
-    """Any part of the last line may remain after a kill: only the lines before it count."""
+    """After a kill, any part of the last line may be there. Only the lines before it count."""
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
     segment = read_segment(path)
@@ -95,7 +95,7 @@ def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
 
 
 def test_a_file_in_another_place_is_found(path: Path) -> None:
-    """A file contains its own name, so renamed or swapped files are reported."""
+    """A file contains its own name, so that renamed or swapped files are reported."""
     moved = path.rename(path.with_name("0002-gw0.jsonl"))
     with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:1: was written as records/0001-gw0\.jsonl"):
         values(read_segment(moved))
@@ -105,7 +105,7 @@ def test_a_file_in_another_place_is_found(path: Path) -> None:
 def test_a_line_that_does_not_fit_is_taken_back(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ) -> None:
-    """If the disk fills up within a line, only that line is lost, with an error."""
+    """If the disk is full in the middle of a line, only that line is lost, and an error is raised."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
     real, calls = os.write, []
@@ -126,7 +126,7 @@ def test_a_line_that_does_not_fit_is_taken_back(
 
 
 def test_a_full_disk_on_sync_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """File systems with late allocation report it at the sync; the record can still be read."""
+    """A file system with late allocation reports a full disk when it syncs. The record can still be read."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
 
@@ -140,7 +140,7 @@ def test_a_full_disk_on_sync_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """100 records take a few syncs, not 100."""
+    """100 records need only a few syncs, not 100."""
     synced = []
     monkeypatch.setattr(os, "fsync", synced.append)
     write(tmp_path / "a.jsonl", *range(100))
@@ -148,14 +148,14 @@ def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_file_is_never_shared(tmp_path: Path) -> None:
-    """Two writers cannot have the same file."""
+    """Two writers cannot open the same file."""
     LineWriter(tmp_path / "a.jsonl", HEAD).close()
     with pytest.raises(FileExistsError):
         LineWriter(tmp_path / "a.jsonl", HEAD)
 
 
 def test_what_is_no_file_is_told(tmp_path: Path) -> None:
-    """A folder or a pipe in the place of a segment is refused without waiting."""
+    """A folder or a pipe in place of a segment is refused without waiting."""
     os.mkfifo(tmp_path / "pipe.jsonl")
     (tmp_path / "folder.jsonl").mkdir()
     for name in ("pipe.jsonl", "folder.jsonl"):

@@ -1,4 +1,4 @@
-"""Packed patches: the file where a lost one is searched."""
+"""Packed patches, and the file in which a lost patch is searched."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from mutator.store.patches import Patches, PatchWriter
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A run folder with the patch of an experiment from each of two workers."""
+    """A run folder with a patch from each of two workers."""
     for worker, name in (("0001-gw0", "a" * 16), ("0001-gw1", "b" * 16)):
         writer = PatchWriter(tmp_path, worker)
         writer.append(name, f"patch of {name}\n".encode())
@@ -18,12 +18,12 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
-    """An existing patch has a file, whatever worker its record names."""
+    """A patch that exists has a file, whichever worker its record names."""
     assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 
 def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
-    """A flipped byte loses a patch, and its file is named."""
+    """A flipped byte loses a patch. The error names the patch's file."""
     path = run / "patches" / "0001-gw1.blocks"
     data = bytearray(path.read_bytes())
     data[-1] ^= 1
@@ -34,7 +34,7 @@ def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
 
 
 def test_a_lost_file_is_that_of_the_worker(run: Path) -> None:
-    """If a whole file is missing, the record gives its name; without a record the folder is named."""
+    """If a whole file is missing, its name comes from the record. Without a record, the folder is named."""
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
     assert Patches(run).file("b" * 16, "0001-gw1") == path

@@ -22,7 +22,7 @@ def lines(run: Path, name: str) -> list[dict[str, object]]:
 
 
 def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
-    """A plan is read back equal, with its ids, whole or chunk by chunk."""
+    """A plan is read back equal, with its ids, as a whole or chunk by chunk."""
     plan = tuple(experiment(value, changes=("no_lead",)) for value in (1.0, 2.5, 3.0))
     chunks = plan_file.write(tmp_path, plan, (2, 1))
     faults = plan_file.read_faults(tmp_path)
@@ -32,9 +32,8 @@ def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
 
 
 def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> None:
-    """The fast path returns the same experiment as the slow one, and leaves to it any line with another
-    format or a wrong id.
-    """
+    """The fast path returns the same experiment as the slow one. It leaves any line with another format or
+    a wrong id to the slow one."""
     for planned in (
         experiment(),
         experiment(2.5, changes=("no_lead",)),
@@ -68,7 +67,7 @@ def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
 
 
 def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
-    """Opening a pipe would wait for a writer for ever, so it is refused."""
+    """A pipe is refused, because opening it would wait for a writer for ever."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
@@ -77,7 +76,7 @@ def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
 def test_a_plan_of_a_newer_version_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
-    """An unknown field could change the experiment, so it is an error that names it."""
+    """An unknown field is an error that names it, because it could change the experiment."""
     plan_file.write(tmp_path, [experiment()], [1])
     [fault], [line] = lines(tmp_path, "faults.jsonl"), lines(tmp_path, "experiments.jsonl")
     injection = fault["injections"][0]  # type: ignore[index]

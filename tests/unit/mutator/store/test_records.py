@@ -1,4 +1,4 @@
-"""Records on disk: no finished one is lost, and no half-written one is accepted."""
+"""Records on disk: every finished one can be read, and no half-written one is accepted."""
 
 import json
 from collections.abc import Callable
@@ -39,7 +39,7 @@ def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> N
 
 
 def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
-    """A record's line equals `asdict`'s, with and without nested records."""
+    """The line of a record equals that of `asdict`, with and without nested records."""
     activation = Activation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
@@ -47,7 +47,7 @@ def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
-    """Lines of runs that end well equal those of older versions."""
+    """The lines of runs that end well equal those that older versions wrote."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append(record())
     writer.close()
@@ -58,7 +58,7 @@ def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeR
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
 def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: int) -> None:
-    """Any part of the last line may remain after a kill: only the lines before it count."""
+    """After a kill, any part of the last line may be there. Only the lines before it count."""
     path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
@@ -74,7 +74,7 @@ def test_a_file_killed_at_birth_is_empty(tmp_path: Path, content: bytes) -> None
 
 
 def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
-    """A line with a valid checksum that is no record is an error with its line."""
+    """If a line has a valid checksum and is not a record, the error gives its line."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append({"experiment_id": 3})
     writer.close()
@@ -93,7 +93,7 @@ def test_newer_schema_is_refused(tmp_path: Path) -> None:
 def test_any_record_goes_before_a_harness_error(
     tmp_path: Path, record: MakeRecord, error_first: bool
 ) -> None:
-    """A retried experiment has the record of the successful try, whichever file has it."""
+    """The record of a retried experiment is that of the successful try, whichever file it is in."""
     wrong = record(status=Status.HARNESS_ERROR, outcome=None, detail="killed from outside")
     good = record()
     write(tmp_path, "0001-gw0.jsonl", wrong if error_first else good)
@@ -110,7 +110,7 @@ def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: Ma
 
 
 def test_a_second_record_of_an_experiment_is_told(tmp_path: Path, record: MakeRecord) -> None:
-    """Finished experiments never run again, so a second record is refused, even an equal one."""
+    """A finished experiment does not run again, so a second record is refused, even if it is equal."""
     write(tmp_path, "0001-gw0.jsonl", record())
     write(tmp_path, "0002-gw0.jsonl", record())
     with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:2: a second record of experiment e{16}"):
@@ -118,9 +118,8 @@ def test_a_second_record_of_an_experiment_is_told(tmp_path: Path, record: MakeRe
 
 
 def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record: MakeRecord) -> None:
-    """A folder of an earlier schema has plain lines; the current schema requires checksums; neither accepts
-    the other.
-    """
+    """A folder with an earlier schema has plain lines, and the current schema requires checksums. Neither
+    accepts the other kind."""
     path = write(tmp_path, "0001-gw0.jsonl", record())
     old = [{"schema": "records/1"}, {k: v for k, v in asdict(record()).items() if k != "patch"}]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in old))
@@ -134,7 +133,7 @@ def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record:
 
 
 def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> None:
-    """Progress counts the outcomes of complete lines as they arrive, each experiment once."""
+    """Progress counts the outcomes of complete lines as they arrive, and each experiment once."""
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
     tail = Tail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)

@@ -46,9 +46,8 @@ def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
 
 
 def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
-    """Provenance has the version of mutator; digests of target, templates and scenarios; seed and reading;
-    and the stretches of work.
-    """
+    """Provenance has mutator's version, the digests of target, templates and scenarios, the seed, the
+    reading, and the stretches of work."""
     found = folder.provenance
     assert found["mutator"]
     assert found["stretches"] == []
@@ -66,13 +65,13 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 
 
 def test_no_run_folder(tmp_path: Path) -> None:
-    """A folder without run.json is reported as no run folder."""
+    """A folder without run.json is reported as not being a run folder."""
     with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 
 
 def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -> None:
-    """A unique beginning finds its id; one without a match, or with several, is an error."""
+    """The beginning of an id finds it if it is unique. No match, or several, is an error."""
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         folder.find("zz")
     with pytest.raises(MutatorError, match="24 experiments start with ''"):
@@ -80,7 +79,8 @@ def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -
 
 
 def test_one_owner(folder: RunFolder) -> None:
-    """While a command owns the folder another is refused with its name; a dead owner's lock is released."""
+    """While a command owns the folder, another command is refused with the owner's name. The lock of a
+    dead owner is released."""
     process = holder(folder, "owner")
     try:
         for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
@@ -94,7 +94,7 @@ def test_one_owner(folder: RunFolder) -> None:
 
 
 def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
-    """A new command waits for workers that still finish, and names them if they do not."""
+    """A new command waits for workers that are still finishing, and names them if they do not finish."""
     process = holder(folder, "worker", "1")
     assert locks.living_workers(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):
@@ -106,7 +106,7 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
 
 @pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
 def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
-    """A folder, pipe or link in the place of a lock is named, and the link's target is not written to."""
+    """A folder, pipe or link in place of a lock is named. Nothing is written to the link's target."""
     place = folder.path / name
     place.unlink(missing_ok=True)
     place.parent.mkdir(exist_ok=True)

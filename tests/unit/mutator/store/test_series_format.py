@@ -1,4 +1,4 @@
-"""The bytes of a series."""
+"""The bytes of a stored series."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ WORDS = arrays("<u4", (3, 6), elements=st.integers(0, 2**32 - 1))
 
 
 def series(values: np.ndarray, points: Points | None = None) -> Series:
-    """The last channel has values at every second time only."""
+    """Series in which the last channel has a value at every second time only."""
     rows = [*values[:-1], values[-1, ::2].copy()]
     every = [1] * (len(values) - 1) + [2]
     return Series(
@@ -28,9 +28,8 @@ def bits(one: Series) -> list[list[int]]:
 
 @given(WORDS, WORDS, st.integers(1, 6))
 def test_all_values_come_back_bit_by_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
-    """Infinite and tiny values, both zeros and every NaN come back, with any golden run, even a
-    longer one.
-    """
+    """Infinite and tiny values, both zeros and every NaN are read back, with any golden run, even a longer
+    one."""
     golden = series(one.view("<f4"))
     faulty = series(np.ascontiguousarray(other[:, :count]).view("<f4"))
     back = decode(encode(golden))
@@ -42,14 +41,14 @@ def test_all_values_come_back_bit_by_bit(one: np.ndarray, other: np.ndarray, cou
 
 
 def test_what_equals_golden_takes_no_room() -> None:
-    """A run of 20 channels that equals golden takes no more than its head, however long it is."""
+    """The series of a run that equals golden in 20 channels needs only its head, however long the run is."""
     values = np.random.default_rng(1).random((20, 600)).astype("<f4")
     golden = Series(t=np.arange(600) / 20, rows=list(values), every=[1] * 20, about={})
     assert len(encode(golden, golden)) < 100
 
 
 def test_points_come_back() -> None:
-    """Points between the times come back, for both runs."""
+    """Points between the times are read back, for both runs."""
     single = np.array([np.inf], dtype="<f4")
     points = Points(channel=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
     values = np.zeros((3, 6), dtype="<f4")
@@ -60,7 +59,7 @@ def test_points_come_back() -> None:
 
 @pytest.mark.parametrize("place", [0, 15, -12, -1])
 def test_damage_is_found(place: int) -> None:
-    """A changed byte is an error and never gives other values."""
+    """A changed byte is an error. It never gives other values."""
     data = bytearray(encode(series(np.ones((3, 6), dtype="<f4"))))
     data[place] ^= 0xFF
     with pytest.raises(MutatorError, match="damaged"):

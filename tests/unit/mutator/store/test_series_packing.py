@@ -1,4 +1,4 @@
-"""Packed series give the same files for any order of arrival, within the budget."""
+"""Packed series are the same files for any order of arrival, and stay within the budget."""
 
 import random
 from pathlib import Path
@@ -52,7 +52,8 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
-    """The best series come first, equal golden runs are stored once, and the workers' files are gone."""
+    """The best series come first, equal golden runs are stored once, and the files of the workers are
+    deleted."""
     folder = SeriesFolder(packed)
     index = folder.index
     assert index is not None
@@ -72,9 +73,8 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
 def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
     tmp_path: Path, packed: Path, seed: int
 ) -> None:
-    """Packed once or several times, by one or two workers, with one experiment run twice, the bytes are the
-    same.
-    """
+    """The bytes are the same if series are packed once or several times, by one or two workers, and if one
+    experiment ran twice."""
     draw = random.Random(seed)
     order = draw.sample(IDS, len(IDS))
     cuts = sorted(draw.sample(range(1, len(IDS)), 2))
@@ -86,7 +86,7 @@ def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
 
 
 def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) -> None:
-    """Series above the budget are left out and counted; packing in two sessions keeps the same ones."""
+    """Series above the budget are left out and counted. Packing in two sessions keeps the same series."""
     runs = [tmp_path / "once", tmp_path / "twice"]
     append(runs[0], "0001-main", IDS)
     pack(runs[0], "p", WORTH, 1)
@@ -102,7 +102,7 @@ def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) ->
 
 
 def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) -> None:
-    """The shards' series may be packed or not."""
+    """The series of shards, packed or not, give the same files as those of one run."""
     shards = [tmp_path / name for name in "ab"]
     for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
         append(shard, "0001-main", part)
@@ -113,7 +113,8 @@ def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) ->
 
 
 def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
-    """After repacking, an experiment keeps its series, whichever of the equal golden runs it has."""
+    """After packing again, an experiment keeps its series, whichever of the equal golden runs it refers
+    to."""
     append(tmp_path, "0001-main", IDS[:2])
     for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
         pack(tmp_path, "p", WORTH, 500)
@@ -137,9 +138,8 @@ def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
 
 
 def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
-    """Experiments of a damaged chunk can be read again once they were rerun, each from a separate file; so
-    can the index.
-    """
+    """Experiments of a damaged chunk can be read again after they were rerun, each from a separate file.
+    The same holds for a damaged index."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

@@ -1,4 +1,4 @@
-"""Stretches of work: reading, comparing, printing."""
+"""Stretches of work: how they are read, compared and printed."""
 
 from dataclasses import asdict
 from typing import Any
@@ -19,12 +19,12 @@ BEFORE = Stretch(
 
 
 def test_they_come_back_as_they_were_written() -> None:
-    """run.json keeps everything about a stretch."""
+    """run.json stores every fact about a stretch."""
     assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
 
 
 def test_an_old_head_has_what_it_was_planned_with() -> None:
-    """A folder of an older version has one stretch, with the data that it recorded."""
+    """A folder of an older version has one stretch with the data that the version recorded."""
     planned = {"python": "3.11.2", "machine": "Linux x86_64", "packages": {"numpy": "2.0"}}
     (found,) = read_stretches({"provenance": planned})
     assert (found.python, found.platform, found.packages) == ("3.11.2", "Linux x86_64", {"numpy": "2.0"})
@@ -39,7 +39,7 @@ def test_a_damaged_stretch_is_told(stretch: Any) -> None:
 
 
 def test_every_difference_is_named() -> None:
-    """Another Python, another version, a missing package and a new one are all named."""
+    """A different Python, a different version, a missing package and a new package are all named."""
     packages = {"numpy": "2.1.0", "old": None, "new": "3.0"}
     assert differences(BEFORE, "CPython 3.12.1", packages) == (
         "CPython 3.11.7, here CPython 3.12.1",
@@ -51,7 +51,7 @@ def test_every_difference_is_named() -> None:
 
 
 def test_several_stretches_are_told_together() -> None:
-    """Each value is listed once, oldest first; accepted differences are marked."""
+    """Each value is listed once, oldest first. Differences that the user accepted are marked."""
     after = Stretch(
         python="CPython 3.12.1",
         packages={"numpy": "2.1.0"},

@@ -1,4 +1,4 @@
-"""Finished runs verified on this machine before are verified by comparing their bytes."""
+"""A finished run that was verified on this machine before is verified by comparing its bytes."""
 
 import json
 from collections.abc import Callable

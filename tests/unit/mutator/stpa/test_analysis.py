@@ -1,4 +1,4 @@
-"""The shipped hazard analysis, and the detection of mistakes in it."""
+"""The shipped hazard analysis, and how mistakes in an analysis are found."""
 
 import shutil
 from pathlib import Path
@@ -31,12 +31,12 @@ def manifest(clone: Workspace) -> TargetManifest:
 
 @pytest.fixture
 def folder(clone: Workspace, tmp_path: Path) -> Path:
-    """A copy of the analysis that a test may break."""
+    """A copy of the analysis, which a test may break."""
     return Path(shutil.copytree(clone.library / "stpa", tmp_path / "stpa"))
 
 
 def spoil(folder: Path, file: str, old: str, new: str) -> int:
-    """Replace the first `old` of a file; return its line."""
+    """Replace the first `old` in a file; return its line."""
     text = (folder / file).read_text()
     assert old in text
     (folder / file).write_text(text.replace(old, new, 1))
@@ -51,16 +51,16 @@ def analysis(clone: Workspace) -> Analysis:
 def test_the_analysis_that_ships(
     analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    """The shipped analysis has no gap or contradiction, and all of its context tables are proved."""
+    """The shipped analysis has no gap or contradiction, and each of its context tables is proved to cover
+    everything."""
     assert check_analysis(analysis, specs, manifest) == []
     assert [table.coverage.beyond for table in analysis.tables.values()] == [None, None]
     assert set(analysis.structure.control_actions) == {"accelerate", "decelerate", "steer"}
 
 
 def test_the_papers_locations_are_the_ones_with_faults(analysis: Analysis) -> None:
-    """Faults enter by radar, camera frames, the vision output, and car sensors; nowhere else except the
-    controllers' software, for which the paper has none.
-    """
+    """Faults are injected at the radar, camera frames, the vision output, car sensors and the controllers'
+    software, and nowhere else. The paper has none in software."""
     places = {place for factor in analysis.factors.values() if factor.faults for place in factor.where}
     sensed = {"own_speed", "own_motion", "steer_angle"}
     assert places == {"radar_points", "pictures", "vision_lead", "path", *sensed, "acc", "lkas"}
@@ -70,7 +70,7 @@ def test_the_papers_locations_are_the_ones_with_faults(analysis: Analysis) -> No
 
 
 def test_places_of_both_readings_count(clone: Workspace) -> None:
-    """A spec with another location as coded is listed at both."""
+    """If a spec has another location as coded, it is listed at both locations."""
     assert injected(clone.spec("radar/jamming")) == {
         "selfdrive/sim/radar.py::RadarSensor.measure",
         "selfdrive/sim/simulator.py::Simulator.step",
@@ -124,7 +124,8 @@ def test_places_of_both_readings_count(clone: Workspace) -> None:
 def test_what_does_not_fit_together_is_refused(
     folder: Path, file: str, old: str, new: str, said: str
 ) -> None:
-    """Gaps, overlaps, unknown and dangling names are refused on load with file and line."""
+    """Gaps, overlaps, unknown names and dangling names are refused with file and line when the analysis is
+    loaded."""
     spoil(folder, file, old, new)
     with pytest.raises(MutatorError) as caught:
         load_analysis(folder)
@@ -185,7 +186,7 @@ def test_gaps_and_contradictions_are_found(
     new: str,
     said: str,
 ) -> None:
-    """A gap, or a contradiction with tables, library or target, is reported at its line."""
+    """A gap, or a contradiction with the tables, the library or the target, is reported at its line."""
     spoil(folder, file, old, new)
     problems = check_analysis(load_analysis(folder), specs, manifest)
     assert [p for p in problems if said in str(p) and p.where and p.line], [str(p) for p in problems]
@@ -194,9 +195,8 @@ def test_gaps_and_contradictions_are_found(
 def test_a_category_or_a_hazard_that_is_left_out(
     folder: Path, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    """A hazard without unsafe actions cannot be reached; every action must be judged in all four
-    categories.
-    """
+    """A hazard without unsafe control actions is reported. Every control action must be judged in all four
+    categories."""
     text = (folder / UNSAFE).read_text()
     (folder / UNSAFE).write_text(text[: text.index("  UCA14:")])
     (folder / FACTORS).write_text((folder / FACTORS).read_text().replace(", UCA14]", "]"))

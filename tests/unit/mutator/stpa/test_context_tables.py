@@ -1,4 +1,4 @@
-"""Context tables and hazards."""
+"""Context tables, and the hazards that they refer to."""
 
 import math
 import re
@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 
 def test_rows_become_triggers(toy: Workspace) -> None:
-    """Each row becomes a trigger with its name and with the constants filled in."""
+    """Each row becomes a trigger with the row's name and with constants replaced by their values."""
     near, far = toy.context_table("pedals").triggers(hold_s=3.0, armed_after_s=1.5)
     assert near == Trigger(name="near", condition="hwt <= 2.0", hold=Hold.FOR, hold_s=3.0, armed_after_s=1.5)
     assert far.condition == "not hwt <= 2.0"
@@ -23,7 +23,7 @@ def test_rows_become_triggers(toy: Workspace) -> None:
 
 
 def test_an_unknown_row(toy: Workspace) -> None:
-    """An error for an unknown row lists the existing ones."""
+    """The error for an unknown row lists the existing rows."""
     with pytest.raises(MutatorError, match="context 'C1'; expected one of near, far"):
         toy.context_table("pedals").triggers(rows=("C1",))
 
@@ -38,7 +38,7 @@ def test_an_unknown_row(toy: Workspace) -> None:
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """A table is read as strictly as any other file, including its conditions."""
+    """A table and its conditions are read as strictly as other files."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -47,7 +47,8 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
 
 
 def test_rows_ask_for_what_a_target_observes(toy: Workspace) -> None:
-    """A name that is neither a constant nor observed is reported at its line, with the known ones."""
+    """A name that is neither a constant nor an observed value is reported at its line, with the known
+    names."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("when: hwt <= safe_hwt_s", "when: hwt <= safe", 1))
     table, variables = load_context_table(path), toy.manifest("toy").observation.variables
@@ -94,7 +95,7 @@ def test_the_table_that_ships(clone: Workspace) -> None:
 
 
 def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
-    """The safe headway is one number in the file."""
+    """A change of one number in the file changes the safe headway."""
     text = (clone.library / "stpa" / "contexts" / "accelerate_decelerate.yaml").read_text()
     path = tmp_path / "wide.yaml"
     path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))
@@ -102,7 +103,7 @@ def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> None:
-    """The docs' table loads, and its rows are proved to cover everything once."""
+    """The table in the docs loads. Its rows are proved to cover everything exactly once."""
     page = clone.library.parent / "docs" / "how-to" / "change-the-hazard-analysis.md"
     (text, *_) = re.findall(r"```yaml\n(.*?)```", page.read_text(), re.DOTALL)
     (tmp_path / "closing.yaml").write_text(text)
@@ -112,7 +113,7 @@ def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> 
 
 
 def test_rows_judge_the_same_actions(toy: Workspace) -> None:
-    """A row without one of the control actions is reported at its line."""
+    """A row that lacks one of the control actions is reported at its line."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     head, _, tail = path.read_text().rpartition("accelerate:")
     path.write_text(f"{head}brake:{tail}")
@@ -121,7 +122,7 @@ def test_rows_judge_the_same_actions(toy: Workspace) -> None:
 
 
 def test_what_cannot_be_proved_is_accepted_and_said(toy: Workspace) -> None:
-    """A table with conditions that compare two variables is accepted as unproved."""
+    """A table whose conditions compare two variables is accepted without a proof."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     path.write_text(path.read_text().replace("hwt <= safe_hwt_s", "v_ego <= v_lead"))
     table = load_context_table(path)

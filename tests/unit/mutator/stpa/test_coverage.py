@@ -22,7 +22,7 @@ def prove(*conditions: str):
     ],
 )
 def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
-    """A table that covers everything once passes, whatever the form of its comparisons."""
+    """A table that covers everything exactly once passes, whatever the form of its comparisons."""
     found = prove(*conditions)
     assert (found.beyond, found.place) == (None, None)
     assert found.cells > 0
@@ -42,7 +42,7 @@ def test_a_right_table_is_proved(conditions: tuple[str, ...]) -> None:
     ],
 )
 def test_a_wrong_table_is_told_where(conditions: tuple[str, ...], place: str, rows: tuple[str, ...]) -> None:
-    """The first cell with no context, or several, is named, including borders."""
+    """The first cell with no context or with several is named, including cells at borders."""
     found = prove(*conditions)
     assert (found.place, found.rows) == (place, rows)
 
@@ -62,7 +62,7 @@ def test_beyond_a_proof(condition: str) -> None:
 
 
 def test_too_many_cells_are_beyond_it_too() -> None:
-    """A table with too many cells is not provable either, so the time is bounded."""
+    """A table with too many cells is reported as not provable, so that the time is bounded."""
     names = ("t", "d_rel", "v_ego", "v_lead", "hwt", "rs")
     found = prove(" and ".join(f"{name} != {i}" for name in names for i in range(4)), "True")
     assert found.beyond is not None and "531441 cells" in found.beyond

@@ -25,13 +25,13 @@ def layout(analysis: Analysis) -> Layout:
 
 
 def meets(box: Box, start: Point, end: Point) -> bool:
-    """Whether a segment along an axis has a point inside the box."""
+    """Whether a horizontal or vertical segment has a point inside the box."""
     (x1, x2), (y1, y2) = sorted((start[0], end[0])), sorted((start[1], end[1]))
     return x1 < box.x + box.width and x2 > box.x and y1 < box.bottom and y2 > box.y
 
 
 def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
-    """No box overlaps another or leaves the diagram."""
+    """No box overlaps another box or leaves the diagram."""
     for one, other in combinations(layout.boxes.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
     for box in layout.boxes.values():
@@ -39,7 +39,7 @@ def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
 
 
 def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: Layout) -> None:
-    """An arrow starts and ends on the edge of its two boxes and goes through none."""
+    """An arrow starts and ends at the edges of its two boxes and crosses no box."""
     for name, link in analysis.structure.links.items():
         points = layout.arrows[name].points
         for place, point in ((link.from_, points[0]), (link.to, points[-1])):
@@ -63,7 +63,7 @@ def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
 
 
 def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, layout: Layout) -> None:
-    """Two lines of text at each arrow overlap no box, other arrow or other label."""
+    """The two lines of text at each arrow do not overlap any box, other arrow or other label."""
     areas = {}
     for name, link in analysis.structure.links.items():
         arrow, width = layout.arrows[name], 7.0 * len(link.label)
@@ -81,13 +81,13 @@ def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, lay
 
 
 def test_places_of_faults_stand_out(analysis: Analysis) -> None:
-    """The diagram is well-formed and reproducible, and only places with faults have the fault colour."""
+    """The diagram is well-formed and reproducible. Only places with faults have the colour of faults."""
     text = draw(analysis)
     assert text == draw(analysis)
     root = ElementTree.fromstring(text)
     lines = [e for e in root.iter("{http://www.w3.org/2000/svg}path") if e.get("stroke") == FAULT]
     links = faulty_places(analysis).keys() & analysis.structure.links.keys()
-    assert len(lines) == len(links) + 1  # and the legend's
+    assert len(lines) == len(links) + 1  # and that of the legend
     words = [e.text for e in root.iter("{http://www.w3.org/2000/svg}text")]
     assert {"ACC", "LKAS", "steer torque", "CF13, 14"} <= set(words)
 
@@ -95,12 +95,12 @@ def test_places_of_faults_stand_out(analysis: Analysis) -> None:
 def test_the_picture_in_the_docs_is_this_one(analysis: Analysis) -> None:
     """The docs have the current diagram.
 
-    After a change: `mutator stpa --svg docs/explanation/hazard-analysis.svg`.
+    After a change, run `mutator stpa --svg docs/explanation/hazard-analysis.svg`.
     """
     assert (CLONE / "docs" / "explanation" / "hazard-analysis.svg").read_text() == draw(analysis)
 
 
 def test_names_in_short() -> None:
-    """Of names with a common beginning the first is written whole."""
+    """If names have a common beginning, only the first is written in full."""
     assert short(["CF9"]) == "CF9"
     assert short(["CF9", "CF10"]) == "CF9, 10"

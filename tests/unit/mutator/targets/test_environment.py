@@ -1,4 +1,4 @@
-"""Environment variables that a manifest sets for its target's processes."""
+"""The environment variables that a manifest sets for its target's processes."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ USE = "import os\nassert (os.environ['ROAD'], os.environ['PYTHONHASHSEED']) == (
 
 
 def with_env(workspace: Workspace, env: str) -> Path:
-    """The toy's manifest with `env` in its third line."""
+    """The toy's manifest, with `env` on its third line."""
     path = workspace.library.parent / MANIFEST
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nenv: {env}\n{rest}")
@@ -26,7 +26,7 @@ def with_env(workspace: Workspace, env: str) -> Path:
 
 
 def test_both_engines_set_them(fork: Fork) -> None:
-    """Reference runs and the fork server have the variable in addition to the harness's."""
+    """Reference runs and the fork server have the variable, and those of the harness."""
     with_env(fork.toy, "{ROAD: wet, OMP_NUM_THREADS: '1'}")
     (fork.toy.library.parent / "tree" / "toycar" / "__init__.py").write_text(USE)
     job = fork.job(at_time(2.0))
@@ -37,7 +37,7 @@ def test_both_engines_set_them(fork: Fork) -> None:
 
 
 def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
-    """The command that shows a film has it, too."""
+    """The command that shows a film also has the variable."""
     with_env(toycar, "{ROAD: wet}")
     show = toycar.library.parent / "tree" / "toycar" / "show.py"
     show.write_text("import os, sys; open(sys.argv[4], 'w').write(os.environ['ROAD'])")
@@ -63,7 +63,8 @@ def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_set(toycar: Workspace, env: str, said: str) -> None:
-    """Names are checked, values are texts, and the harness's own variables are refused unless equal."""
+    """Names are checked, and values are texts. A variable that the harness sets is refused unless the
+    value is the same."""
     path = with_env(toycar, env)
     with pytest.raises(MutatorError) as caught:
         toycar.manifest("toycar")

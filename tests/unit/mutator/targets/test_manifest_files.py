@@ -1,4 +1,4 @@
-"""Target manifests describe a foreign tree by data alone."""
+"""Target manifests describe a foreign tree with data only."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ FILM = 'film: {run: ["x={film}"], module: show, args: ["{out}"], still: ["{film}
 
 
 def test_a_manifest_is_read(toy: Workspace) -> None:
-    """Root, package, entry, channels and the place of observation are read from the file."""
+    """Root, package, entry, channels and the place of observation are read from the manifest."""
     manifest = toy.manifest("toy")
     assert manifest.root == (toy.library.parent / "target").resolve()
     assert manifest.step_s == 0.1
@@ -28,7 +28,7 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
 
 
 def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Workspace) -> None:
-    """A channel without a tolerance gets its role's; 0 is a valid tolerance."""
+    """A channel without a tolerance has that of its role. 0 is a valid tolerance."""
     path = toy.library / "targets" / "toy.yaml"
     kept = "{unit: m/s, role: actuator, tolerance: 0.5}"
     more = ("pedal: {unit: '-', role: actuator}", "wish: {unit: m}", "gap: {unit: m, tolerance: 0}")
@@ -38,7 +38,7 @@ def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Works
 
 
 def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
-    """Values that a target does not store are computed from its names, attributes and items."""
+    """Values that a target does not store are computed from names, attributes and items that it has."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("is: now.gap", "is: 'now[\"lead\"].x[-1] - (now.x + 4.5)'")
     path.write_text(text.replace("is: now.lead_speed", "is: 'hypot(now.v[0], now.v[1]) > 3'"))
@@ -48,7 +48,7 @@ def test_ground_truth_may_be_reckoned(toy: Workspace) -> None:
 
 
 def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
-    """An older manifest observes the same four values for every target; errors name its lines."""
+    """An older manifest observes the same four values for every target. Its errors have line numbers."""
     path = toy.library / "targets" / "toy.yaml"
     before, text = toy.manifest("toy").observation, path.read_text()
     head, _, rest = text.partition("  time: now.time")
@@ -72,7 +72,7 @@ def test_a_manifest_of_the_older_schema_is_read(toy: Workspace) -> None:
 
 
 def test_arguments(toy: Workspace) -> None:
-    """Placeholders are filled in and changes add their arguments; an unknown change is refused."""
+    """Placeholders are replaced, and changes add their arguments. An unknown change is refused."""
     manifest = toy.manifest("toy")
     given = manifest.arguments(scenario=Path("s.yaml"), seed=3, out=Path("o"), changes=("alone",))
     assert given == ("s.yaml", "--seed", "3", "--out", "o", "--alone", "--quiet")
@@ -81,9 +81,8 @@ def test_arguments(toy: Workspace) -> None:
 
 
 def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
-    """Each placeholder is filled in once, in arguments of the entry, of changes and of independent runs;
-    other braces stay.
-    """
+    """Each placeholder is replaced once, in the arguments of the entry, of changes and of independent
+    runs. Other braces stay."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("alone: [--alone, --quiet]", 'alone: ["--in={out}/x", \'{"a": {}}\']')
     text = text.replace("  changes:", '  independent: ["--log={out}:{seed}"]\n  changes:')
@@ -95,7 +94,7 @@ def test_placeholders_anywhere_in_an_argument(toy: Workspace) -> None:
 
 
 def test_arguments_may_be_left_out(toy: Workspace) -> None:
-    """An entry without arguments gets scenario, seed and output folder as options."""
+    """If the entry has no arguments, the scenario, the seed and the output folder are passed as options."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(line for line in lines if not line.startswith("  args:")))
@@ -104,7 +103,7 @@ def test_arguments_may_be_left_out(toy: Workspace) -> None:
 
 
 def test_the_harness_names_the_cache(toy: Workspace) -> None:
-    """`{cache}` is the target's own folder below the user's cache, the same in every run."""
+    """`{cache}` is the target's folder in the user's cache, and is the same in every run."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace('"{out}"', '"{out}", --cache, "{cache}"'))
     manifest = toy.manifest("toy")
@@ -114,9 +113,8 @@ def test_the_harness_names_the_cache(toy: Workspace) -> None:
 
 
 def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
-    """Filming adds arguments with a folder in the run's output; the command's module is checked like any
-    other.
-    """
+    """A film adds arguments with a folder in the run's output. The module of its command is checked like
+    other modules."""
     with pytest.raises(MutatorError, match=r"target toy cannot be filmed; expected `film` in its manifest"):
         toy.manifest("toy").filming()
     path = toy.library / "targets" / "toy.yaml"
@@ -137,7 +135,7 @@ def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
 
 
 def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
-    """An option overrides the manifest's root."""
+    """An option overrides the root in the manifest."""
     path = toy.library / "targets" / "toy.yaml"
     other = tmp_path / "other"
     (other / "toycar").mkdir(parents=True)
@@ -147,7 +145,7 @@ def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
-    """`shipped:target` is the controller that ships with the harness, wherever the manifest is."""
+    """`shipped:target` is the controller that ships with the harness, wherever the manifest is stored."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text()
     line = next(line for line in text.splitlines() if line.startswith("root:"))
@@ -161,7 +159,8 @@ def test_the_root_may_be_the_shipped_controller(toy: Workspace) -> None:
 
 
 def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
-    """A manifest is a snapshot: an edit appears only in one loaded later; bytecode is no part of a tree."""
+    """A manifest is a snapshot: an edit is seen only by a manifest that is loaded later. Bytecode is not
+    part of a tree."""
     manifest = toy.manifest("toy")
     before = manifest.tree
     (manifest.root / "toycar" / "__pycache__").mkdir()
@@ -219,7 +218,7 @@ def test_a_manifest_is_a_snapshot(toy: Workspace) -> None:
     ],
 )
 def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """A manifest is read as strictly as any other file."""
+    """A manifest is read as strictly as other files."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -239,7 +238,8 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
 def test_packages_and_modules(
     toy: Workspace, packages: str, package: str | None, names: tuple[str, ...]
 ) -> None:
-    """The probe is in the only package, or outside any package if there are several or a plain module."""
+    """The probe is in the package if there is only one. With several packages or a plain module, it is
+    outside."""
     path = toy.library / "targets" / "toy.yaml"
     text = path.read_text().replace("package: toycar", packages)
     path.write_text(text.replace('"toycar/**/*.py"', '"**/*.py"'))
@@ -255,7 +255,7 @@ def test_packages_and_modules(
 
 
 def test_files_may_be_left_out(toy: Workspace) -> None:
-    """By default, the tree has exactly all files of the packages, including data, and the modules."""
+    """By default, the tree has exactly the files of the packages, including data files, and the modules."""
     path = toy.library / "targets" / "toy.yaml"
     lines = path.read_text().replace("package: toycar", "packages: [toycar, drive.py]").splitlines()
     path.write_text("\n".join(line for line in lines if not line.startswith("files:")))
@@ -281,7 +281,8 @@ def test_files_may_be_left_out(toy: Workspace) -> None:
     ],
 )
 def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> None:
-    """Names must be unique import names or module files at the root; exactly one of the two keys is given."""
+    """Names must be unique, and must be import names or module files at the root. Exactly one of the two
+    keys is allowed."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", packages))
     with pytest.raises(MutatorError) as caught:
@@ -290,7 +291,7 @@ def test_packages_that_cannot_be(toy: Workspace, packages: str, said: str) -> No
 
 
 def test_a_package_that_is_not_there(toy: Workspace) -> None:
-    """A manifest with no file of its package is refused when the tree is read."""
+    """A manifest is refused when its tree is read if no file belongs to its package."""
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("package: toycar", "package: other"))
     with pytest.raises(MutatorError, match="no file of package 'other'"):
@@ -310,13 +311,13 @@ def test_a_package_that_is_not_there(toy: Workspace) -> None:
     ],
 )
 def test_globs(glob: str, hits: set[str]) -> None:
-    """`*` stays in a folder, `**` spans folders, and a glob must match the whole path."""
+    """`*` matches within a folder, `**` matches across folders, and a glob must match the whole path."""
     paths = ["a/x.py", "a/b/y.py", "a/b/c/z.py", "a/b/d.dbc", "w.py", "a/xXpy"]
     assert {p for p in paths if matches(p, [glob])} == hits
 
 
 def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> None:
-    """A linked file or folder is part of the tree and can have faults; the mutant has a copy."""
+    """A linked file or folder is part of the tree and can have faults. The mutant has a copy of it."""
     outside = tmp_path / "outside"
     outside.mkdir()
     root = toy.manifest("toy").root / "toycar"
@@ -336,7 +337,7 @@ def test_links_count_as_what_they_lead_to(toy: Workspace, tmp_path: Path) -> Non
 
 
 def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
-    """A dangling link is named with its target, instead of as a missing file."""
+    """A dangling link is reported with its target, and not as a missing file."""
     link = toy.manifest("toy").root / "toycar" / "glue.py"
     link.symlink_to("/nowhere/glue.py")
     with pytest.raises(MutatorError, match=r"toycar/glue.py: a link to /nowhere/glue.py, where nothing is"):
@@ -344,7 +345,7 @@ def test_a_link_that_leads_nowhere(toy: Workspace) -> None:
 
 
 def test_digests_do_not_depend_on_order(tmp_path: Path) -> None:
-    """Equal files give the same digest in any order of creation."""
+    """Equal files give the same digest, in whatever order they were created."""
     for name, order in (("a", ["x.py", "y.py"]), ("b", ["y.py", "x.py"])):
         (tmp_path / name).mkdir()
         for file in order:

@@ -57,7 +57,7 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_it_is_well_without_a_mistake(path: Path) -> None:
-    """The manifest without the mistakes is valid."""
+    """Without the mistakes, the manifest is valid."""
     path.write_text(WHOLE)
     assert load_manifest(path).hazards == ("HIT", "LATE")
 
@@ -105,7 +105,8 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
     ],
 )
 def test_a_mistake_is_told_with_what_to_do(path: Path, right: str, wrong: str, got: str, known: str) -> None:
-    """More than thirty kinds of mistakes are reported with file and line, value, expectation and remedy."""
+    """Each of more than thirty kinds of mistakes is reported with file and line, the value, the
+    expectation and a remedy."""
     assert right in WHOLE
     path.write_text(WHOLE.replace(right, wrong, 1))
     with pytest.raises(MutatorError) as caught:

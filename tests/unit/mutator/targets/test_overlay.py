@@ -1,4 +1,4 @@
-"""Overlays: glue of the library on top of a foreign tree."""
+"""Overlays: glue in the library that is added to a foreign tree."""
 
 import shutil
 from pathlib import Path
@@ -25,9 +25,8 @@ def edit(path: Path, old: str, new: str) -> None:
 
 
 def test_an_overlay_is_part_of_the_tree(pole: Workspace) -> None:
-    """All its files are in the tree and in the digest, under their paths; its modules must come from the
-    tree.
-    """
+    """All files of the overlay are in the tree and in the digest, under their paths. A run must import its
+    modules from the tree."""
     before = pole.manifest("pole")
     assert before.tree.overlaid == {"drive.py", "glue_parts/scenario.py"}
     assert before.overlay == (pole.library / "overlays" / "pole").resolve()
@@ -53,7 +52,7 @@ def test_an_overlay_may_be_named_from_the_library(pole: Workspace) -> None:
 
 
 def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
-    """Entry module and observation are in the overlay; faults of the foreign modules act."""
+    """The entry module and the observation are in the overlay. Faults in the foreign modules take effect."""
     trial = try_fault("sensor/angle", "tilted", 1.0, value=60, workspace=pole)
     assert trial.record.outcome is Outcome.HAZARD
     assert trial.record.activation is not None and trial.record.activation.first == 1.0
@@ -62,7 +61,7 @@ def test_a_tree_with_an_overlay_is_driven(pole: Workspace) -> None:
 
 
 def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
-    """A place in the overlay is refused at the line of the spec."""
+    """A spec with a place in the overlay is refused at its line."""
     spec = pole.library / "faults" / "sensor" / "angle.yaml"
     edit(
         spec,
@@ -77,7 +76,8 @@ def test_no_fault_is_injected_into_glue(pole: Workspace) -> None:
 
 @pytest.mark.parametrize("name", ["regulator.py", "filters/low_pass.py", "notes.txt"])
 def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
-    """A file of the overlay that the root also has is refused, whether or not it is part of the tree."""
+    """A file of the overlay is refused if the root has a file with the same path, whether or not that file
+    is part of the tree."""
     (pole.manifest("pole").root / "notes.txt").write_text("mine")
     path = pole.library / "overlays" / "pole" / name
     path.parent.mkdir(exist_ok=True)
@@ -87,14 +87,14 @@ def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
 
 
 def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
-    """An overlay module with the probe's name is refused."""
+    """A module of the overlay with the probe's name is refused."""
     (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected that name free"):
         build(pole.manifest("pole"), pole.fault_models(), None, always())
 
 
 def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
-    """Glue linked into the overlay, as a file, a folder or the overlay itself, works the same."""
+    """A link to a file, a folder or the overlay itself works like the original."""
     whole = pole.manifest("pole").tree
     overlay, elsewhere = pole.library / "overlays" / "pole", tmp_path / "elsewhere"
     shutil.move(overlay / "glue_parts", elsewhere / "glue_parts")
@@ -109,7 +109,7 @@ def test_linked_glue(pole: Workspace, tmp_path: Path) -> None:
 
 
 def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
-    """Errors in glue name its own path; `doctor` names root and overlay."""
+    """An error in the glue names the glue's own path. `doctor` names root and overlay."""
     overlay = (pole.library / "overlays" / "pole").resolve()
     edit(pole.library / MANIFEST, "after_assign: now", "after_assign: then")
     with pytest.raises(MutatorError) as caught:
@@ -121,7 +121,7 @@ def test_errors_name_the_file_of_the_overlay(pole: Workspace) -> None:
 
 
 def test_films_know_the_overlay(pole: Workspace, tmp_path: Path) -> None:
-    """The command that shows a film finds glue and foreign modules in one folder."""
+    """The command that shows a film finds the glue and the foreign modules in one folder."""
     body = "import sys, drive, pole; open(sys.argv[1], 'w').write(drive.__file__)"
     (pole.library / "overlays" / "pole" / "show.py").write_text(body)
     film = 'film: {run: [], module: show, args: ["{out}"], still: []}\n'

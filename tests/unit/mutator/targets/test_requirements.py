@@ -1,4 +1,4 @@
-"""The packages that a target needs: reported if missing, recorded if present."""
+"""The packages that a target needs. Missing ones are reported, and present ones are recorded."""
 
 from importlib import metadata
 from pathlib import Path
@@ -23,7 +23,7 @@ SAID = (
 
 
 def requiring(workspace: Workspace, *requirements: str) -> Workspace:
-    """The toy with these requirements in the third line of its manifest."""
+    """The toy, with these requirements on the third line of its manifest."""
     path = workspace.library / "targets" / "toycar.yaml"
     head, about, rest = path.read_text().split("\n", 2)
     path.write_text(f"{head}\n{about}\nrequires: {list(requirements)}\n{rest}")
@@ -37,9 +37,8 @@ def lacking(toycar: Workspace) -> Workspace:
 
 
 def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_path: Path) -> None:
-    """Before anything runs, a trial and a campaign name each missing package or wrong version, with the
-    remedy.
-    """
+    """A trial and a campaign report each missing package or wrong version before anything runs, with a
+    remedy."""
     with pytest.raises(MutatorError, match=SAID):
         try_fault("sensor/lane", "A", 1.0, workspace=lacking)
     with pytest.raises(MutatorError, match=SAID):
@@ -48,7 +47,7 @@ def test_what_is_missing_is_named_before_anything_runs(lacking: Workspace, tmp_p
 
 
 def test_check_and_doctor_name_it(lacking: Workspace) -> None:
-    """Both commands report it as well."""
+    """Both commands report the missing package."""
     problem, *_ = check_library(lacking, "toycar")
     with pytest.raises(MutatorError, match=SAID):
         raise problem
@@ -67,7 +66,7 @@ def test_what_is_no_requirement(toycar: Workspace) -> None:
 
 
 def test_versions_are_noted_with_the_run(toycar: Workspace, tmp_path: Path) -> None:
-    """A stretch of work has the versions of the required packages, used or not."""
+    """A stretch of work has the versions of all required packages, whether or not a run uses them."""
     requiring(toycar, "HypoThesis>=6")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     begin_stretch(folder, toycar, records="0001-*", accept=False)

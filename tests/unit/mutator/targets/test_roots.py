@@ -1,4 +1,4 @@
-"""Roots of targets: installed packages are found where pip put them, without an import."""
+"""Roots of targets. An installed package is found where pip installed it, and is not imported."""
 
 import shutil
 import sys
@@ -15,7 +15,7 @@ from mutator.workspace import Workspace
 
 @pytest.fixture
 def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder of installed packages, which must not be imported here."""
+    """A folder of installed packages that fail if they are imported."""
     folder = tmp_path / "site"
     (folder / "filters_of_poles").mkdir(parents=True)
     (folder / "filters_of_poles" / "__init__.py").write_text("raise RuntimeError('imported')\n")
@@ -26,7 +26,7 @@ def site(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def installed(pole: Workspace, **keys: str) -> Workspace:
-    """The pole's library with other keys in its manifest."""
+    """The pole's library, with other keys in its manifest."""
     path = pole.library / "targets" / "pole.yaml"
     lines = [line for line in path.read_text().splitlines() if line.partition(":")[0] not in keys]
     path.write_text("\n".join([lines[0], *(f"{k}: {v}" for k, v in keys.items() if v), *lines[1:]]) + "\n")
@@ -34,7 +34,7 @@ def installed(pole: Workspace, **keys: str) -> Workspace:
 
 
 def test_an_installed_package(pole: Workspace, site: Path) -> None:
-    """The tree has the package's own files and the overlay, without neighbours; nothing is imported."""
+    """The tree has the package's files and the overlay, and no other packages. Nothing is imported."""
     manifest = installed(pole, root="installed:filters_of_poles", packages="[filters_of_poles]").manifest(
         "pole"
     )
@@ -49,7 +49,7 @@ def test_an_installed_package(pole: Workspace, site: Path) -> None:
 
 
 def test_an_installed_module(pole: Workspace, site: Path) -> None:
-    """A module outside any package is found, too."""
+    """A module outside all packages is also found."""
     installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
     manifest = pole.manifest("pole")
     assert manifest.root == site.resolve()
@@ -81,13 +81,14 @@ def test_an_installed_module(pole: Workspace, site: Path) -> None:
     ],
 )
 def test_what_is_not_installed(pole: Workspace, site: Path, keys: dict[str, str], said: str) -> None:
-    """A missing package, one without source, and a tree that would include its neighbours are refused."""
+    """A missing package, a package without source, and a tree that would include other packages are
+    refused."""
     with pytest.raises(MutatorError, match=f"pole.yaml:{said}"):
         installed(pole, **keys).manifest("pole")
 
 
 def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
-    """An unreadable manifest is one problem, however many campaigns use its target."""
+    """An unreadable manifest is reported once, however many campaigns use its target."""
     installed(pole, root="installed:none_of_poles", packages="[none_of_poles]", requires='["poles>=1"]')
     (problem,) = check_library(pole, "pole")
     assert problem.remedy == "pip install 'poles>=1'"
@@ -96,10 +97,10 @@ def test_check_tells_a_missing_package_once(pole: Workspace) -> None:
 def test_an_installed_package_is_driven(
     pole: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The mutant of an installed package runs from its own tree, and the installed one stays unchanged."""
+    """A mutant of an installed package runs from its own tree, and the installed package stays unchanged."""
     root, site = pole.manifest("pole").root, tmp_path / "site"
     shutil.move(root / "filters", site / "filters")
-    for name in ("pole.py", "regulator.py"):  # glue may bring its own needs
+    for name in ("pole.py", "regulator.py"):  # the glue may have requirements
         shutil.move(root / name, pole.library / "overlays" / "pole" / name)
     shutil.rmtree(pole.library / "faults" / "sensor")
     monkeypatch.syspath_prepend(str(site))

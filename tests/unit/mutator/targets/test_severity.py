@@ -1,4 +1,4 @@
-"""Severity in a manifest, and scales of a library."""
+"""Severity in a manifest, and the scales in a library."""
 
 import re
 from pathlib import Path
@@ -26,7 +26,7 @@ classes:
     [(0, "S0"), (3.99, "S0"), (4, "S1"), (19.9, "S1"), (20, "S2"), (39.9, "S2"), (40, "S3"), (150, "S3")],
 )
 def test_the_shipped_scale(kph: float, severity: str) -> None:
-    """The shipped target's contacts are classed by the strict ends of the SAE J2980 ranges."""
+    """The shipped target's contacts are classed by the strict limits of the ranges in SAE J2980."""
     workspace = Workspace.find()
     scale = workspace.scale_of(workspace.manifest("openpilot"))
     assert scale is not None
@@ -34,9 +34,8 @@ def test_the_shipped_scale(kph: float, severity: str) -> None:
 
 
 def test_the_shipped_masses() -> None:
-    """The own car is the simulator's Civic; a contact at 20 m/s with an equal one has half of that as
-    delta-v.
-    """
+    """The simulated car is the simulator's Civic. In a contact at 20 m/s with an equal car, delta-v is
+    half of that."""
     contact = Workspace.find().manifest("openpilot").contact
     assert contact is not None
     assert (contact.hazard, contact.mass, contact.delta_v(20.0)) == ("H1", 1461.6, 10.0)
@@ -56,7 +55,7 @@ def test_the_shipped_masses() -> None:
     ],
 )
 def test_mistakes_in_a_scale(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """A scale needs all four classes with rising delta-v; an error names the line."""
+    """A scale needs all four classes with increasing delta-v. The error gives the line."""
     (tmp_path / "hard.yaml").write_text(SCALE)
     assert load_scale(tmp_path / "hard.yaml").classes[2] == ("S2", 20 * KPH, "c")
     (tmp_path / "hard.yaml").write_text(SCALE.replace(old, new))
@@ -74,7 +73,8 @@ def test_mistakes_in_a_scale(tmp_path: Path, old: str, new: str, message: str) -
     ],
 )
 def test_mistakes_in_a_manifest(tmp_path: Path, old: str, new: str, message: str) -> None:
-    """A manifest must name an existing terminal hazard, final speed and scale; masses are positive."""
+    """The terminal hazard, the final speed and the scale that a manifest names must exist. Masses must be
+    positive."""
     workspace = Workspace.find()
     text = (
         workspace.targets["openpilot"]

@@ -1,4 +1,4 @@
-"""A target's files in memory, and what others derive from them."""
+"""The files of a target in memory, and values that are derived from them."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from mutator.targets.source_tree import read_tree
 
 
 def test_derived_once(tmp_path: Path) -> None:
-    """A derived value is computed once for each path and function, from the file as read."""
+    """A derived value is computed once for each path and function, from the file as it was read."""
     (tmp_path / "a.py").write_text("a = 1\n")
     (tmp_path / "b.py").write_text("b = 1\n")
     tree = read_tree(tmp_path, ["*.py"])
@@ -29,7 +29,7 @@ def test_derived_once(tmp_path: Path) -> None:
 
 
 def test_a_file_that_the_target_lacks(tmp_path: Path) -> None:
-    """A path outside the manifest's files is an error that names it, and nothing is derived."""
+    """If a path is not one of the manifest's files, the error names it, and nothing is derived."""
     (tmp_path / "a.txt").write_text("a")
     tree = read_tree(tmp_path, ["*.py"])
     with pytest.raises(MutatorError, match=r"no file 'a\.txt' in the target"):

@@ -1,4 +1,4 @@
-"""Trigger conditions."""
+"""The conditions of triggers."""
 
 import math
 
@@ -32,7 +32,8 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0, "hwt": 2.0,
     ],
 )
 def test_one_text_for_one_condition(text: str, canonical: str) -> None:
-    """Spelling and constants are normalized, and the canonical text is a fixed point."""
+    """Spelling and constants are normalized. The canonical text stays the same when it is normalized
+    again."""
     assert check_condition(text, {"safe": 3}) == canonical
     assert check_condition(canonical) == canonical
 
@@ -64,16 +65,15 @@ def test_one_text_for_one_condition(text: str, canonical: str) -> None:
     ],
 )
 def test_anything_else_is_refused(text: str, piece: str) -> None:
-    """Anything except a plain comparison of observed ground truth is an error that shows the
-    offending text.
-    """
+    """Any condition other than a plain comparison of observed values is an error that shows the invalid
+    text."""
     with pytest.raises(MutatorError) as caught:
         check_condition(text, variables=FOLLOWING)
     assert piece in str(caught.value)
 
 
 def test_what_is_not_known_is_not_a_number() -> None:
-    """A condition over known values is decided; with a missing value, no comparison holds."""
+    """A condition is evaluated for known values. If a value is missing, no comparison holds."""
     assert evaluate("hwt == 2 and rs == 2", FOLLOWING)
     assert not evaluate("gap > 1", FOLLOWING) and not evaluate("gap <= 1", FOLLOWING)
 
@@ -91,9 +91,8 @@ def test_what_is_not_known_is_not_a_number() -> None:
     ],
 )
 def test_formulas(text: str, canonical: str, code: str) -> None:
-    """A formula is a number over the variables, has one canonical text, and becomes code that
-    cannot raise.
-    """
+    """A formula is a number computed from the variables. It has one canonical text and becomes code that
+    cannot raise."""
     assert check_formula(text, FOLLOWING) == check_formula(canonical, FOLLOWING) == canonical
     assert to_code(canonical, number=True) == code
 

@@ -1,4 +1,4 @@
-"""Kinds of triggers: built by code, and parsed from user input."""
+"""The kinds of triggers, built by code or parsed from a user's text."""
 
 import math
 
@@ -13,7 +13,7 @@ FOLLOWING = {"t": 3.0, "d_rel": 40.0, "v_ego": 20.0, "v_lead": 18.0}
 
 
 def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
-    """`always`, a time and a condition are recognized; conditions wait until armed."""
+    """`always`, a time and a condition are recognized. A condition waits until it is armed."""
     assert read_trigger("always", 1.5, ("t", "hwt")) == always(armed_after_s=1.5)
     assert read_trigger("12.5", 1.5, ("t", "hwt")) == at_time(12.5)
     typed = read_trigger("hwt<=2", 1.5, ("t", "hwt"))
@@ -22,13 +22,13 @@ def test_what_is_typed_makes_a_trigger_of_its_kind() -> None:
 
 @pytest.mark.parametrize("text", ["", "soon", "nan", "hwt", "1 +"])
 def test_anything_else_is_refused(text: str) -> None:
-    """Any other text is a user's error."""
+    """Any other text is reported as a user's error."""
     with pytest.raises(MutatorError):
         read_trigger(text, 0.0, ("t", "hwt"))
 
 
 def test_ready_made_triggers() -> None:
-    """`always` and a point in time both last to the end of the run."""
+    """`always` and a point in time last to the end of the run."""
     assert always().hold is Hold.TO_END
     assert at_time(3).condition == "t >= 3.0"
     assert at_time(3).hold is Hold.TO_END
@@ -40,7 +40,7 @@ def test_ready_made_triggers() -> None:
 
 
 def test_random_times_are_starts_of_steps() -> None:
-    """A drawn time depends only on seed and key, lies in its interval, and is the start of a step."""
+    """A drawn time depends only on the seed and the key, lies in its interval, and is the start of a step."""
     times = [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert times == [draw_time(7, f"key {i}", first_s=1.5, last_s=29.5, step_s=0.01) for i in range(300)]
     assert all(1.5 <= t <= 29.5 and t == round(t * 100) / 100 for t in times)

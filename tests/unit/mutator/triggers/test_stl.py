@@ -16,7 +16,8 @@ Formula = tuple  # (operator, operands)
 
 
 def formulas() -> st.SearchStrategy[Formula]:
-    """Small formulas over x and y: predicates, connectives, and operators over past and future."""
+    """Small formulas over x and y, with predicates, connectives, and operators for the past and the
+    future."""
     predicate = st.tuples(st.sampled_from(["<=", ">="]), st.sampled_from("xy"), st.integers(0, 4))
     times = st.tuples(st.integers(0, 2), st.integers(0, 2)).map(sorted)
 
@@ -43,7 +44,7 @@ def text(formula: Formula) -> str:
 
 
 def far(formula: Formula) -> int:
-    """The number of steps it looks ahead."""
+    """The number of steps that the formula looks ahead."""
     match formula:
         case ("<=" | ">=", _, _):
             return 0
@@ -56,7 +57,7 @@ def far(formula: Formula) -> int:
 
 
 def defined(formula: Formula, i: int, values: dict[str, list[float]]) -> float:
-    """The robustness of step i."""
+    """The robustness of the formula at step i."""
     match formula:
         case ("<=", name, limit):
             return limit - values[name][i]
@@ -81,9 +82,8 @@ def defined(formula: Formula, i: int, values: dict[str, list[float]]) -> float:
 @settings(deadline=None, max_examples=300)
 @given(formulas(), st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=12))
 def test_robustness_is_that_of_the_definition(formula: Formula, rows: list[tuple[int, int]]) -> None:
-    """A formula has a value at a step once its whole window is seen; before that, and for steps with too
-    short a record, it has none.
-    """
+    """A formula has a value at a step after its whole window was observed. Before that, and if the record
+    is too short, it has none."""
     x, y = (np.array(column, dtype=float) for column in zip(*rows, strict=True))
     time = np.arange(len(rows)) * STEP
     found = stl.robustness(text(formula), {"t": time, "x": x, "y": y}, STEP)
@@ -94,7 +94,7 @@ def test_robustness_is_that_of_the_definition(formula: Formula, rows: list[tuple
 
 
 def test_an_answer_that_never_came() -> None:
-    """A predicate and a future operator in one formula are each evaluated at their own step."""
+    """If a formula has a predicate and a future operator, each is evaluated at its own step."""
     x = np.array([1.0, 6, 6, 6, 6])
     found = stl.robustness("(x > 5) implies eventually[0,2](x < 5)", {"t": np.arange(5.0), "x": x}, 1.0)
     assert found.tolist() == [np.inf, np.inf, 4, -1, -1]
@@ -104,7 +104,8 @@ def test_an_answer_that_never_came() -> None:
     ("step_s", "bound", "steps"), [(1 / 30, "1", 30), (0.01, "0.07", 7), (0.5, "500ms", 1)]
 )
 def test_bounds_count_whole_steps(step_s: float, bound: str, steps: int) -> None:
-    """A bound in seconds is a number of steps, even if a step has no short decimal form."""
+    """A bound in seconds becomes a number of steps, even if the length of a step has no short decimal
+    form."""
     time = np.arange(40) * step_s
     found = stl.robustness(f"always[0:{bound}](x < 1)", {"t": time, "x": np.zeros(40)}, step_s)
     assert found.tolist() == [np.inf] * steps + [1.0] * (40 - steps)
@@ -112,7 +113,7 @@ def test_bounds_count_whole_steps(step_s: float, bound: str, steps: int) -> None
 
 @pytest.mark.parametrize("third", [0.35, 0.1, np.nan])
 def test_steps_of_another_length_are_refused(third: float) -> None:
-    """The logic counts steps, so uneven ones are refused."""
+    """Uneven steps are refused, because the logic counts steps."""
     values = {"t": np.array([0.0, 0.1, third]), "x": np.zeros(3)}
     with pytest.raises(MutatorError, match=r"a step of \S+ s at 0.1 s.*expected steps of 0.1 s"):
         stl.robustness("x < 1", values, 0.1)
@@ -134,7 +135,7 @@ def test_steps_of_another_length_are_refused(third: float) -> None:
 def test_what_is_no_formula(
     formula: str, message: str, caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """An invalid formula gets the harness's own error, and rtamt prints nothing."""
+    """An invalid formula raises the harness's own error, and rtamt prints nothing."""
     with caplog.at_level(logging.WARNING), pytest.raises(MutatorError, match=message) as found:
         stl.check(formula, ["x", "y"], STEP)
     assert "INVALID" not in str(found.value)
@@ -143,7 +144,7 @@ def test_what_is_no_formula(
 
 @pytest.mark.parametrize("formula", ["1 / (x - 1) < 3", "sqrt(0 - x) < 3", "next(x > 3) or rise(y < 2)"])
 def test_arithmetic_is_no_mistake_before_there_are_numbers(formula: str) -> None:
-    """A check does not guess values."""
+    """A check accepts arithmetic that is invalid only for some values, because it knows no values."""
     stl.check(formula, ["x", "y"], STEP)
 
 

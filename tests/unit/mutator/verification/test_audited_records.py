@@ -1,4 +1,4 @@
-"""An audit's checks of records: fields that contradict each other."""
+"""Checks of records in an audit find fields that contradict each other."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -37,9 +37,8 @@ def flaws(record: Record) -> list[str]:
     ],
 )
 def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str) -> None:
-    """Channels belong to the target, times lie within the drive, and the first actuator's time is the
-    manifestation; runs without recorded channels are exempt.
-    """
+    """Channels must belong to the target, times must lie within the drive, and the time of the first
+    actuator must be that of the manifestation. Runs without recorded channels are exempt."""
     head = HEAD | {"channels": [[name, "-", "internal", "", ""] for name in ("gas", "brake", "seen")]}
     one = Recorded(Path("r.jsonl"), 7, record(**FINE | fields))
     found = [str(flaw) for flaw in verdicts(head, [one], MANIFEST)]
@@ -59,7 +58,7 @@ def test_what_left_golden(record: MakeRecord, fields: dict[str, Any], told: str)
     ],
 )
 def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, Any]) -> None:
-    """No valid result of a run is reported as a difference."""
+    """A valid result of a run is never reported."""
     assert flaws(record(**FINE | fields)) == []
 
 
@@ -87,6 +86,7 @@ def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, An
 def test_contradictions_are_told_with_their_line(
     record: MakeRecord, fields: dict[str, Any], told: str
 ) -> None:
-    """Each contradiction names experiment, file and line, the value found and the expected one."""
+    """For each contradiction, experiment, file and line, the value found and the expected value are
+    reported."""
     found = flaws(record(**FINE | fields))
     assert any(f"r.jsonl:7: {'e' * 16}: {told}" in text for text in found), found

@@ -1,4 +1,4 @@
-"""The check of the machine."""
+"""The check of the machine by `doctor`."""
 
 import importlib.metadata
 
@@ -12,7 +12,7 @@ NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
 
 
 def test_this_machine_can_run_campaigns_but_for_the_library() -> None:
-    """Where the tests run, only the missing library fails, with its remedy."""
+    """On a machine that can run the tests, only the missing library fails, with a remedy."""
     findings = doctor.examine(NO_LIBRARY)
     failed = [f for f in findings if f.level is Level.FAIL]
     assert [(f.name, f.found, f.remedy) for f in failed] == [("library", "no fault library", "say --root")]
@@ -20,7 +20,7 @@ def test_this_machine_can_run_campaigns_but_for_the_library() -> None:
 
 
 def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A missing requirement is a failure that says what to install."""
+    """A missing requirement is a failure, and the finding says what to install."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["no-such-package>=2,<3"])
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "no-such-package"]
     assert finding.level is Level.FAIL
@@ -28,7 +28,7 @@ def test_a_missing_package_fails_with_its_pip_line(monkeypatch: pytest.MonkeyPat
 
 
 def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package outside its version range may still work, so it is a warning that shows both versions."""
+    """A package outside its range of versions is a warning with both versions, because it may still work."""
     monkeypatch.setattr(importlib.metadata, "requires", lambda _: ["numpy>=999"])
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "numpy"]
     assert finding.level is Level.WARN
@@ -36,9 +36,8 @@ def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder without locks or write permission cannot hold runs, but another one can, so it is a
-    warning.
-    """
+    """A folder without locks or write permission is a warning. It cannot have runs, but another folder
+    can."""
 
     def refuse(*_: object) -> None:
         raise OSError(95, "Operation not supported")
@@ -50,7 +49,7 @@ def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_child_that_cannot_start_fails(monkeypatch: pytest.MonkeyPatch) -> None:
-    """An interpreter that cannot start child processes cannot run experiments."""
+    """An interpreter that cannot start child processes is a failure, because it cannot run experiments."""
     monkeypatch.setattr(doctor.sys, "executable", "/no/such/python")
     [finding] = [f for f in doctor.examine(NO_LIBRARY) if f.name == "child process"]
     assert finding.level is Level.FAIL

@@ -1,4 +1,4 @@
-"""Findings from running a target: each kind of misbehaving controller is reported with the line."""
+"""Findings from running a target. Each kind of misbehaving controller is reported with the line."""
 
 import re
 from pathlib import Path
@@ -24,7 +24,7 @@ def toy(toycar: Workspace) -> Workspace:
 
 
 def change(toy: Workspace, file: str, old: str, new: str) -> None:
-    """Edit a file of the toy's tree or library."""
+    """Edit a file in the toy's tree or library."""
     root = toy.library.parent
     path = root / file if file.endswith(".yaml") else root / "tree" / "toycar" / file
     assert old in path.read_text()
@@ -32,19 +32,19 @@ def change(toy: Workspace, file: str, old: str, new: str) -> None:
 
 
 def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
-    """The line of the toy's file that has this text."""
+    """The line number of this text in the toy's file."""
     lines = (toy.library.parent / "tree" / "toycar" / file).read_text().splitlines()
     (number,) = (n for n, line in enumerate(lines, 1) if text in line)
     return number
 
 
 def driven(toy: Workspace) -> dict[str, Finding]:
-    """Findings by name."""
+    """The findings by name."""
     return {finding.name: finding for finding in check_drive(toy, "toycar", SCENARIO)}
 
 
 def test_a_sound_target_has_nothing_to_tell(toy: Workspace) -> None:
-    """Everything is checked and passes; each campaign's canary runs once."""
+    """Everything is checked and passes. The canary of each campaign runs once."""
     found = driven(toy)
     assert {name: one.level for name, one in found.items()} == dict.fromkeys(
         ["golden A", "fast engines", "statements", "triggers", "canary small"], Level.OK
@@ -82,9 +82,8 @@ SETS = (
 def test_what_is_not_deterministic_is_told_with_its_line(
     toy: Workspace, edits: list[tuple[str, str]], imports: str, line: str, told: str
 ) -> None:
-    """If runs differ, channel, step, time and both values are reported, with the line that probably causes
-    it.
-    """
+    """If two runs differ, channel, step, time and both values are reported, with the line that probably
+    causes the difference."""
     for old, new in edits:
         change(toy, "driver.py", old, new)
     change(toy, "driver.py", "class Driver", f"{imports}\n\n\nclass Driver")
@@ -99,9 +98,9 @@ def test_what_is_not_deterministic_is_told_with_its_line(
 
 @pytest.mark.parametrize("made", ["names()", "held['names']"], ids=["returned", "in a dict"])
 def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made: str) -> None:
-    """A difference due to the hash seed alone is reported as such, with the remedy for hashes and without a
-    line, even if a set of constants has another order in loaded bytecode than in fresh bytecode.
-    """
+    """A difference caused only by the hash seed is reported as such, with the remedy for hashes and
+    without a line. This includes a set of constants whose order in loaded bytecode differs from that in
+    fresh bytecode."""
     names = "{'x', 'y', 'zed', 'q'}"
     change(toy, "sensing.py", "class Sensor", f"def names():\n    return {names}\n\n\nclass Sensor")
     change(
@@ -121,9 +120,8 @@ def test_a_set_that_is_not_found_by_reading_is_told_as_one(toy: Workspace, made:
 def test_a_thread_pool_is_told_with_its_line(
     toy: Workspace, long: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Ordered results from a pool are deterministic, but its threads prevent forking: name, line and remedy
-    are reported, even if a run takes too long to try it.
-    """
+    """A pool with ordered results is deterministic, but its threads prevent forking. Name, line and remedy
+    are reported, even if a run is too slow to try forking."""
     change(
         toy,
         "driver.py",
@@ -157,7 +155,7 @@ def test_a_thread_pool_is_told_with_its_line(
 
 
 def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> None:
-    """Reading a clock does not fail the check if trace and record are the same."""
+    """Reading a clock passes the check if trace and record are the same."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(
         toy,
@@ -171,7 +169,7 @@ def test_a_clock_that_shows_nowhere_is_no_more_than_a_note(toy: Workspace) -> No
 
 
 def test_lines_are_those_of_the_target(toy: Workspace) -> None:
-    """Lines added for counting shift the recorded ones; the report has the target's own numbers."""
+    """Lines that are added for counting shift other lines. The report has the line numbers of the target."""
     change(toy, "sensing.py", "class Sensor", "import time\n\n\nclass Sensor")
     change(
         toy,
@@ -184,9 +182,8 @@ def test_lines_are_those_of_the_target(toy: Workspace) -> None:
 
 
 def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
-    """An anchor in a branch that no run executes is reported with the line of its spec; the others
-    are not.
-    """
+    """An anchor in a branch that no run executes is reported with the line of its spec. Other anchors are
+    not."""
     change(
         toy,
         "sensing.py",
@@ -208,7 +205,7 @@ def test_a_fault_whose_place_is_never_executed_is_told(toy: Workspace) -> None:
 
 
 def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> None:
-    """A statement that runs reach only without the fault's change is reported."""
+    """A statement is reported if runs reach it only without the fault's change of the scenario."""
     change(
         toy,
         "sensing.py",
@@ -226,15 +223,14 @@ def test_a_place_counts_only_with_the_changes_of_its_fault(toy: Workspace) -> No
     ("count", "told"), [(0, "none"), (1, "1 trigger, which is reached"), (2, "2 triggers, all are reached")]
 )
 def test_what_was_reached_is_counted(toy: Workspace, count: int, told: str) -> None:
-    """None, one and several get different wording."""
+    """The wording depends on whether none, one or several were reached."""
     finding = Reach(toy, toy.manifest("toycar"), [])._finding("trigger", count, [], "")
     assert (finding.name, finding.found) == ("triggers", told)
 
 
 def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
-    """A context that never occurs is reported with its line, and so is a random time after the end of every
-    run.
-    """
+    """A context that never occurs is reported with its line, and so is a random time after the end of
+    every run."""
     change(toy, "fault_library/stpa/contexts/near_far.yaml", "near_s: 2.0", "near_s: 0.01")
     change(toy, "fault_library/campaigns/small.yaml", "random_until_s: 5.5", "random_until_s: 9.0")
     found = driven(toy)["triggers"]
@@ -258,14 +254,14 @@ def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> N
 
 
 def test_a_target_that_crashes_or_is_harmful_is_told(toy: Workspace) -> None:
-    """Reasons against a golden run are reported as by the checks before a campaign."""
+    """Reasons against a golden run are reported as in the checks before a campaign."""
     change(toy, "driver.py", "        gap, closing", "        1 / 0\n        gap, closing")
     found = driven(toy)["golden A"]
     assert (found.level, "crashed: ZeroDivisionError" in found.found) == (Level.FAIL, True)
 
 
 def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
-    """If golden runs differ, forking is not tried, since it would differ for the same reason."""
+    """If golden runs differ, forking is not tried, because it would differ for the same reason."""
     change(toy, "driver.py", "class Driver", "import time\n\n\nclass Driver")
     change(toy, "driver.py", *CLOCK)
     fast = driven(toy)["fast engines"]
@@ -273,7 +269,7 @@ def test_what_is_not_well_is_not_forked(toy: Workspace) -> None:
 
 
 def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
-    """Without `entry.stepwise` nothing can be forked, and the manifest is named."""
+    """Without `entry.stepwise`, nothing can be forked, and the finding names the manifest."""
     change(toy, "fault_library/targets/toycar.yaml", "  stepwise: begin\n", "")
     found = driven(toy)
     assert found["golden A"].level is Level.OK
@@ -282,6 +278,6 @@ def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
 
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
-    """A scenario that the library lacks is the caller's error."""
+    """A scenario that is not in the library is an error of the caller."""
     with pytest.raises(MutatorError, match="nowhere"):
         check_drive(toy, "toycar", ["nowhere"])

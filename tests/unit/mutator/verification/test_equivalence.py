@@ -1,4 +1,4 @@
-"""The sample that proves an engine: its content and its findings."""
+"""The equivalence check: its sample of experiments and its findings."""
 
 import json
 from collections.abc import Callable
@@ -24,7 +24,8 @@ Reseal = Callable[..., None]
 
 
 def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., Experiment]) -> None:
-    """The sample is one in a hundred, at least 20, the same for the same seed, and includes rare cases."""
+    """The sample has one experiment in a hundred and at least 20, is the same for the same seed, and
+    includes rare cases."""
     many = [experiment(value, f"S{value % 5:.0f}") for value in range(3000)]
     rare = experiment(1.0, "S9", spec="vision/rain/rate")
     sample = equivalence.sample([*many, rare], 1)
@@ -39,7 +40,7 @@ def test_the_sample_has_every_fault_type_and_scenario(experiment: Callable[..., 
 
 @pytest.fixture
 def proven(toycar: Workspace, tmp_path: Path) -> Path:
-    """A run folder of two experiments from the fork engine, with its proof."""
+    """A run folder with two experiments from the fork engine and their equivalence check."""
     summary = run_campaign(toycar, "small", tmp_path / "run", engine="fork", choices=Choices(limit=2))
     assert summary.proof == equivalence.Proof(sampled=2, same=2)
     assert summary.exit_code == 0
@@ -48,7 +49,7 @@ def proven(toycar: Workspace, tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
-    """A record that the reference engine contradicts is named, and the campaign fails."""
+    """A record that differs from the reference engine's is named, and the campaign fails."""
     (path,) = (proven / "records").iterdir()
     lines = path.read_text().splitlines()
     record = json.loads(lines[1])
@@ -60,7 +61,7 @@ def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Pat
 
 @pytest.mark.slow
 def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
-    """An incomplete proof is not a success; the same command completes it, with any engine."""
+    """An incomplete check is not a success. The same command completes it, with any engine."""
     (path,) = (proven / "proof").iterdir()
     path.write_text(path.read_text().splitlines()[0] + "\n")
     reseal(proven, finished=False)
@@ -75,7 +76,7 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path, r
 
 @pytest.mark.slow
 def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
-    """A run on the reference engine alone has no proof."""
+    """A run that uses only the reference engine has no equivalence check."""
     summary = run_campaign(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
     assert summary.proof is None
     assert not (tmp_path / "run" / "proof").exists()
@@ -91,7 +92,7 @@ _BELIEVE = """
 
 @pytest.fixture
 def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy with runs that believe a file about the world from some time on, unless told to forget it."""
+    """A toy whose runs read a file about the world from some time on, unless they are told to forget it."""
     go, world = (tmp_path / "toy/tree/toycar" / name for name in ("go.py", "world.py"))
     believe = _BELIEVE.replace("{kept}", str(tmp_path / "kept"))
     go.write_text(go.read_text().replace("\n    return Drive(case)\n", believe))
@@ -115,9 +116,8 @@ def sharing(toycar: Workspace, tmp_path: Path) -> Workspace:
 def test_the_proof_believes_nothing_that_runs_share(
     sharing: Workspace, tmp_path: Path, kept: str, told: str
 ) -> None:
-    """An error common to golden runs and forks fails the campaign and names the experiment, whether it shows
-    before or after the fault begins; correct shared data pass.
-    """
+    """An error that golden runs and forks share fails the campaign and names the experiment, whether it
+    appears before or after the fault begins. Correct shared data pass."""
     (tmp_path / "kept").write_text(kept)
     out = tmp_path / "run"
     try:
@@ -133,7 +133,8 @@ def test_the_proof_believes_nothing_that_runs_share(
 
 
 def test_which_engine_runs(toycar: Workspace) -> None:
-    """Forking is the default where it is possible and pays; a requested engine is used or refused."""
+    """Forking is the default where it is possible and worthwhile. An engine that is requested is used or
+    refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 1000) == "fork"
     assert choose_engine(None, manifest, 10) == "reference"
@@ -148,7 +149,7 @@ def test_which_engine_runs(toycar: Workspace) -> None:
 
 @pytest.fixture
 def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
-    """A toy that starts a thread when it is loaded, so that nothing can be forked."""
+    """A toy that cannot be forked, because it starts a thread when it is loaded."""
     go = tmp_path / "toy/tree/toycar/go.py"
     wait = "wait = threading.Event().wait\nthreading.Thread(target=wait, name='poll', daemon=True).start()"
     go.write_text(go.read_text().replace("class Drive:", f"import threading\n\n{wait}\n\n\nclass Drive:"))
@@ -156,9 +157,8 @@ def threaded(toycar: Workspace, tmp_path: Path) -> Workspace:
 
 
 def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_path: Path) -> None:
-    """If the reference engine ran every experiment, no proof is run; the summary says why nothing was forked,
-    the folder equals one of the reference engine, and its audit finds nothing.
-    """
+    """If the reference engine ran every experiment, there is no equivalence check. The summary says why
+    nothing was forked. The folder equals one of the reference engine, and its audit finds nothing."""
     summary = run_campaign(threaded, "small", tmp_path / "run", engine="fork", choices=Choices(limit=1))
     assert (summary.proof, summary.exit_code) == (None, 0)
     assert summary.not_forked.endswith("only one can be forked: besides the main one, 'poll'")
@@ -178,16 +178,15 @@ def test_where_nothing_was_forked_no_proof_is_driven(threaded: Workspace, tmp_pa
 def test_few_experiments_are_said_not_to_be_worth_forking(
     toycar: Workspace, tmp_path: Path, engine: str | None, note: str
 ) -> None:
-    """If the harness chose not to fork a small campaign, the end of the run says so."""
+    """If the harness decided not to fork a small campaign, the summary says so."""
     summary = run_campaign(toycar, "small", tmp_path / "run", engine=engine, choices=Choices(limit=1))
     assert (summary.proof, summary.proof_note) == (None, note)
 
 
 @pytest.mark.slow
 def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path) -> None:
-    """Proof runs from before it was known that nothing is forked are deleted, so that the seal does not
-    depend on timing.
-    """
+    """If nothing turns out to be forked, the check's earlier runs are deleted, so that the seal does not
+    depend on timing."""
     run = tmp_path / "run"
     seal = run_campaign(threaded, "small", run, engine="fork", choices=Choices(limit=2)).seal
     folder = RunFolder.open(run)
@@ -207,7 +206,7 @@ def test_a_proof_that_was_begun_in_vain_goes(threaded: Workspace, tmp_path: Path
 
 @pytest.mark.slow
 def test_what_is_run_again_by_another_engine_is_proved(toycar: Workspace, tmp_path: Path) -> None:
-    """An experiment still to be run may be forked, whatever its previous run reported."""
+    """An experiment that must still run may be forked, whatever its previous run reported."""
     run = tmp_path / "run"
     run_campaign(toycar, "small", run, engine="reference", choices=Choices(limit=2))
     folder = RunFolder.open(run)

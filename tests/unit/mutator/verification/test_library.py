@@ -1,4 +1,4 @@
-"""The check of library, templates and target; and the shipped library."""
+"""The check of a library, its templates and its target, and the shipped library."""
 
 import ast
 from collections import Counter
@@ -38,7 +38,7 @@ BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 @pytest.fixture(scope="module")
 def everything() -> dict[str, tuple[Fault, ...]]:
-    """All faults of the library in both readings, seed 1."""
+    """All faults of the library in both readings, with seed 1."""
     clone = Workspace.find(root=Path(__file__).parents[4])
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     return {
@@ -58,9 +58,8 @@ def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, .
 
 
 def test_the_library_that_ships_has_no_problem(clone: Workspace) -> None:
-    """In the shipped library every spec expands, every anchor is found once, every shape compiles and
-    un-splices.
-    """
+    """In the shipped library, every spec expands, every anchor is found once, and every shape compiles and
+    can be undone."""
     assert check_library(clone, "openpilot") == []
 
 
@@ -73,7 +72,8 @@ def test_counts(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """An invisible vehicle seems faster, ghosts come closer; values lie in their ranges, in their units."""
+    """An invisible vehicle appears faster, and ghosts appear closer. Values lie in their ranges, in their
+    units."""
     by_spec: dict[str, list[Fault]] = {}
     for fault in faults["as_described"]:
         by_spec.setdefault(fault.spec, []).append(fault)
@@ -102,9 +102,10 @@ def test_values_and_signs(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Faults without lead aim at H2; steering, lane and image faults at H3; the others at H1.
+    """Faults without a lead vehicle aim at H2. Steering, lane and image faults aim at H3, and the others
+    at H1.
 
-    Lost data latch as described, bad images as coded.
+    Lost data latch as described, and bad images latch as coded.
     """
     for fault in faults["as_described"]:
         seen = fault.module == "vision_input"
@@ -119,7 +120,8 @@ def test_aims_holds_and_changes(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Both readings have the same values; as coded, units slip, lanes drift and jamming stops all CAN."""
+    """Both readings have the same values. As coded, units are wrong, lanes drift, and jamming stops all
+    CAN messages."""
     described, coded = faults["as_described"], faults["as_coded"]
     assert [(f.spec, f.value) for f in described] == [(f.spec, f.value) for f in coded]
     differing = {f.fault_type for f, g in zip(described, coded, strict=True) if f.injections != g.injections}
@@ -144,7 +146,7 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Distance errors of radar, camera and both have the same numbers."""
+    """Distance errors of the radar, of the camera and of both have the same numbers."""
     values: dict[str, list[object]] = {}
     for fault in faults["as_described"]:
         values.setdefault(fault.spec, []).append(fault.value)
@@ -156,7 +158,7 @@ def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) 
 
 
 def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Levels, gains, biases and kernels are those of the published table, and reach the effect unchanged."""
+    """Levels, gains, biases and kernels are those of the published table and reach the effect unchanged."""
     levels: dict[str, list[object]] = {}
     for fault in faults["as_described"]:
         if fault.module == "vision_input":
@@ -175,7 +177,8 @@ def test_levels_of_disturbed_pictures(faults: dict[str, tuple[Fault, ...]]) -> N
 
 
 def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Each level, and each of two effects in one frame, has a different seed, equal in both readings."""
+    """Each level has a different seed, and so does each of two effects in one frame. The seeds are equal
+    in both readings."""
     seeds = {
         reading: [dict(i.params)["seed"] for f in found for i in f.injections if i.model == "image_effect"]
         for reading, found in everything.items()
@@ -185,7 +188,7 @@ def test_each_effect_has_a_seed_of_its_own(everything: dict[str, tuple[Fault, ..
 
 
 def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
-    """The effects of a spec act in its order: rain falls in front of a foggy road."""
+    """The effects of a spec act in its order, so that rain falls in front of a foggy road."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     fault = next(f for f in everything["as_described"] if f.fault_type == "rain_and_fog")
     made = build(manifest, models, fault, always())
@@ -194,7 +197,7 @@ def test_two_effects_in_one_picture(clone: Workspace, everything: dict[str, tupl
 
 
 def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
-    """Code that draws the road or reads frames accepts no faults, because runs share its output."""
+    """Code that draws the road or reads frames cannot have faults, because runs share its output."""
     manifest = clone.manifest("openpilot")
     todo, closed = ["selfdrive/sim/road_renderer.py", "selfdrive/sim/image_folder.py"], set()
     while todo:
@@ -209,7 +212,7 @@ def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
     harmless = {
         "selfdrive/common/errors.py",
         "selfdrive/common/conversions.py",
-    }  # compute nothing
+    }  # modules that compute nothing
     open_to_faults = {path for path in closed if not matches(path, manifest.forbid)}
     assert open_to_faults <= harmless
     assert matches("selfdrive/sim/image_library.py", manifest.forbid)
@@ -217,7 +220,8 @@ def test_no_fault_gets_into_the_cache_of_pictures(clone: Workspace) -> None:
 
 @pytest.mark.slow
 def test_every_mutant_of_the_library(clone: Workspace, everything: dict[str, tuple[Fault, ...]]) -> None:
-    """Every fault, in both readings and all four contexts, compiles and un-splices to the original bytes."""
+    """Every fault, in both readings and all four contexts, compiles, and the original can be restored from
+    it."""
     manifest, models = clone.manifest("openpilot"), clone.fault_models()
     triggers = clone.context_table("accelerate_decelerate").triggers(armed_after_s=1.5)
     ids = set()
@@ -233,7 +237,7 @@ def test_every_mutant_of_the_library(clone: Workspace, everything: dict[str, tup
 
 
 def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
-    """All problems of the toy library after one edit, without the folder's name."""
+    """All problems of the toy's library after one edit, without the name of the folder."""
     path = toy.library.parent / file
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
@@ -241,7 +245,7 @@ def edited(toy: Workspace, file: str, old: str, new: str) -> list[str]:
 
 
 def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
-    """Each variant that misses its statement is a separate problem, at the line of its anchor."""
+    """Each variant whose statement is missing is a separate problem, at the line of its anchor."""
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "distance = truth.gap")
     assert len(problems) == 3, "two variants, one of them in two readings"
     assert problems[0].startswith(
@@ -251,13 +255,13 @@ def test_a_target_that_lost_an_anchor(toy: Workspace) -> None:
 
 
 def test_a_target_with_a_second_hit(toy: Workspace) -> None:
-    """An ambiguous anchor is a problem with both candidates."""
+    """An anchor with two candidates is a problem that lists both."""
     problems = edited(toy, "target/toycar/sensor.py", "gap = truth.gap", "gap = 0\n        gap = truth.gap")
     assert "assignment to 'gap' matches 2 statements in Sensor.measure: lines 14, 15" in problems[0]
 
 
 def test_problems_do_not_hide_each_other(toy: Workspace) -> None:
-    """A broken table does not hide a broken spec."""
+    """If a table and a spec are broken, both are reported."""
     (toy.library / "stpa" / "contexts" / "pedals.yaml").write_text("schema: context_table/9\n")
     problems = edited(toy, "fault_library/faults/sensor/distance.yaml", "model: scale", "model: skale")
     assert len(problems) == 2

@@ -1,4 +1,4 @@
-"""The checks before a campaign: each can fail, and none is repeated needlessly."""
+"""The checks before a campaign. Each of them can fail, and none is repeated without need."""
 
 import re
 import shutil
@@ -33,7 +33,8 @@ def change(toycar: Workspace, old: str, new: str, name: str = "go") -> None:
 
 
 def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Anchors, golden twice, null mutant and canary all pass, and are not run again for the same sources."""
+    """Anchors, two golden runs, the null mutant and the canary all pass. For the same sources, they are
+    not run again."""
     folder = frozen(toycar, tmp_path)
     told: list[Progress] = []
     results = run_checks(toycar, folder, workers=2, notify=told.append)
@@ -86,9 +87,8 @@ def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -
 def test_an_unsound_target_is_refused(
     toycar: Workspace, tmp_path: Path, old: str, new: str, told: str
 ) -> None:
-    """A target that is non-deterministic, harmful without a fault, or different from its manifest starts no
-    campaign.
-    """
+    """No campaign starts if its target is non-deterministic, reaches a hazard without a fault, or differs
+    from its manifest."""
     change(toycar, old, new)
     folder = frozen(toycar, tmp_path)
     with pytest.raises(CheckFailed, match=re.escape(told)):
@@ -96,7 +96,7 @@ def test_an_unsound_target_is_refused(
 
 
 def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """A probe with an observation statement that never runs proves nothing."""
+    """If the observation statement never runs, the probe proves nothing, and the check fails."""
     change(toycar, "        drive.step()", "        Drive.other(drive)")
     change(toycar, "    def step(self):", "    def step(self):\n        now = 0\n\n    def other(self):")
     manifest = toycar.library / "targets" / "toycar.yaml"
@@ -111,7 +111,8 @@ def test_an_observation_that_is_not_reached_is_refused(toycar: Workspace, tmp_pa
 
 
 def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """If no value of the canary reaches its hazard, hazards might go unseen; all tried values are listed."""
+    """If no value of the canary reaches its hazard, the check fails, because hazards might be missed. The
+    values tried are listed."""
     path = toycar.campaign("small")
     path.write_text(path.read_text().replace("at_s: 1.0", "at_s: 5.9"))
     folder = frozen(toycar, tmp_path)
@@ -126,9 +127,8 @@ def test_a_harmless_canary_is_refused(toycar: Workspace, tmp_path: Path) -> None
 
 
 def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_path: Path) -> None:
-    """Another value than the largest may be the harmful one: the others are tried, and the result
-    names both.
-    """
+    """If the largest value of the canary does no harm, other values are tried. The result names both
+    values."""
     change(toycar, "offset = world.offset", "shown = world.offset\n        offset = shown", "sensing")
     change(toycar, "closing, offset))", "closing, shown if offset > 2.0 else offset))", "sensing")
     results = run_checks(toycar, frozen(toycar, tmp_path))
@@ -140,7 +140,7 @@ def test_a_canary_that_harms_with_another_value_passes(toycar: Workspace, tmp_pa
 def test_an_anchor_that_is_gone_is_told_before_anything_runs(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A fault without its statement is reported with its spec, before any run."""
+    """A fault whose statement is missing is reported with its spec, before any run."""
     change(toycar, "offset = world.offset", "shift = world.offset", "sensing")
     change(toycar, "closing, offset))", "closing, shift))", "sensing")
     folder = frozen(toycar, tmp_path)
@@ -152,7 +152,7 @@ def test_an_anchor_that_is_gone_is_told_before_anything_runs(
 def test_other_golden_runs_than_before_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with records does not resume with another golden run, and keeps its own."""
+    """A run with records keeps its golden run and does not resume with another one."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(
@@ -179,12 +179,11 @@ def test_other_golden_runs_than_before_are_refused(
 
 
 def test_a_canary_whose_run_was_ended_from_outside_is_run_again(toycar: Workspace, tmp_path: Path) -> None:
-    """The check's result does not depend on a signal to one of its runs; a run that does not end well is
-    repeated only once.
-    """
+    """A signal to one run does not affect the result of the check. A run that does not end well is
+    repeated only once."""
     canary = frozen(toycar, tmp_path).canary
     fine = CheckRun(problem="", hazards=(("H3", 1.0),))
     runs = iter([CheckRun(problem="crashed: killed by SIGHUP"), fine])
     assert judge([canary], lambda _: next(runs), "H3") == ("", "reached H3")
-    ended = iter([CheckRun(problem="crashed")] * 2)  # a third run would be one too many
+    ended = iter([CheckRun(problem="crashed")] * 2)  # a third run is not allowed
     assert "(crashed)" in judge([canary], lambda _: next(ended), "H3")[0]

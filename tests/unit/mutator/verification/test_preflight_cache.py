@@ -1,4 +1,4 @@
-"""Checks run once for the same sources, in any run folder, and damaged ones are ignored."""
+"""Checks are run once for the same sources, in any run folder. Damaged results are ignored."""
 
 import os
 import shutil
@@ -20,7 +20,7 @@ CopyToycar = Callable[[Path], Workspace]
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Workspace, RunFolder]:
-    """A toy with a folder of passed checks."""
+    """A toy with a folder for passed checks."""
     root = tmp_path_factory.mktemp("checked")
     toy = copy_toycar(root)
     folder = freeze(make_plan(toy, "small"), root / "run", toy)
@@ -32,7 +32,7 @@ def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -
 
 @pytest.fixture
 def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A copy of the resulting cache, in use: its only entry."""
+    """A copy of the resulting cache, which is in use; return its only entry."""
     copied = shutil.copytree(checked[1].path.parent / "cache", tmp_path / "cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(copied))
     (entry,) = (tmp_path / "cache" / "mutator" / "checks").iterdir()
@@ -40,7 +40,7 @@ def cache(checked: tuple[Workspace, RunFolder], tmp_path: Path, monkeypatch: pyt
 
 
 class Driven(Exception):
-    """Raised if anything runs."""
+    """Raised if a test runs the target."""
 
 
 @pytest.fixture
@@ -53,7 +53,7 @@ def nothing_is_driven(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.usefixtures("cache", "nothing_is_driven")
 def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp_path: Path) -> None:
-    """A second folder of the same sources has the same bytes of results and golden runs at once."""
+    """A second folder of the same sources gets the same bytes of results and golden runs immediately."""
     toy, before = checked
     folder = freeze(make_plan(toy, "small", Choices(only='method == "guided"')), tmp_path / "run", toy)
     assert all(result.passed for result in run_checks(toy, folder))
@@ -69,7 +69,7 @@ def test_another_folder_drives_nothing(checked: tuple[Workspace, RunFolder], tmp
 def test_a_damaged_entry_is_not_believed(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, damaged: str, content: bytes | None
 ) -> None:
-    """An entry with an empty, changed or missing file is ignored: the checks run again."""
+    """If a file of an entry is empty, changed or missing, the entry is ignored, and the checks run again."""
     if not damaged:
         shutil.rmtree(cache)
     elif content is None:
@@ -87,7 +87,8 @@ def test_a_damaged_entry_is_not_believed(
 def test_nothing_in_an_entry_may_be_another(
     checked: tuple[Workspace, RunFolder], tmp_path: Path, cache: Path, how: str
 ) -> None:
-    """An entry is used unchanged or not at all: its results and golden runs are part of a seal."""
+    """An entry is either used unchanged or ignored, because its results and golden runs are part of a
+    seal."""
     if how == "another file":
         shutil.copy(cache / "golden" / "A" / "log.npz", cache / "golden" / "A" / "log2.npz")
     elif how == "a pipe":
@@ -112,7 +113,7 @@ def test_other_sources_are_checked(
     monkeypatch: pytest.MonkeyPatch,
     changed: str,
 ) -> None:
-    """Another seed, target or machine has no entry."""
+    """With another seed, target or machine, there is no entry."""
     if changed == "machine":
         monkeypatch.setattr("platform.node", lambda: "elsewhere")
     if changed == "target":
@@ -124,7 +125,7 @@ def test_other_sources_are_checked(
 
 
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
-    """The next entry replaces the damaged one."""
+    """The next entry replaces a damaged one."""
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
     preflight_cache.store(cache, checked[1].path, "checks.json", checked[1].work)

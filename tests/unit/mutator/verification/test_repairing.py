@@ -1,4 +1,4 @@
-"""Repair: damaged parts are moved aside, intact ones stay, and the folder opens again."""
+"""Repair moves damaged parts aside and keeps intact ones, and the folder can be opened again."""
 
 import json
 import shutil
@@ -29,18 +29,18 @@ def made(
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """A finished run of 24 experiments that a test may damage."""
+    """A finished run of 24 experiments, which a test may damage."""
     return Path(shutil.copytree(made, tmp_path / "run"))
 
 
 def repaired(run: Path) -> tuple[list[str], RunFolder]:
-    """The output of a repair, and the folder, which then opens."""
+    """Repair the run; return the output and the folder, which can be opened."""
     said = repair(RunFolder.unverified(run))
     return said, RunFolder.open(run)
 
 
 def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
-    """Change the lines of a file."""
+    """Change the lines of a file in the run."""
     path.write_bytes(b"".join(change(path.read_bytes().splitlines(keepends=True))))
 
 
@@ -60,7 +60,7 @@ LOSSES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], int]] = {
 
 @pytest.mark.parametrize("loss", LOSSES)
 def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) -> None:
-    """Only the lost lines must be run again; the damaged file is kept elsewhere unchanged."""
+    """Only the lost lines must be run again. The damaged file is kept unchanged in another folder."""
     change, lost = LOSSES[loss]
     edit(run / RECORDS, change)
     damaged = (run / RECORDS).read_bytes()
@@ -73,7 +73,7 @@ def test_the_intact_lines_of_a_segment_stay(run: Path, made: Path, loss: str) ->
 
 
 def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
-    """A file with valid checksums that is not the closed one loses all its lines."""
+    """A file whose checksums are valid, but which is not the file that was closed, loses all its lines."""
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     lines[4]["outcome"] = "sdc"
     values = [{k: v for k, v in line.items() if k != "sum"} for line in lines]
@@ -83,7 +83,7 @@ def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
 
 
 def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
-    """The closed file is still inside, and stays."""
+    """If lines were added to a closed file, its original lines stay."""
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
     (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
@@ -99,7 +99,7 @@ def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
 
 
 def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[..., None]) -> None:
-    """Running the experiment again restores both."""
+    """A lost patch also removes its record. Running the experiment again restores both."""
     one, other = list(plan_file.ids(run))[:2]
     [file] = Patches(run).files()
     put_patches(run, {one: b"other", other: None})
@@ -112,9 +112,8 @@ def test_a_lost_patch_takes_its_record_with_it(run: Path, put_patches: Callable[
 
 
 def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Path) -> None:
-    """The first block of a file is a whole patch, and the others are differences from it: all are
-    run again.
-    """
+    """The first block of a file is a complete patch, and the others are differences from it. If it is
+    lost, all experiments of the file are run again."""
     [file] = Patches(run).files()
     data = file.read_bytes()
     file.write_bytes(data[:60] + bytes([data[60] ^ 1]) + data[61:])
@@ -125,7 +124,8 @@ def test_a_damaged_block_takes_the_records_with_it_whose_patches_need_it(run: Pa
 
 @pytest.mark.parametrize("name", ["checks.json", "golden/A/log.npz"])
 def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
-    """The run becomes unfinished, so that `run` rebuilds the file."""
+    """A file that `run` can rebuild is moved aside. The run then counts as unfinished, so that `run`
+    rebuilds it."""
     (run / name).write_bytes(b"other")
     said, folder = repaired(run)
     assert said == [f"{name} set aside: `mutator run` rebuilds it"]
@@ -138,7 +138,7 @@ def test_what_run_makes_again_is_put_aside(run: Path, name: str) -> None:
 
 
 def test_the_plan_for_people_is_made_anew(run: Path, made: Path) -> None:
-    """plan.csv follows from the plan, so the run stays finished."""
+    """plan.csv is written again from the plan, so the run stays finished."""
     (run / "plan.csv").unlink()
     said, folder = repaired(run)
     assert said == ["plan.csv rebuilt from the plan"] and folder.finished
@@ -153,7 +153,7 @@ def test_strangers_go(run: Path) -> None:
 
 
 def test_damaged_costs_lose_their_line(run: Path) -> None:
-    """Timings are outside the seal; the remaining ones are read again."""
+    """Timings are not part of the seal. Those that remain can be read."""
     edit(run / "timings" / "0001-a.jsonl", lambda x: [*x[:3], x[3].replace(b"1.0", b"9.0"), *x[4:]])
     with pytest.raises(MutatorError, match=r"0001-a\.jsonl:4: a damaged line"):
         RunFolder.open(run).timings()
@@ -163,7 +163,7 @@ def test_damaged_costs_lose_their_line(run: Path) -> None:
 
 @pytest.mark.parametrize("content", [None, b"{", b"{}"])
 def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None) -> None:
-    """Only a previously known seal can vouch for a rebuilt ledger, and the output says so."""
+    """Only a seal that was known before can vouch for a rebuilt ledger. The output says so."""
     path = run / digests.FILE
     path.unlink() if content is None else path.write_bytes(content)
     said, folder = repaired(run)
@@ -172,7 +172,7 @@ def test_a_damaged_ledger_is_made_of_the_files(run: Path, content: bytes | None)
 
 
 def test_what_nobody_can_make_again_stays(run: Path) -> None:
-    """A damaged campaign file or plan stays, so that a copy can replace it."""
+    """A damaged campaign file or plan stays in place, so that a copy can replace it."""
     (run / "campaign.yaml").write_text("other")
     assert repair(RunFolder.unverified(run)) == []
     assert (run / "campaign.yaml").read_text() == "other"
@@ -182,14 +182,15 @@ def test_what_nobody_can_make_again_stays(run: Path) -> None:
 
 
 def test_a_sound_run_is_left_alone(run: Path) -> None:
-    """Nothing is moved aside or written."""
+    """In an intact run, nothing is moved aside or written."""
     before = (run / digests.FILE).stat().st_mtime_ns
     assert repair(RunFolder.unverified(run)) == []
     assert (run / digests.FILE).stat().st_mtime_ns == before and not (run / "damaged").exists()
 
 
 def test_a_killed_repair_leaves_no_finished_run(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Killed at any point after it moved something, the folder opens, and the run resumes."""
+    """If a repair is killed at any point after it moved something, the folder can be opened, and the run
+    resumes."""
     edit(run / RECORDS, lambda x: [*x[:3], x[3].replace(b"ok", b"no"), *x[4:]])
     with monkeypatch.context() as patched, pytest.raises(KeyboardInterrupt):
         patched.setattr(digests, "close_segments", kill)
@@ -203,7 +204,7 @@ def kill(*_: object, **__: object) -> None:
 
 
 def test_repair_waits_for_nobody(run: Path) -> None:
-    """A folder in use, or one of an earlier schema, is refused."""
+    """A folder that is in use, or that has an earlier schema, is refused."""
     with owned(run), pytest.raises(MutatorError, match="in use"):
         repair(RunFolder.unverified(run))
     head = run / "run.json"
@@ -215,7 +216,7 @@ def test_repair_waits_for_nobody(run: Path) -> None:
 @pytest.mark.parametrize("name", NO_FILES)
 @pytest.mark.parametrize("is_link", [False, True])
 def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> None:
-    """A folder in the place of a file is moved with its content, and so is a dangling link."""
+    """A folder in place of a file is moved aside with its content. A dangling link is moved, too."""
     (run / name).unlink()
     if is_link:
         (run / name).symlink_to(run / "nowhere")
@@ -228,7 +229,7 @@ def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> No
 
 
 def test_a_file_of_patches_that_is_a_link_is_put_aside(run: Path, put_patches: Callable[..., None]) -> None:
-    """The link's target stays unchanged."""
+    """If a file of patches is a link, the link's target stays unchanged."""
     name = next(plan_file.ids(run))
     put_patches(run, {name: b"not the patch of the record"})
     [file] = Patches(run).files()

@@ -1,4 +1,4 @@
-"""The seal: one digest of exactly what counts."""
+"""The seal is one digest of exactly those parts of a run that determine its result."""
 
 import json
 import shutil
@@ -30,7 +30,7 @@ def made(
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """A finished run that a test may change."""
+    """A finished run, which a test may change."""
     return Path(shutil.copytree(made, tmp_path / "another place"))
 
 
@@ -39,7 +39,8 @@ def sealed(run: Path) -> str | None:
 
 
 def test_a_seal_does_not_depend_on_who_computed_when(made: Path, run: Path, reseal: Reseal) -> None:
-    """Other sessions, workers and record orders, lost timings and another processor give the same seal."""
+    """Other sessions, workers and orders of records give the same seal. So do lost timings and another
+    processor."""
     path = run / "records" / "0001-a.jsonl"
     head, *lines = path.read_text().splitlines()
     path.write_text("\n".join([head, *lines[12:], ""]))
@@ -106,7 +107,7 @@ def test_all_that_counts_is_in_it(made: Path, run: Path, reseal: Reseal, change:
 
 
 def test_what_is_not_finished_has_none(run: Path) -> None:
-    """An unfinished run has no seal, nor has an old one without digests."""
+    """An unfinished run has no seal. An old run without digests has none either."""
     digests.close_segments(run, finished=False)
     folder = RunFolder.open(run)
     assert (seal_of(folder), seal_or_why_not(folder)) == (None, "none: the run is not finished")
@@ -116,8 +117,9 @@ def test_what_is_not_finished_has_none(run: Path) -> None:
 
 
 def test_a_record_is_in_it_as_it_was_written(made: Path, run: Path) -> None:
-    """The seal covers bytes, not their interpretation: a later field of records changes no seal."""
+    """The seal covers bytes, not what they mean, so a field that is added to records later does not change
+    it."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines()
-    assert canonical(json.loads(lines[1])) != lines[1]  # the checksum comes first
+    assert canonical(json.loads(lines[1])) != lines[1]  # the checksum is the first key
     assert sealed(run) == sealed(made)

@@ -1,4 +1,4 @@
-"""Finding the places that use the order of a set, by reading the source."""
+"""Places that depend on the order of a set are found by reading the source."""
 
 import pytest
 
@@ -25,7 +25,7 @@ from mutator.verification.set_order import places
     ],
 )
 def test_a_set_that_is_gone_through_is_found(line: str) -> None:
-    """Loops, comprehensions, lists, sums and `pop` use a set's order."""
+    """Loops, comprehensions, lists, sums and `pop` depend on the order of a set."""
     assert len(places(line.encode())) == 1
 
 

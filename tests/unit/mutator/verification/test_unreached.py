@@ -1,4 +1,4 @@
-"""Triggers that golden runs never reach."""
+"""Triggers that no golden run reaches."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -34,9 +34,8 @@ SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0
 def test_what_never_holds_is_told(
     toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
 ) -> None:
-    """A time after the last observation, and a condition that never holds while armed, are reported with the
-    number of affected experiments.
-    """
+    """A time after the last observation is reported, and so is a condition that never holds while it is
+    armed. Both have the number of affected experiments."""
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
     told = remarks(
         toycar,
@@ -50,7 +49,8 @@ def test_what_never_holds_is_told(
 
 
 def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
-    """Observations are read back unchanged, by the keys of their golden runs; without any there are none."""
+    """Observations are read back unchanged, by the keys of their golden runs. If nothing is stored, there
+    are none."""
     assert read_observed(tmp_path) == {}
     write_observed(tmp_path, "town/A+alone", SEEN)
     assert {key: rows.tolist() for key, rows in read_observed(tmp_path).items()} == {
@@ -59,9 +59,8 @@ def test_what_is_observed_is_read_back(tmp_path: Path) -> None:
 
 
 def test_triggers_are_told_of_cached_checks_too(toycar: Workspace, tmp_path: Path) -> None:
-    """Unreached triggers are known for golden runs from the cache, too; a resumed run does not repeat the
-    warning.
-    """
+    """Unreached triggers are also known if golden runs come from the cache. A resumed run does not repeat
+    the warning."""
     campaign = toycar.library / "campaigns" / "small.yaml"
     text = campaign.read_text().replace("methods: [guided, random]", "methods: [guided]")
     campaign.write_text(text.replace("table: near_far", "list: [{when: v_ego > 99}, {at_s: 50}]"))

@@ -1,4 +1,4 @@
-"""What pages share: assets, and data inside a page."""
+"""The assets that pages share, and data inside a page."""
 
 import base64
 import gzip
@@ -10,11 +10,11 @@ from mutator import web
 from mutator.report import page as report
 from mutator.review import page as review
 
-SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # loaded by address from a server
+SERVED = ("jobs.js", "served.js", "start.js", "served.css")  # a server's page loads it by its address
 
 
 def test_carried_data_come_back_and_are_the_same_each_time() -> None:
-    """JSON, compressed without a time stamp, in base64, cannot end a script element."""
+    """JSON is compressed without a time stamp and written in base64, which cannot end a script element."""
     value = {"text": "</script> ⟨1⟩", "numbers": [0.1, None, 3]}
     text = web.packed(value)
     assert json.loads(gzip.decompress(base64.b64decode(text))) == value
@@ -33,7 +33,7 @@ def test_plain_data_cannot_end_their_element() -> None:
 
 
 def test_what_json_does_not_know_is_refused() -> None:
-    """A page cannot read NaN, so it must be written as something else."""
+    """NaN is written as something else, because a page cannot read it."""
     with pytest.raises(ValueError, match="JSON"):
         web.packed([float("nan")])
 
@@ -43,5 +43,5 @@ def test_what_json_does_not_know_is_refused() -> None:
     sorted({*report.STYLES, *report.SCRIPTS, *review.STYLES, *review.SCRIPTS, *SERVED}),
 )
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
-    """`asset` refuses a script that could end its element; a script has at most 300 lines."""
+    """`asset` refuses a script that could end its element. A script has at most 300 lines."""
     assert len(web.asset(name).splitlines()) <= 300
