@@ -1,4 +1,4 @@
-"""The content of a run folder, and how to read and write it: plan, records, checks, shards.
+"""Read and write a run folder: plan, records, checks, shards.
 
-This package stores results; it does not interpret them.
+This package stores results and does not interpret them.
 """

@@ -1,8 +1,9 @@
-"""Files of checksummed blocks of bytes, each appended by one process: patches, and series during a run.
+"""Files of checksummed blocks of bytes; each file has one process that appends. They hold patches, and series
+during a run.
 
-A block is a head of 19 bytes, a key (text) and its content. The head is, little-endian: the mark `FIB1`, a
-kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the SHA-256 of the
-rest of the block. A changed block is detected, and the blocks after it still count.
+A block consists of a head of 19 bytes, a key (text) and the content. The head is little-endian: the mark
+`FIB1`, a kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the
+SHA-256 of the rest of the block. A changed block is detected, and the blocks after it remain readable.
 """
 
 import os
@@ -17,12 +18,12 @@ from mutator._common.files import raising_disk_full
 
 _MARK = b"FIB1"
 _HEAD, _CHECK = struct.Struct("<4sBHI"), 8
-_BATCH, _BATCH_S = 32, 2.0  # at most so many blocks, and seconds, between two syncs
+_BATCH, _BATCH_S = 32, 2.0  # the most blocks, and seconds, between two syncs
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Block:
-    """An appended block. The file's owner chooses `kind`; `offset` is the start of the content."""
+    """An appended block. The file's owner chooses `kind`; `offset` is where the content starts."""
 
     kind: int
     key: str
@@ -32,9 +33,9 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
-    """The content of such a file: the intact blocks, and whether others are damaged.
+    """The content of a block file: the intact blocks, and whether any are damaged.
 
-    A block that a kill cut short at the end is not damage.
+    A last block that a kill cut short does not count as damage.
     """
 
     path: Path
@@ -43,9 +44,9 @@ class Blocks:
 
 
 class BlockWriter:
-    """Appends blocks to a new file, synced in batches.
+    """Append blocks to a new file, synced in batches.
 
-    A block that does not fit on the disk is removed again, and DiskFull raised.
+    If a block does not fit on the disk, it is removed again, and DiskFull is raised.
     """
 
     def __init__(self, path: Path) -> None:
@@ -62,7 +63,7 @@ class BlockWriter:
             self.sync()
 
     def extend(self, blocks: bytes) -> None:
-        """Append whole blocks made elsewhere; they are synced by time only."""
+        """Append complete blocks that were built elsewhere. Only elapsed time triggers a sync."""
         with raising_disk_full(self.path):
             try:
                 written = 0
@@ -77,7 +78,7 @@ class BlockWriter:
             self.sync()
 
     def sync(self) -> None:
-        """Make sure that what was appended survives a power cut."""
+        """Sync the file, so that appended blocks survive a power cut."""
         if self._unsynced:
             with raising_disk_full(self.path):
                 os.fsync(self._fd)
@@ -98,7 +99,7 @@ def as_block(kind: int, key: str, data: bytes) -> bytes:
 
 
 def read_blocks(path: Path) -> Blocks:
-    """Verify the blocks of a file."""
+    """Read a file and verify its blocks."""
     found = list(_verified(path.read_bytes()))
     blocks = tuple(block for block in found if block is not None)
     return Blocks(path=path, blocks=blocks, damaged=len(blocks) < len(found))
@@ -110,7 +111,7 @@ def intact_blocks(path: Path) -> Iterator[Block]:
 
 
 def _verified(data: bytes) -> Iterator[Block | None]:
-    """Yield intact blocks, and None for damaged parts."""
+    """Yield the intact blocks, and None for each damaged part."""
     at = 0
     while at < len(data):
         block = _block_at(data, at)
@@ -125,7 +126,7 @@ def _verified(data: bytes) -> Iterator[Block | None]:
 
 
 def _block_at(data: bytes, at: int) -> Block | None:
-    """The intact block that begins there, or None."""
+    """The intact block that begins at this offset, or None."""
     begin = at + _HEAD.size + _CHECK
     if begin > len(data):
         return None
@@ -141,7 +142,7 @@ def _block_at(data: bytes, at: int) -> Block | None:
 
 
 def _intact(data: bytes, at: int) -> Iterator[int]:
-    """Where intact blocks begin, from `at` on."""
+    """Yield the offsets, from `at` on, at which intact blocks begin."""
     while (at := data.find(_MARK, at)) >= 0:
         if _block_at(data, at) is not None:
             yield at
@@ -149,7 +150,7 @@ def _intact(data: bytes, at: int) -> Iterator[int]:
 
 
 def _is_cut(data: bytes, at: int) -> bool:
-    """Whether the file's end cuts off a block that begins there."""
+    """Whether the block that begins at this offset is cut off by the end of the file."""
     rest = data[at:]
     if len(rest) < _HEAD.size + _CHECK:
         return _MARK.startswith(rest[: len(_MARK)])

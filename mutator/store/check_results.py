@@ -11,7 +11,7 @@ FILE = "checks.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
-    """One check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` describes the result."""
+    """The result of one check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` describes it."""
 
     name: str
     passed: bool
@@ -19,13 +19,13 @@ class CheckResult:
 
 
 def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
-    """The packages that the golden runs loaded; empty before they ran."""
+    """The packages that the golden runs loaded; empty before they have run."""
     path = folder.path / FILE
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
-    """Mean CPU time in s of the golden runs; None before they ran."""
+    """The mean CPU time of the golden runs in s; None before they have run."""
     path = folder.path / FILE
     found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
     return found if isinstance(found, int | float) else None

@@ -1,4 +1,4 @@
-"""Delete what a run wrote into its folder, and nothing else."""
+"""Delete the files that a run wrote into its folder, and no others."""
 
 import os
 import time
@@ -19,26 +19,26 @@ _TRIES, _PAUSE_S = 50, 0.1
 
 
 def clean(path: Path) -> None:
-    """Delete the run folder; MutatorError as in `check`, and while a command or its workers hold it."""
+    """Delete the run folder. MutatorError as in `check`, and while a command or its workers use it."""
     check(path)
     with owned(path, patience_s=0.0):
-        found = check(path)  # again, now that nobody writes to it
-        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # the head last
+        found = check(path)  # check again, because nobody writes to the folder any more
+        _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # run.json goes last
 
 
 def clear(path: Path) -> None:
-    """Delete what a killed command left in an unfinished run folder; other files stay.
+    """Delete the files that a killed command left in an unfinished run folder; other files stay.
 
-    The head goes first, and half-written files, the evidence of the command, last.
+    run.json is deleted first. Half-written files, which show that a command was killed, are deleted last.
     """
     ours, _ = _sorted_out(path)
     _delete(path, sorted(ours, key=lambda file: (is_half_written(file.name), file != path / HEAD)))
 
 
 def finish_deletion(path: Path) -> bool:
-    """Wait for a command that may be deleting the run folder, then delete what was written meanwhile.
+    """Wait for a command that may be deleting the run folder, then delete what was written in the meantime.
 
-    Returns whether the folder is gone.
+    Return whether the folder is gone.
     """
     for _ in range(_TRIES):
         try:
@@ -48,7 +48,7 @@ def finish_deletion(path: Path) -> bool:
                 clear(path)
         except FileNotFoundError:
             return True
-        except MutatorError:  # still in use
+        except MutatorError:  # the folder is still in use
             time.sleep(_PAUSE_S)
         else:
             return True
@@ -64,7 +64,7 @@ def _delete(path: Path, files: Iterable[Path]) -> None:
 
 
 def check(path: Path) -> list[Path]:
-    """List the files of a run folder; MutatorError for any other folder, a link, or unknown content."""
+    """List the files of a run folder; MutatorError for a link, any other folder, or unknown content."""
     if path.is_symlink():
         raise MutatorError(
             f"a link to {path.readlink()}",
@@ -94,13 +94,15 @@ def check(path: Path) -> list[Path]:
 
 
 def _is_known(name: str) -> bool:
-    """Whether a run writes a file of that name, or leaves it half written."""
+    """Whether a run writes a file with that name, or may leave it half written."""
     whole = Path(name).with_name(complete(Path(name).name)).as_posix()
     return any(fnmatchcase(whole, pattern) for pattern in CONTENT)
 
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
-    """What a run wrote below `path`, without folders, and everything else. Links are not followed."""
+    """Separate the files below `path` that a run wrote from everything else. Folders are left out, and links
+    are not followed.
+    """
     ours: list[Path] = []
     strangers: list[Path] = []
     for folder, folders, files in os.walk(path):

@@ -1,7 +1,7 @@
-"""`digests.json`: size and SHA-256 of every file of a run folder that counts, to detect changes.
+"""`digests.json`: size and SHA-256 of every file of a run folder that counts, used to detect changes.
 
-Only the folder's owner writes it. A rewrite is announced first, with old and new digest, and confirmed
-afterwards. After a kill in between, each file matches one of the two.
+Only the folder's owner writes it. Before a file is rewritten, its old and new digest are announced;
+afterwards they are confirmed. If the process is killed in between, each file matches one of the two.
 """
 
 import hashlib
@@ -28,12 +28,12 @@ from mutator.store.lines import read_segment
 
 SCHEMA, FILE = "digests/1", "digests.json"
 _WORTH_THREADS = 20_000_000  # bytes
-SEGMENTS = ("records", "proof")  # folders of append-only files, each of which is entered once closed
+SEGMENTS = ("records", "proof")  # folders of append-only files; a file is entered when it is closed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Digest:
-    """A file's state when it was written; `lines` for segments only."""
+    """The size and hash of a file when it was written; `lines` for segments only."""
 
     size: int  # bytes
     sha256: str
@@ -45,7 +45,7 @@ class Digest:
 
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
-        """The digest of a file; None if there is none."""
+        """Compute the digest of a file; None if the file is missing."""
         if not path.is_file():  # never block on a pipe
             return None
         try:
@@ -60,12 +60,12 @@ class Digest:
             return None
 
     def is_of(self, found: "Digest | None") -> bool:
-        """Whether a file's current digest matches."""
+        """Whether a file's current digest matches this one."""
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
 
 
 def of_files(paths: Sequence[Path]) -> list[Digest | None]:
-    """The digest of each file, in parallel: hashing releases the lock."""
+    """The digest of each file, computed in parallel, because hashing releases the interpreter lock."""
     sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
     if sum(sizes) < _WORTH_THREADS:
         return [Digest.of_file(path) for path in paths]
@@ -78,7 +78,7 @@ def of_files(paths: Sequence[Path]) -> list[Digest | None]:
 
 
 class DigestingFile:
-    """Writes to a file and computes its digest."""
+    """Write to a file and compute its digest."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file, self._hash, self._size = file, hashlib.sha256(), 0
@@ -90,12 +90,12 @@ class DigestingFile:
 
     @property
     def digest(self) -> Digest:
-        """The digest of everything written."""
+        """The digest of everything written so far."""
         return Digest(size=self._size, sha256=self._hash.hexdigest())
 
 
 def sha256(path: Path) -> str:
-    """The digest of a file, which may be larger than memory; '' if there is none."""
+    """The SHA-256 of a file, which may be larger than memory; '' if the file is missing."""
     found = Digest.of_file(path)
     return found.sha256 if found else ""
 
@@ -104,8 +104,8 @@ def sha256(path: Path) -> str:
 class Ledger:
     """The content of `digests.json`.
 
-    Files by their names in the run folder; files being rewritten, with their new digests (None: deleted);
-    whether every experiment has a record that counts.
+    `files` by their names in the run folder; `rewriting`: files that are being rewritten, with their new
+    digests (None: deleted); `finished`: whether every experiment has a record that counts.
     """
 
     files: Mapping[str, Digest]
@@ -113,7 +113,7 @@ class Ledger:
     finished: bool = False
 
     def accepts(self, name: str, found: Digest | None) -> bool:
-        """Whether a file may have this digest; one that is being rewritten may be old, new or missing."""
+        """Whether a file may have this digest. A file that is being rewritten may be old, new or missing."""
         known = self.files.get(name)
         if name not in self.rewriting:
             return known.is_of(found) if known else found is None
@@ -122,7 +122,7 @@ class Ledger:
 
     @property
     def names(self) -> list[str]:
-        """Every file that is known or announced."""
+        """The names of all files that are known or announced."""
         return [*self.files, *(name for name in self.rewriting if name not in self.files)]
 
 
@@ -165,10 +165,10 @@ def _plain(one: Digest) -> dict[str, Any]:
 def rewriting(
     run: Path, coming: Mapping[str, Digest | None], *, finished: bool | None = None
 ) -> Iterator[None]:
-    """Announce that the block changes these files (None: deletes them), and confirm at the end.
+    """Announce that the block changes these files (None: deletes them), and confirm the changes at the end.
 
-    A kill within the block leaves a folder that opens and can be rewritten. `finished` as in
-    `close_segments`, from the beginning.
+    If the process is killed within the block, the folder still opens, and the files can be rewritten.
+    `finished` is as in `close_segments`, but counts from the start of the block.
     """
     before = settled(run)
     before = replace(before, finished=before.finished if finished is None else finished)
@@ -185,7 +185,7 @@ def rewrite(run: Path, name: str, data: bytes) -> None:
 
 
 def settled(run: Path) -> Ledger:
-    """The ledger without announcements: files that a killed command left are taken as they are."""
+    """The ledger without announcements. The files that a killed command left are taken as they are."""
     known = read(run)
     files = dict(known.files)
     for name, coming in known.rewriting.items():
@@ -198,9 +198,9 @@ def settled(run: Path) -> Ledger:
 
 
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
-    """Enter the segments that are complete, without a torn last line.
+    """Enter the complete segments into the ledger; a torn last line is not counted.
 
-    `finished` says whether the run is, from now on; None: as before. MutatorError for a damaged line.
+    `finished` says whether the run is finished from now on; None: as before. MutatorError for a damaged line.
     """
     before = settled(run)
     files = dict(before.files)

@@ -1,6 +1,7 @@
-"""Lines of checksummed files by experiment: all verified at once, each parsed on request.
+"""Lines of checksummed files, indexed by experiment. All lines are verified together; each is parsed when it
+is read.
 
-A million experiments take some 200 MB this way; as objects, their records take 5 GB.
+For a million experiments this takes some 200 MB; their records as objects would take 5 GB.
 """
 
 import json
@@ -16,17 +17,17 @@ from mutator._common.hashing import from_json
 from mutator.errors import MutatorError
 from mutator.store.lines import bare_segment, verified_lines
 
-_OPEN = 16  # most open files
+_OPEN = 16  # the most files to keep open
 _ID = re.compile(rb'"experiment_id":"([^"\\]+)"')  # canonical JSON has this nowhere else in a line
 
 T = TypeVar("T")
 
 
 class IndexedLines(Mapping[str, T], Generic[T]):
-    """Maps each experiment to the object that `made` makes of its line, in order of first appearance.
+    """Map each experiment to the object that `made` creates from its line, in order of first appearance.
 
-    `replaces(line, known)` decides about a second line of an experiment, and may raise. MutatorError for a
-    damaged line, and on access for one with other content.
+    `replaces(line, known)` decides whether a second line of an experiment counts, and may raise. MutatorError
+    for a damaged line; reading a line with unexpected content raises MutatorError, too.
     """
 
     def __init__(
@@ -41,7 +42,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self._made, self._checksums = made, checksums
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
-        self._last: tuple[str, T] | None = None  # the last object, since some callers ask twice
+        self._last: tuple[str, T] | None = None  # the last object is kept, because some callers read it twice
         self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
         for file, path in enumerate(self._files.paths):
             self._read(file, path, schema, replaces)
@@ -68,7 +69,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return Line(self._files.paths[file], self._number[at], data)
 
     def __getitem__(self, name: str) -> T:
-        last = self._last  # threads may replace it meanwhile
+        last = self._last  # another thread may replace it in the meantime
         if last is None or last[0] != name:
             self._last = last = name, self._read_one(name)
         return last[1]
@@ -90,7 +91,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return len(self._index)
 
     def problem(self, line: "Line") -> MutatorError:
-        """The error about an unexpected line."""
+        """Return the error about an unexpected line."""
         return self._problem(line.path, line.number)
 
     def _problem(self, path: Path, number: int) -> MutatorError:
@@ -104,7 +105,7 @@ class Line:
         self.path, self.number, self.data = path, number, data
 
     def content(self) -> dict[str, Any]:
-        """The object on it; ValueError if it is not one."""
+        """The object on the line; ValueError if the line is not a JSON object."""
         value = from_json(self.data)
         if not isinstance(value, dict):
             raise ValueError("no object")
@@ -116,13 +117,13 @@ def _name(data: bytes) -> str | None:
     if found := _ID.search(data):
         return found[1].decode()
     try:
-        return str(json.loads(data)["experiment_id"])  # older folders use other spaces
+        return str(json.loads(data)["experiment_id"])  # older folders use spaces in other places
     except (KeyError, TypeError, ValueError, RecursionError):
         return None
 
 
 class Files:
-    """Reads parts of files and keeps a few files open."""
+    """Read parts of files, and keep a few files open."""
 
     def __init__(self, paths: list[Path]) -> None:
         self.paths = paths

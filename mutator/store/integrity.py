@@ -1,7 +1,7 @@
-"""Check that a run folder is as written, before anything in it is used.
+"""Check that a run folder is unchanged before anything in it is used.
 
-Files are compared with `digests.json`, lines with their checksums, records with the plan. Folders of the
-first schema have neither digests nor checksums, so only their ids are checked.
+Files are compared with `digests.json`, lines with their checksums, and records with the plan. Folders of the
+first schema have no digests or checksums, so only their ids are checked.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -20,18 +20,18 @@ from mutator.store.records import SCHEMA, ending_on, second_record
 from mutator.store.run_head import CAMPAIGN, HEAD, Head
 from mutator.store.shards import Shard
 
-SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders with no unknown files in a finished run
+SEALED = ("plan", "golden", *digests.SEGMENTS)  # folders in which a finished run has no unknown files
 WHOLE = (HEAD, CAMPAIGN, plan_file.EXPERIMENTS, plan_file.FAULTS)  # files that cannot be recreated
 TOP = (HEAD, CAMPAIGN, "plan.csv", "checks.json", "reviewed.json")
-_MANY = 5  # experiments that one message names
+_MANY = 5  # the most experiments that one message names
 
 
 def problems(
     run: Path, head: Head, ledger: Ledger | None, shard: Shard | None, *, anew: bool = False
 ) -> Iterator[MutatorError]:
-    """Yield all that is wrong in a run folder, which runs `shard`.
+    """Yield every problem of a run folder that runs `shard`.
 
-    For a finished run that this machine has verified before, only the bytes are compared, unless `anew`.
+    For a finished run that this machine has verified before, only the file bytes are compared, unless `anew`.
     """
     key = ""
     if ledger is not None:
@@ -67,7 +67,7 @@ def problems(
 
 
 def content_key(run: Path) -> str:
-    """A key for everything that counts in a finished run folder (`verified_runs`).
+    """A key that identifies everything that counts in a finished run folder (`verified_runs`).
 
     It is empty if the run is not finished or does not match its digests.
     """
@@ -78,22 +78,22 @@ def content_key(run: Path) -> str:
 
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
-    """The digests of all files that count, by name in the run folder."""
+    """The digests of all files that count, by their names in the run folder."""
     names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
     return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
-    """`verified_runs.key_of` of these files and of the list of required files."""
+    """The `verified_runs.key_of` of these files and the list of required files."""
     ledger = Digest.of_file(run / digests.FILE)
     told = {**found, digests.FILE: ledger}
     return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
 def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
-    """Ids and positions of the experiments that a run folder runs, in plan order.
+    """The ids and positions of the experiments that a run folder runs, in plan order.
 
-    MutatorError for a plan with a duplicate, or whose number differs from its chunks.
+    MutatorError if the plan has a duplicate, or if its length does not match its chunks.
     """
     path = run / plan_file.EXPERIMENTS
     places: dict[str, int] = {}
@@ -133,7 +133,7 @@ def file_problems(
 
 
 def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[MutatorError]:
-    """Yield what is wrong with a changed file: its damaged lines, if it has lines."""
+    """Yield the problems of a changed file: its damaged lines, if it consists of lines."""
     path = run / name
     if known.lines is not None:
         segment = read_segment(path)
@@ -147,7 +147,7 @@ def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[Mut
         return
     line = None
     if name in (plan_file.EXPERIMENTS, plan_file.FAULTS):
-        with suppress(MutatorError):  # the other problem is a missing file
+        with suppress(MutatorError):  # a missing file is a separate problem
             line = next((one.line for one in plan_file.problems(run) if one.where == str(path)), None)
     yield MutatorError(
         f"changed: {_told(found)}", where=path, line=line, expected=_told(known), remedy=_remedy(run, name)
@@ -166,7 +166,7 @@ def _remedy(run: Path, name: str) -> str:
 
 
 def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
-    """Yield damaged lines of segments in use, or left by a killed command."""
+    """Yield the damaged lines of segments that are in use or were left by a killed command."""
     for name in digests.segments(run):
         if name not in ledger.files:
             try:
@@ -178,7 +178,7 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
 
 
 def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
-    """Yield files of a finished run that the ledger does not name, in folders where all must be named."""
+    """Yield files that the ledger of a finished run does not name, in folders where it must name all."""
     known = {*ledger.files, *ledger.rewriting}
     paths = [run / name for name in TOP]
     paths += [path for folder in SEALED for path in sorted((run / folder).rglob("*"))]
@@ -249,7 +249,7 @@ def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[Mutato
 def _counted(
     segment: Segment, lines: _Lines, planned: Collection[str]
 ) -> Iterator[tuple[int, str | MutatorError, str, int]]:
-    """Yield line, experiment, patch and hash of each record of a segment that counts, or the line's
+    """Yield line number, experiment, patch and hash of each record that counts in a segment, or a line's
     problem.
     """
     for number, line in lines:
@@ -274,7 +274,7 @@ def _counted(
 def patch_problems(
     patches: Patches, experiment_id: str, known: str, worker: str = ""
 ) -> Iterator[MutatorError]:
-    """Yield a problem if a stored patch is missing or its digest is not the record's `known` (empty: no
+    """Yield a problem if a stored patch is missing, or if its digest is not the record's `known` (empty: no
     mutant).
     """
     if not known:

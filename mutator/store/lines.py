@@ -1,8 +1,9 @@
-"""Files of checksummed lines, each appended by one process; raw bytes are verified before any line is parsed.
+"""Files of checksummed lines; each file has one process that appends. Raw bytes are verified before any line
+is parsed.
 
-A line is a JSON object whose first key is its checksum, `{"sum":"<16 hex>",...}`: SHA-256, shortened, of the
-previous line's checksum and of all bytes after its own. So a changed, missing, duplicate or moved line is
-detected by its number, and the lines after it still verify.
+A line is a JSON object that begins with its checksum, `{"sum":"<16 hex>",...}`. The checksum is a shortened
+SHA-256 of the previous line's checksum and of all bytes after its own checksum. A changed, missing, duplicate
+or moved line is therefore detected by its number, and the lines after it can still be verified.
 """
 
 import json
@@ -18,19 +19,19 @@ from mutator._common.files import check_schema, raising_disk_full, writing_atomi
 from mutator._common.hashing import canonical
 from mutator.errors import MutatorError
 
-_BATCH = 32  # lines between two syncs
-_BATCH_S = 2.0  # and the longest time between them
+_BATCH = 32  # the most lines between two syncs
+_BATCH_S = 2.0  # the longest time between two syncs
 _KEY, _WIDTH, _AFTER = b'{"sum":"', 16, b'",'
 _SUM = slice(len(_KEY), len(_KEY) + _WIDTH)
 _BODY = len(_KEY) + _WIDTH + len(_AFTER)
 
 
 class LineWriter:
-    """Appends checksummed JSON lines to a new file, synced in batches.
+    """Append checksummed JSON lines to a new file, synced in batches.
 
-    `head`, with the schema, is the first line, to which the file's name is added. `first` is called before
-    each sync, to sync what the lines refer to. A line that does not fit on the disk is removed again, and
-    DiskFull raised.
+    The first line is `head`, which has the schema; the file's name is added to it. `first` is called before
+    each sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed
+    again, and DiskFull is raised.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
@@ -46,13 +47,13 @@ class LineWriter:
         self.append(_head(path, head))
 
     def append(self, value: Mapping[str, Any]) -> None:
-        """Append one line; it is on the disk after the next `sync` at the latest."""
+        """Append one line. It is on the disk after the next `sync` at the latest."""
         self.extend([canonical(value).encode()])
         if self._unsynced >= _BATCH:
             self.sync()
 
     def extend(self, values: Iterable[bytes]) -> None:
-        """Append lines, given as canonical text; they are synced by time only."""
+        """Append lines of canonical text. Only elapsed time triggers a sync."""
         lines, last = [], self._last
         for value in values:
             lines.append(_line(last, value[1:]))
@@ -73,7 +74,7 @@ class LineWriter:
             self.sync()
 
     def sync(self) -> None:
-        """Make sure that what was appended survives a power cut."""
+        """Sync the file, so that appended lines survive a power cut."""
         self._first()
         with raising_disk_full(self.path):
             os.fsync(self._fd)
@@ -89,10 +90,10 @@ class LineWriter:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Segment:
-    """The content of such a file: intact lines by number from 1, numbers of damaged lines, end of the last
-    whole line.
+    """The content of a line file: intact lines by number from 1, numbers of damaged lines, and the end of the
+    last complete line.
 
-    What comes after that end was torn by a kill.
+    Bytes after that end belong to a line that a kill cut short.
     """
 
     path: Path
@@ -102,7 +103,7 @@ class Segment:
     end: int
 
     def problem(self, number: int) -> MutatorError:
-        """The error about a damaged line."""
+        """Return the error about a damaged line."""
         run = self.path.parent.parent
         mend = f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
         return MutatorError(
@@ -114,7 +115,7 @@ class Segment:
         )
 
     def content(self, number: int) -> dict[str, Any]:
-        """The object on a line, without its checksum; MutatorError if it is not one."""
+        """The object on a line, without its checksum; MutatorError if the line is not an object."""
         try:
             value = json.loads(self.lines[number])
         except (ValueError, RecursionError):
@@ -125,14 +126,14 @@ class Segment:
         return value
 
     def body(self, number: int) -> bytes:
-        """A line without its checksum, which is the same in every file."""
+        """A line without its checksum. This part is the same in every file."""
         return self.body_of(self.lines[number])
 
     def body_of(self, line: bytes) -> bytes:
         return line[_BODY if self.checksums else 0 :]
 
     def check_head(self, schema: str) -> None:
-        """Raise MutatorError for a file of another schema, or one written under another name."""
+        """Raise MutatorError for a file with another schema, or one that was written under another name."""
         if 1 not in self.lines:
             return
         head = self.content(1)
@@ -148,8 +149,8 @@ class Segment:
             )
 
     def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield number and content of each line after the head; MutatorError for damage or another schema
-        or name.
+        """Yield the number and content of each line after the head; MutatorError for damage, or another
+        schema or file name.
         """
         if self.damaged:
             raise self.problem(self.damaged[0])
@@ -160,7 +161,8 @@ class Segment:
 def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
     """Verify the lines of a file, whose bytes are `data` if already read.
 
-    Without `checksums` (an old run folder) every whole line counts as intact. MutatorError without a file.
+    Without `checksums` (an old run folder), every complete line counts as intact. MutatorError if the file is
+    missing.
     """
     data = _read(path) if data is None else data
     end = data.rfind(b"\n") + 1
@@ -177,14 +179,14 @@ def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = Tru
 
 
 def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tuple[int, int, bytes]]:
-    """Yield number, offset and bytes (without newline) of each whole line after the head.
+    """Yield the number, offset and bytes (without newline) of each complete line after the head.
 
-    MutatorError for a damaged line, and for a missing file or another schema or name.
+    MutatorError for a damaged line, a missing file, or another schema or file name.
     """
     last, offset = b"", 0
     with _no_pipe(path).open("rb") as file:
         for number, line in enumerate(file, start=1):
-            if not line.endswith(b"\n"):  # torn by a kill
+            if not line.endswith(b"\n"):  # a kill cut this line short
                 return
             data = line[:-1]
             if checksums and not _is_intact(last, data):
@@ -198,7 +200,7 @@ def verified_lines(path: Path, schema: str, *, checksums: bool) -> Iterator[tupl
 
 
 def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
-    """Yield number and bytes of each whole, intact line. MutatorError without a file."""
+    """Yield the number and bytes of each complete, intact line. MutatorError if the file is missing."""
     last = b""
     with _no_pipe(path).open("rb") as file:
         for number, line in enumerate(file, start=1):
@@ -209,12 +211,12 @@ def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
 
 
 def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:
-    """A segment of which only these lines are known."""
+    """A segment that contains only these lines."""
     return Segment(path=path, checksums=checksums, lines=lines or {}, damaged=(), end=0)
 
 
 def _is_intact(last: bytes, line: bytes) -> bool:
-    """Whether a line that follows the checksum `last` matches its own."""
+    """Whether a line matches its checksum, given the previous line's checksum `last`."""
     found = sha256(last + line[_BODY:]).hexdigest()[:_WIDTH].encode()
     return line[:_BODY] == b"".join((_KEY, found, _AFTER))
 
@@ -235,7 +237,7 @@ def _no_pipe(path: Path) -> Path:
 
 
 def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
-    """The bytes of a file at `path` after `values` were appended."""
+    """The bytes that a file at `path` would have after `values` were appended."""
     lines = [b""]
     for value in (_head(path, head), *values):
         lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
@@ -243,7 +245,7 @@ def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, A
 
 
 def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
-    """Write a file from other files' lines, after a new head, with new checksums."""
+    """Write a file that has a new head, then lines of other files, with new checksums."""
     first = _line(b"", canonical(_head(path, head)).encode()[1:])
     with writing_atomic(path) as file:
         file.write(first)
@@ -255,7 +257,7 @@ def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> N
 
 
 def _line(last: bytes, body: bytes) -> bytes:
-    """A line: its checksum, which follows `last`, and `body`, the object without its first brace."""
+    """A line: its checksum, computed from `last` and `body`, then `body`, an object without its brace."""
     checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
     return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
 

@@ -1,4 +1,4 @@
-"""The patches of a run folder: packed, most of them as a difference from another patch.
+"""The patches of a run folder, packed. Most are stored as a difference from another patch.
 
 Each worker appends to its own file, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have one
 file per patch, `patches/<xx>/<experiment>.patch`. The digest in a record identifies the patch that was run.
@@ -15,21 +15,21 @@ from mutator._common.hashing import digest
 from mutator.store.blocks import Block, BlockWriter, as_block, intact_blocks, read_blocks
 
 FOLDER, SUFFIX = "patches", ".blocks"
-WHOLE, BESIDE = 0, 1  # kinds of blocks: a whole patch, or a difference from the last whole one
-_WINDOW = 32_768  # bytes of deflate's window
-_RUN = 256  # patches per whole one, which are lost with it
+WHOLE, BESIDE = 0, 1  # kinds of blocks: a complete patch, or a difference from the last complete one
+_WINDOW = 32_768  # window size of deflate, in bytes
+_RUN = 256  # patches that depend on one complete patch, and are lost with it
 _LEVEL = 9
 
 
 class _Packer:
-    """Makes the blocks of one file."""
+    """Create the blocks of one file."""
 
     def __init__(self) -> None:
         self._count = 0
         self._whole = b""
 
     def block(self, data: bytes) -> tuple[int, bytes]:
-        """Kind and content of the next patch's block."""
+        """The kind and content of the block for the next patch."""
         is_whole = self._count % _RUN == 0
         self._count += 1
         if is_whole:
@@ -40,7 +40,7 @@ class _Packer:
 
 
 class PatchWriter:
-    """Appends the patches of a worker."""
+    """Append the patches of a worker."""
 
     def __init__(self, run: Path, worker: str) -> None:
         self._path = run / FOLDER / f"{worker}{SUFFIX}"
@@ -54,13 +54,13 @@ class PatchWriter:
         self._blocks.append(kind, experiment_id, content)
 
     def extend(self, blocks: bytes) -> None:
-        """Append blocks of `packed_patches`."""
+        """Append blocks that `packed_patches` returned."""
         if self._blocks is None:
             self._blocks = BlockWriter(self._path)
         self._blocks.extend(blocks)
 
     def sync(self) -> None:
-        """Make sure that what was appended survives a power cut."""
+        """Sync the file, so that appended patches survive a power cut."""
         if self._blocks is not None:
             self._blocks.sync()
 
@@ -70,7 +70,7 @@ class PatchWriter:
 
 
 class _Whole:
-    """A whole patch, unpacked once."""
+    """A complete patch, unpacked once."""
 
     def __init__(self, block: Block) -> None:
         self._block = block
@@ -82,7 +82,7 @@ class _Whole:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """A patch's place: its block, and the whole patch that it depends on or is."""
+    """The place of a patch: its block, and the complete patch that it depends on or is itself."""
 
     path: Path
     block: Block
@@ -90,7 +90,7 @@ class _Place:
 
 
 def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
-    """The patch in a block; None if the whole patch that it depends on is lost."""
+    """The patch in a block; None if the complete patch on which it depends is lost."""
     try:
         if block.kind == WHOLE or whole is None:
             return whole.data if whole is not None and block.kind == WHOLE else zlib.decompress(block.data)
@@ -101,13 +101,13 @@ def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
 
 
 class Patches:
-    """Reads the patches of the run folder at `run`."""
+    """Read the patches of the run folder at `run`."""
 
     def __init__(self, run: Path) -> None:
         self.run = run
 
     def __iter__(self) -> Iterator[str]:
-        """Every experiment with a stored patch."""
+        """Yield every experiment that has a stored patch."""
         old = (path.stem for path in (self.run / FOLDER).glob("*/*.patch"))
         return iter(sorted({*self._places, *old}))
 
@@ -120,8 +120,8 @@ class Patches:
         return _unpacked(place.block, place.whole)
 
     def digests(self) -> Iterator[tuple[str, str]]:
-        """Yield each experiment with a packed patch, and the patch's SHA-256, empty if damaged; newer ones
-        come later.
+        """Yield each experiment that has a packed patch, and the patch's SHA-256 (empty if damaged). Newer
+        patches come later.
         """
         for path in filter(Path.is_file, self.files()):
             whole: _Whole | None = None
@@ -131,9 +131,10 @@ class Patches:
                 yield block.key, "" if data is None else digest(data)
 
     def file(self, experiment_id: str, worker: str = "") -> Path:
-        """The file that has, or should have, an experiment's patch.
+        """The file that contains, or should contain, an experiment's patch.
 
-        That is one with a damaged patch, else the file of the `worker` in its record, if known.
+        This is a file in which the patch is damaged; if there is none, the file of the `worker` in its
+        record, if known.
         """
         place = self._places.get(experiment_id)
         if place is not None:
@@ -146,11 +147,11 @@ class Patches:
         return next(damaged, lost)
 
     def old_file(self, experiment_id: str) -> Path:
-        """The file in folders of earlier schemas."""
+        """The patch file of an experiment, in folders of earlier schemas."""
         return self.run / FOLDER / experiment_id[:2] / f"{experiment_id}.patch"
 
     def files(self) -> list[Path]:
-        """The block files, oldest session first, and anything else with such a name."""
+        """The block files, oldest session first, and anything else with the suffix of one."""
         return sorted((self.run / FOLDER).glob(f"*{SUFFIX}"))
 
     @cached_property
@@ -171,7 +172,7 @@ def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
 
 
 def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
-    """Blocks of patches that depend on no earlier ones: a file, or a part of one."""
+    """The blocks of patches that do not depend on earlier ones: a whole file or a part of one."""
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)

@@ -1,4 +1,4 @@
-"""The frozen plan on disk: one line per experiment, read whole or by chunk."""
+"""The frozen plan on disk: one line per experiment, read as a whole or chunk by chunk."""
 
 import json
 import re
@@ -42,15 +42,13 @@ Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiment
 
 
 class SupportsWrite(Protocol):
-    """What lines are written to."""
+    """A file to which lines can be written."""
 
     def write(self, data: bytes, /) -> object: ...
 
 
 class PlanWriter:
-    """Writes experiments, and each fault once, to the given files; `places` has the position of each
-    chunk.
-    """
+    """Write experiments, and each fault once, to the given files; `places` has the position of each chunk."""
 
     def __init__(self, experiments: SupportsWrite, faults: SupportsWrite) -> None:
         self.places: list[Chunk] = []
@@ -59,7 +57,7 @@ class PlanWriter:
         self._offset = 0
 
     def append(self, experiments: Sequence[Experiment], chunks: Iterable[int]) -> None:
-        """Write the experiments of the next chunks, of these lengths."""
+        """Write the experiments of the next chunks; the chunks have these lengths."""
         lines = (canonical(_line(experiment)).encode() + b"\n" for experiment in experiments)
         for count in chunks:
             data = b"".join(islice(lines, count))
@@ -72,7 +70,7 @@ class PlanWriter:
 
 
 def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -> list[Chunk]:
-    """Write the plan's files; returns the position of each chunk."""
+    """Write the plan's files; return the position of each chunk."""
     make_folder(run)
     with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
         writer = PlanWriter(lines, faults)
@@ -81,12 +79,12 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
 
 
 def make_folder(run: Path) -> None:
-    """Make the folder of the plan's files."""
+    """Create the folder of the plan's files."""
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
 
 
-_Lines = Iterable[tuple[int | None, bytes]]  # number, if known, and text
+_Lines = Iterable[tuple[int | None, bytes]]  # line number, if known, and text
 
 
 def _lines(path: Path) -> _Lines:
@@ -94,7 +92,7 @@ def _lines(path: Path) -> _Lines:
 
 
 def _tried(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> Iterator[_T | MutatorError]:
-    """Yield what `made` makes of each line of the plan file at `path`, or the line's problem."""
+    """Yield what `made` returns for each line of the plan file at `path`, or the line's problem."""
     for number, line in lines:
         try:
             yield made(json.loads(line))
@@ -118,7 +116,7 @@ def read_faults(run: Path) -> dict[str, Fault]:
 
 
 def fault_lines(run: Path) -> dict[str, bytes]:
-    """The lines of the plan's faults by id, the digest of the line, without parsing."""
+    """The lines of the plan's faults, unparsed, by id, which is the digest of the line."""
     lines = (line.rstrip(b"\n") for line in lines_of(run / FAULTS))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
@@ -151,7 +149,7 @@ def read_all(run: Path) -> tuple[Experiment, ...]:
 
 
 class ExperimentsInOrder(Sequence[Experiment]):
-    """Every experiment in plan order, read on access, so that a million need no memory."""
+    """Every experiment in plan order, read on access. A plan of a million experiments is never in memory."""
 
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
         self._run, self._chunks = run, chunks
@@ -181,7 +179,7 @@ class ExperimentsInOrder(Sequence[Experiment]):
 
 
 def iterate(run: Path) -> Iterator[Experiment]:
-    """Like `read_all`, one at a time."""
+    """Like `read_all`, but yield one experiment at a time."""
     path = run / EXPERIMENTS
     yield from _experiments(path, _lines(path), read_faults(run))
 
@@ -196,7 +194,7 @@ def lines_of(path: Path) -> Iterator[bytes]:
 
 
 def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
-    """The experiment on a line of the plan file at `path`."""
+    """Read the experiment on a line of the plan file at `path`."""
     [experiment] = _experiments(path, [(number, line)], faults)
     return experiment
 
@@ -214,7 +212,7 @@ def ids(run: Path) -> Iterator[str]:
     path = run / EXPERIMENTS
     for number, line in _lines(path):
         found = _ID.match(line)
-        if found and line.count(b'"id":') == 1:  # as written, with a single id
+        if found and line.count(b'"id":') == 1:  # the line as written, if it contains a single id
             yield found[1].decode()
         else:
             yield from _read(path, [(number, line)], lambda data: str(data["id"]))
@@ -237,7 +235,7 @@ def problems(run: Path) -> Iterator[MutatorError]:
 
 
 def to_plain(experiment: Experiment) -> dict[str, Any]:
-    """An experiment as JSON types, with its fault's id."""
+    """Convert an experiment to JSON types, with its fault's id."""
     return {name: plain(value) for name, value in _line(experiment).items()}
 
 
@@ -256,7 +254,7 @@ def _line(experiment: Experiment) -> dict[str, Any]:
 
 
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    """The experiment on a plan file's line; MutatorError if its id does not match, or for an unknown
+    """Read the experiment on a line of the plan; MutatorError if its id does not match, or for an unknown
     field.
     """
     if data["fault"] not in faults:
@@ -273,7 +271,7 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
         read["after_hazard"] = AfterHazard(data["after_hazard"])
     experiment = _make(Experiment, values, **read)
     if _is_named(data):
-        vars(experiment)["id"] = data["id"]  # what the property would compute and keep
+        vars(experiment)["id"] = data["id"]  # the value that the cached property would compute
     elif experiment.id != data["id"]:
         raise MutatorError(
             f"experiment {data['id']} has the content of {experiment.id}",
@@ -284,9 +282,9 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
 
 
 def _is_named(data: Mapping[str, Any]) -> bool:
-    """Whether the id of a plan file's line matches its content, computed from the plain data.
+    """Whether the id on a line of the plan matches the line's content, computed from the plain data.
 
-    This takes half the time of the experiment's own id. That one handles missing and new fields.
+    This takes half the time of `Experiment.id`, which handles missing and new fields.
     """
     if data.keys() != _FIELDS or data["trigger"].keys() != _known(Trigger):
         return False
@@ -294,7 +292,7 @@ def _is_named(data: Mapping[str, Any]) -> bool:
 
 
 def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
-    """The canary in the run.json at `head`; MutatorError if it is damaged."""
+    """Read the canary in the run.json at `head`; MutatorError if it is damaged."""
     try:
         fault = fault_from(data["fault"])
         return experiment_from({**data, "fault": fault.id}, {fault.id: fault})
@@ -303,7 +301,7 @@ def canary_from(head: Path, data: Mapping[str, Any]) -> Experiment:
 
 
 def fault_from(data: Mapping[str, Any]) -> Fault:
-    """The fault on a plan file's line; MutatorError for an unknown field."""
+    """Read the fault on a line of the plan; MutatorError for an unknown field."""
     return _make(
         Fault,
         data,
@@ -326,9 +324,7 @@ def _injection_from(data: Mapping[str, Any]) -> Injection:
 
 
 def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """A record from its line; some values were `read` already. Fields that the line lacks have their
-    defaults.
-    """
+    """Create a record from its line; some values were `read` already. Missing fields get their defaults."""
     if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
         raise MutatorError(
             f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",

@@ -1,4 +1,4 @@
-"""Read lines of the plan, including ids, from their bytes without parsing JSON."""
+"""Read experiments and their ids from plan lines, without parsing a whole line as JSON."""
 
 import json
 import re
@@ -18,9 +18,9 @@ _FIELDS = {field.name for field in fields(Trigger)}
 
 
 def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experiment | None:
-    """The experiment on a line in canonical JSON.
+    """Read the experiment on a line in canonical JSON.
 
-    None for any other line, or if the id does not match; the general reader handles those.
+    Return None for any other line, or if the id does not match. The general reader handles those.
     """
     if not (found := _LINE.fullmatch(line)):
         return None
@@ -41,7 +41,7 @@ def experiment_as_written(line: bytes, faults: Mapping[str, Fault]) -> Experimen
         )
     except (ValueError, LookupError, TypeError):
         return None
-    vars(experiment)["id"] = name.decode()  # what the property would compute and keep
+    vars(experiment)["id"] = name.decode()  # the value that the cached property would compute
     return experiment
 
 

@@ -14,9 +14,9 @@ _ID = re.compile(rb'"id":"([^"\\]+)"')
 
 
 class Planned(Mapping[str, Experiment]):
-    """Those of the run folder at `run`, in plan order.
+    """The experiments of the run folder at `run`, in plan order.
 
-    MutatorError on access for a line that is damaged or does not match its id.
+    Reading a line that is damaged or does not match its id raises MutatorError.
     """
 
     def __init__(self, run: Path) -> None:
@@ -46,7 +46,7 @@ class Planned(Mapping[str, Experiment]):
 
 
 def _id(line: bytes) -> str | None:
-    """The id on a line, or None; such a line is reported on access."""
+    """The id on a line; None if it cannot be read, which is reported when the line is read."""
     if found := _ID.search(line):
         return found[1].decode()
     try:

@@ -1,4 +1,4 @@
-"""The progress of a run: stage, share done, rate, remaining time."""
+"""The progress of a run: stage, completed steps, rate and remaining time."""
 
 import json
 import time
@@ -14,16 +14,16 @@ class Progress:
     """The progress of a run in its current stage."""
 
     stage: str  #: `plan`, `checks`, `golden`, `experiments`, `proof`, `tables`, `pictures` or `report`
-    detail: str = ""  #: what the stage is working on
-    done: int = 0  #: finished steps of the stage
-    total: int = 0  #: steps of the stage; 0: nothing to count
-    outcomes: Counter[str] = field(default_factory=Counter)  #: how many experiments ended how
+    detail: str = ""  #: the step on which the stage is working
+    done: int = 0  #: completed steps of the stage
+    total: int = 0  #: total steps of the stage; 0: nothing to count
+    outcomes: Counter[str] = field(default_factory=Counter)  #: number of experiments by outcome or status
     per_s: float | None = None  #: steps per second since the stage began
-    remaining_s: float | None = None  #: estimated time to the end of the stage in s
+    remaining_s: float | None = None  #: estimated time in s to the end of the stage
 
 
 class Pace:
-    """Measures the rate of a stage from now on; `done` of `total` steps were done before."""
+    """Measure the rate of a stage from now on; `done` of `total` steps were completed before."""
 
     def __init__(self, stage: str, total: int, done: int = 0) -> None:
         self._stage, self._total, self._before = stage, total, done
@@ -45,7 +45,7 @@ class Pace:
 
 
 class Tail:
-    """Follows the records of a run as they are appended, reading each byte once."""
+    """Follow the records of a run as workers append them, reading each byte once."""
 
     def __init__(self, stage: str, folder: Path, total: int) -> None:
         self._folder = folder
@@ -76,10 +76,10 @@ class Tail:
             name = label(data["status"], data["outcome"])
             if name != Status.HARNESS_ERROR or data["experiment_id"] not in self._labels:
                 self._labels[data["experiment_id"]] = name
-        except (ValueError, KeyError):  # a head, or damage that read_records reports
+        except (ValueError, KeyError):  # a head, or damage that `read_records` reports
             return
 
 
 def label(status: str, outcome: str | None) -> str:
-    """What Progress counts: the outcome if there is one, else the status."""
+    """The label under which Progress counts an experiment: its outcome or, without one, its status."""
     return str(outcome or status)

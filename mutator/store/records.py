@@ -1,4 +1,4 @@
-"""Records on disk: appended by workers, one file each, and readable after any kill."""
+"""Records on disk. Each worker appends to its own file, which is readable after any kill."""
 
 import json
 import re
@@ -14,17 +14,17 @@ from mutator.store.indexed_lines import IndexedLines, Line
 SCHEMA = "records/2"
 TIMINGS_SCHEMA = "timings/2"
 _NAMES = tuple(field.name for field in fields(Record))
-_RECORDS = ("activation", "error")  # fields that are records themselves
+_RECORDS = ("activation", "error")  # fields that contain records
 
 
 def line_of(record: Record) -> dict[str, Any]:
-    """A record as in its line: `asdict` without copying every tuple."""
+    """Convert a record to its line's content: `asdict` without a copy of every tuple."""
     line = {name: getattr(record, name) for name in _NAMES}
     return line | {name: asdict(line[name]) for name in _RECORDS if line[name] is not None}
 
 
 def record_from(data: Mapping[str, Any]) -> Record:
-    """The record of a parsed line."""
+    """Create the record from a parsed line."""
     activation = data["activation"]
     return Record(
         experiment_id=str(data["experiment_id"]),
@@ -61,20 +61,20 @@ class Ending(NamedTuple):
 
     @property
     def counts(self) -> bool:
-        """Whether the experiment is done: a harness error is tried again."""
+        """Whether the experiment is finished. A harness error does not count, because it is retried."""
         return self.status != Status.HARNESS_ERROR.value
 
 
-# in canonical JSON; within a text the quotation marks would be escaped
+# this pattern is canonical JSON; within a text its quotation marks would be escaped
 _NAME, _OUTCOME = b'"experiment_id":"', b'"outcome":'
 _END = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
 _ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
 
 
 def ending_on(line: bytes) -> Ending:
-    """The ending on a record's line, ten times as fast as the whole record.
+    """Read the ending from a record's line, ten times as fast as the whole record.
 
-    Raises ValueError and others, as `json.loads` and missing keys do.
+    It raises ValueError, and the errors that `json.loads` and missing keys raise.
     """
     begin = line.find(_NAME) + len(_NAME)
     found = _END.match(line, line.find(_OUTCOME))
@@ -88,7 +88,7 @@ def ending_on(line: bytes) -> Ending:
 
 
 def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
-    """How each experiment ended."""
+    """Read how each experiment ended."""
     for name in records:
         if isinstance(records, IndexedLines):
             line = records.line(name)
@@ -102,7 +102,7 @@ def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
 
 
 def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
-    """The final record of each experiment that has one; torn last lines are skipped.
+    """The final record of each experiment that has one; a torn last line is skipped.
 
     Any other record supersedes a harness error. MutatorError for a damaged line and for a second record of
     one experiment; CheckFailed if the two differ.
@@ -122,13 +122,13 @@ def _replaces(line: Line, known: Line) -> bool:
 
 
 def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str, Any]]:
-    """The newest line of timings of each experiment that has one."""
+    """The newest timing line of each experiment that has one."""
     paths = sorted((run / "timings").glob("*.jsonl"))
     return IndexedLines(paths, TIMINGS_SCHEMA, dict, lambda line, known: True, checksums=checksums)
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
-    """The error about a second final record of an experiment."""
+    """Return the error about a second final record of an experiment."""
     if same:
         return MutatorError(
             f"a second record of experiment {experiment_id}",

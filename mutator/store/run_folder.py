@@ -1,4 +1,4 @@
-"""The run folder: everything a campaign was given and everything it produced.
+"""The run folder: everything a campaign was given, and everything it produced.
 
 DIR/
   digests.json          size and SHA-256 of every file that counts
@@ -44,11 +44,11 @@ from mutator.store.stretches import Stretch, read_stretches
 from mutator.targets.severity import Scale
 
 STOP_NOTE = "Runs end at their first terminal hazard: hazards and alerts after it were not seen."
-SERIES_MB = 500  # of a run, unless planned with another number
-_LOOKS = 3  # attempts to read a folder while its owner writes
+SERIES_MB = 500  # budget of a run's series, unless the plan sets another
+_LOOKS = 3  # attempts to read a folder that its owner is writing
 SCRATCH = "work"
 _TABLES = ("results", "propagation", "timings")
-CONTENT = (  # all possible content of a run folder; * stands for any text, including folders
+CONTENT = (  # all files that a run folder may contain; * stands for any text, including folders
     *(HEAD, digests.FILE, "campaign.yaml", "plan.csv", "plan/*.jsonl", "reviewed.json", "checks.json"),
     *(
         "golden/*/*",
@@ -71,7 +71,7 @@ CONTENT = (  # all possible content of a run folder; * stands for any text, incl
 
 
 class GoldenRun(NamedTuple):
-    """A fault-free run: its scenario with changes, and its seed if a run has several (None: the run's
+    """A fault-free run: its scenario with changes, and, if a run has several seeds, its seed (None: the run's
     seed).
     """
 
@@ -81,29 +81,29 @@ class GoldenRun(NamedTuple):
 
     @classmethod
     def of(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
-        """The golden run that an experiment is compared with."""
+        """The golden run with which an experiment is compared."""
         return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
 
     @property
     def key(self) -> str:
-        """Its name: `S1`, `S1+alone`, `S1+alone@7` with seed 7."""
+        """The run's name: `S1`, `S1+alone`, or `S1+alone@7` with seed 7."""
         name = "+".join((self.scenario, *self.changes))
         return name if self.seed is None else f"{name}@{self.seed}"
 
     @classmethod
     def from_plain(cls, told: Sequence[Any]) -> "GoldenRun":
-        """One from run.json."""
+        """Read a golden run from run.json."""
         scenario, changes, *seed = told
         return cls(scenario, tuple(changes), *seed)
 
     def plain(self) -> list[Any]:
-        """As in run.json."""
+        """The golden run as stored in run.json."""
         return [self.scenario, list(self.changes), *([] if self.seed is None else [self.seed])]
 
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Paths and head of a run folder."""
+    """The paths and the head of a run folder."""
 
     path: Path
 
@@ -111,8 +111,8 @@ class RunFolder:
     def open(cls, path: Path) -> "RunFolder":
         """Open and verify an existing run folder.
 
-        MutatorError if there is none, it has a newer schema, or anything in it is damaged, missing or not in
-        its plan.
+        MutatorError if there is none, if it has a newer schema, or if anything in it is damaged, missing or
+        not in its plan.
         """
         folder = cls.unverified(path)
         for problem in folder.problems():
@@ -131,7 +131,7 @@ class RunFolder:
             )
         folder = cls(path.resolve())
         check_is_text(folder.path)
-        _ = folder.head  # read now, so that a wrong schema fails here
+        _ = folder.head  # read it here, so that a wrong schema fails early
         return folder
 
     @staticmethod
@@ -140,7 +140,8 @@ class RunFolder:
         return (path / HEAD).is_file()
 
     def problems(self, *, anew: bool = False) -> list[MutatorError]:
-        """All differences from what was written; folders of earlier schemas cannot detect all.
+        """Yield all differences from what was written. In folders of earlier schemas, not every change can be
+        detected.
 
         With `anew`, earlier verifications are ignored (`verified_runs`).
         """
@@ -163,12 +164,12 @@ class RunFolder:
 
     @property
     def verifiable(self) -> bool:
-        """Whether it has digests and checksums, unlike folders of earlier schemas."""
+        """Whether the folder has digests and checksums, which earlier schemas do not have."""
         return bool(self.head["schema"] != FIRST_SCHEMA)
 
     @property
     def finished(self) -> bool:
-        """Whether every experiment has a record that counts, and the proof is complete."""
+        """Whether every experiment has a record that counts, and the equivalence check is complete."""
         return self.verifiable and digests.read(self.path).finished
 
     @cached_property
@@ -185,11 +186,11 @@ class RunFolder:
 
     @property
     def stretches(self) -> tuple[Stretch, ...]:
-        """What each session that ran anything used, oldest first."""
+        """The software and machine of each session that ran anything, oldest first."""
         return read_stretches(self.head)
 
     def stretch_of(self, experiment_id: str) -> Stretch | None:
-        """The newest stretch of work with a record of an experiment."""
+        """The newest stretch of work that has a record of an experiment."""
         files = self.path / "records"
         for stretch in reversed(self.stretches):
             for path in files.glob(f"{stretch.records}.jsonl"):
@@ -199,7 +200,7 @@ class RunFolder:
 
     @property
     def planned(self) -> int:
-        """The number of experiments planned for this folder: of its shard, or all."""
+        """The number of experiments planned for this folder: those of its shard, or all."""
         shard = self.shard
         if shard is None:
             return int(self.head["experiments"])
@@ -207,8 +208,8 @@ class RunFolder:
 
     @property
     def shard(self) -> Shard | None:
-        """The share of the plan that runs here; None: all of it."""
-        text = self.head["choices"].get("shard")  # missing in runs older than shards
+        """The share of the plan that runs in this folder; None: all of it."""
+        text = self.head["choices"].get("shard")  # runs from before shards do not have this key
         return Shard.parse(text) if text else None
 
     @property
@@ -217,49 +218,49 @@ class RunFolder:
 
     @property
     def scale(self) -> Scale | None:
-        """The scale of delta-v classes; None for a target without contacts, and in older runs."""
+        """The scale of delta-v classes; None in older runs, and for a target without contacts."""
         told = self.head.get("severity")
         return Scale.from_plain(told) if told else None
 
     @property
     def series_mb(self) -> int:
         """The budget of series in MB."""
-        chosen = self.head["choices"].get("series_mb")  # missing in earlier runs
+        chosen = self.head["choices"].get("series_mb")  # earlier runs do not have this key
         return SERIES_MB if chosen is None else int(chosen)
 
     @property
     def has_alerts(self) -> bool:
-        """Whether the target has alerts; True for an old folder, which does not say."""
+        """Whether the target has alerts. True for an old folder, which does not record it."""
         return bool(self.head.get("alerts", True))
 
     @property
     def stop_note(self) -> str:
-        """A note about runs that end at their first terminal hazard; empty if they go on."""
+        """A note about runs that end at their first terminal hazard; empty if they continue after it."""
         stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
         return STOP_NOTE if stops else ""
 
     @property
     def seeds(self) -> range:
-        """The seed of all draws, or several."""
+        """The seeds of all draws, one or several."""
         first, last = self.head.get("seeds", (self.head["seed"], self.head["seed"]))
         return range(first, last + 1)
 
     @cached_property
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run needed."""
+        """Every fault-free run that the campaign needs."""
         return tuple(map(GoldenRun.from_plain, self.head["goldens"]))
 
     @property
     def scenarios(self) -> set[str]:
-        """The scenarios that are run."""
+        """The scenarios of the campaign."""
         return {one.scenario for one in self.goldens}
 
     def golden_of(self, experiment: Experiment) -> GoldenRun:
-        """The fault-free run that an experiment is compared with."""
+        """The fault-free run with which an experiment is compared."""
         return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
 
     def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        """Folder with trace and record of a fault-free run."""
+        """The folder of a fault-free run's trace and record."""
         return self.path / "golden" / GoldenRun(scenario, changes, seed).key
 
     def golden_folder(self, experiment: Experiment) -> Path:
@@ -268,13 +269,14 @@ class RunFolder:
 
     @cached_property
     def patches(self) -> Patches:
-        """The source diffs of the experiments that ran."""
+        """The source diffs of experiments that have run."""
         return Patches(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
-        """The stored diff of an experiment with that record; None if it has not run, or had no mutant.
+        """The stored diff of an experiment with that record; None if the experiment has not run, or had no
+        mutant.
 
-        MutatorError if it is missing, or is not the one in the record.
+        MutatorError if the diff is missing or does not match the record.
         """
         if self.verifiable:
             if record is None or not record.patch:
@@ -284,34 +286,38 @@ class RunFolder:
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
-        """The records of the experiments, or of the `proof`, by experiment id; parsed on access."""
+        """The records of the experiments or, with `proof`, of the equivalence check, by experiment id; parsed
+        on access.
+        """
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:
-        """A current record as this folder would store it: earlier schemas have no patches."""
+        """A current record in the form in which this folder stores it: earlier schemas have no patches."""
         return record if self.verifiable else replace(record, patch="")
 
     def timings(self) -> Mapping[str, dict[str, Any]]:
-        """The cost of each experiment and where it ran: its newest line, by experiment id; like `records`."""
+        """The newest timing line of each experiment: what it cost and where it ran. By experiment id; parsed
+        like `records`.
+        """
         return read_timings(self.path, checksums=self.verifiable)
 
     @property
     def canary(self) -> Experiment:
-        """The experiment that must reach its hazard before the campaign starts."""
+        """The experiment that must cause its hazard before the campaign starts."""
         return plan_file.canary_from(self.path / HEAD, self.head["canary"])
 
     def share(self) -> dict[str, int]:
-        """Ids and positions of the experiments that run here, in plan order."""
+        """The ids and positions of the experiments that run in this folder, in plan order."""
         return integrity.share(self.path, self.head, self.shard)
 
     @property
     def work(self) -> Path:
-        """Scratch, which may be deleted while nobody owns the folder."""
+        """Scratch folder. It may be deleted while no command owns the run folder."""
         return self.path / SCRATCH
 
     @property
     def base(self) -> Path:
-        """The pristine tree from which runs are made."""
+        """The unmodified copy of the tree from which runs are created."""
         return self.work / "base"
 
     def find(self, prefix: str) -> str:

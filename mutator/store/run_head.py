@@ -1,4 +1,4 @@
-"""Read and check `run.json`; damage is reported by its key, whichever version wrote it."""
+"""Read and check `run.json`. Damage is reported by its key, whichever version wrote the file."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import fields
@@ -11,7 +11,7 @@ from mutator._common.places import RUN_HEAD
 from mutator.errors import MutatorError
 from mutator.model import Limits
 
-SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first one had neither digests nor checksums
+SCHEMA, FIRST_SCHEMA = "run/3", "run/1"  # the first schema had neither digests nor checksums
 HEAD, CAMPAIGN = RUN_HEAD, "campaign.yaml"
 REMEDY = "the run folder is damaged: take the file from a copy of it"
 _TEXTS = {str: str}
@@ -29,7 +29,7 @@ _STRETCH = {
     "accepted": [str],
     "machines": [{"worker": str, "host": str, "python": str, "platform": str}],
 }
-_LATER = {"machines"}  # missing in older folders
+_LATER = {"machines"}  # older folders do not have these keys
 _SHAPES: dict[str, Any] = {
     "plan": str,
     "campaign": str,
@@ -60,11 +60,11 @@ _SHAPES: dict[str, Any] = {
     "stretches": [_STRETCH],
     "chunks": [[int]],
 }
-_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # of each item
+_SIZES = {"goldens": (2, 3), "chunks": (3,), "metrics": (4,), "channels": (5,)}  # allowed lengths of each item
 
 
 class Head(dict[str, Any]):
-    """The content of a run.json; MutatorError for a missing key."""
+    """The content of a run.json; reading a missing key raises MutatorError."""
 
     def __init__(self, path: Path, content: Mapping[str, Any]) -> None:
         super().__init__(content)

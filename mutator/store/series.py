@@ -18,7 +18,7 @@ from mutator.store.series_script import name_of, read_script, write_script
 
 SCHEMA, FOLDER, KEPT = "series/1", "series", "kept"
 INDEX = "index"
-_ID = 16  # hex digits of an experiment's id
+_ID = 16  # hex digits of an experiment id
 _LENGTH = struct.Struct("<I")
 
 
@@ -27,9 +27,9 @@ class Index:
     """The content of `series/index.js`.
 
     * `chunks`: (name, number of entries); `sizes`: the bytes of each entry, in order
-    * `goldens`, `entries`: the entry of each golden run and experiment
+    * `goldens`, `entries`: the number of the entry of each golden run and each experiment
     * `golden_of`: the golden run of each experiment
-    * `left_out`: how many experiments ended well but have no series, mostly because of `budget_mb`
+    * `left_out`: how many experiments ended normally but have no series, mostly because of `budget_mb`
     """
 
     plan: str
@@ -42,7 +42,9 @@ class Index:
     budget_mb: int
 
     def plain(self) -> dict[str, Any]:
-        """As JSON types: ids joined in one text, by worth; entries as differences from the previous one."""
+        """The index as JSON types: ids joined into one text, ordered by worth; each entry as a difference
+        from the previous one.
+        """
         names, numbers = list(self.goldens), [*self.entries.values()]
         return {
             "schema": SCHEMA,
@@ -59,7 +61,7 @@ class Index:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Index":
-        """The inverse of `plain`."""
+        """Create an index from the result of `plain`."""
         text, names = data["ids"], list(data["goldens"])
         ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
         golden_of = (names[code] for code in data["golden_of"])
@@ -76,7 +78,7 @@ class Index:
 
     @cached_property
     def places(self) -> list[tuple[str, int]]:
-        """The chunk of each entry, and its start there."""
+        """The chunk of each entry, and where the entry starts in it."""
         found, number = [], 0
         for name, count in self.chunks:
             sizes = self.sizes[number : number + count]
@@ -86,7 +88,7 @@ class Index:
 
 
 class SeriesFolder:
-    """Reads the series of the run folder at `run`."""
+    """Read the series of the run folder at `run`."""
 
     def __init__(self, run: Path) -> None:
         self.path = run / FOLDER
@@ -95,7 +97,7 @@ class SeriesFolder:
 
     @cached_property
     def index(self) -> Index | None:
-        """The index of series; None if none were packed. MutatorError if damaged."""
+        """The index of series; None if no series were packed. MutatorError if it is damaged."""
         return read_index(self.path / f"{INDEX}.js") if self.is_packed else None
 
     @property
@@ -116,12 +118,12 @@ class SeriesFolder:
             return False
 
     def kept_ids(self) -> list[str]:
-        """The experiments whose series are in separate files."""
+        """The experiments that have a series in a separate file."""
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """(golden, faulty) of an experiment; None without a series. MutatorError for damage, with the
-        repairing command.
+        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage, with the
+        command that repairs it.
         """
         try:
             return self._read(experiment_id)
@@ -159,7 +161,7 @@ class SeriesFolder:
         return data
 
     def kept(self, experiment_id: str) -> Path:
-        """The file of a series made by a rerun."""
+        """The file of the series that a rerun of an experiment wrote."""
         return self.path / KEPT / f"{experiment_id}.js"
 
 
@@ -175,7 +177,7 @@ def putting_aside(run: Path) -> str:
 
 
 def read_index(path: Path) -> Index:
-    """Read an index; MutatorError if damaged."""
+    """Read an index; MutatorError if it is damaged."""
     remedy = putting_aside(path.parent.parent)
     try:
         data = json.loads(gzip.decompress(read_script(path)))
@@ -191,7 +193,7 @@ def read_index(path: Path) -> Index:
 
 
 def write_index(path: Path, index: Index) -> None:
-    """Write an index, with the same bytes for equal ones."""
+    """Write an index; equal indexes give equal bytes."""
     text = canonical(index.plain()).encode()
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
 
@@ -203,7 +205,7 @@ def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
 
 
 def read_kept(path: Path) -> tuple[Series, Series]:
-    """(golden, faulty) in such a file; MutatorError if damaged."""
+    """Read (golden, faulty) from such a file; MutatorError if it is damaged."""
     data = read_script(path)
     try:
         (length,) = _LENGTH.unpack_from(data)

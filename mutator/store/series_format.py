@@ -1,7 +1,7 @@
-"""The bytes of a run's series, `series/1`: channels on common times, single precision, compressed.
+"""The byte format of a run's series, `series/1`: channels at common times, single precision, compressed.
 
-A faulty run keeps only channels that differ from its golden run, as the number of single-precision values in
-between. The second differences over time are stored in byte planes and compressed; see
+For a faulty run, only channels that differ from its golden run are stored, as the number of single-precision
+values in between. The second differences over time are split into byte planes and compressed; see
 docs/reference/formats.md.
 """
 
@@ -26,7 +26,7 @@ _EMPTY: np.ndarray = np.empty(0)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Values at steps between the common times: channel number, time (s), both runs' values."""
+    """Values at steps between the common times: channel number, time (s) and the values of both runs."""
 
     channel: np.ndarray = field(default_factory=lambda: _EMPTY.astype(int))
     t: np.ndarray = field(default_factory=lambda: _EMPTY)
@@ -36,10 +36,11 @@ class Points:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Series:
-    """A run on common times `t` (s).
+    """A run at common times `t` (s).
 
-    `rows` has the values of each channel in single precision (NaN: none), at every n-th time with n from
-    `every`. `about` is plain data. `points` are a faulty run's values between these times.
+    `rows` has the values of each channel in single precision (NaN: no value). `every` gives n for each
+    channel: it has a value at every n-th time. `about` is plain data. `points` are a faulty run's values
+    between these times.
     """
 
     t: np.ndarray
@@ -49,14 +50,14 @@ class Series:
     points: Points = field(default_factory=Points)
 
     def times(self, channel: int) -> np.ndarray:
-        """The times (s) of a channel's values."""
+        """The times (s) at which a channel has values."""
         return self.t[:: self.every[channel]]
 
 
 def encode(one: Series, golden: Series | None = None) -> bytes:
-    """Encode a run, always with the same bytes; without `golden`, a golden run.
+    """Encode a run; the same run always gives the same bytes. Without `golden`, it is a golden run.
 
-    The times of a faulty run begin with those of `golden`.
+    The times of a faulty run begin like those of `golden`.
     """
     known = 0
     if golden is not None and len(one.t):
@@ -84,7 +85,7 @@ def encode(one: Series, golden: Series | None = None) -> bytes:
 
 
 def decode(data: bytes, golden: Series | None = None) -> Series:
-    """Decode a run that was encoded with `golden`; MutatorError if damaged."""
+    """Decode a run that was encoded with `golden`; MutatorError if the bytes are damaged."""
     try:
         return _decode(gzip.decompress(data), golden)
     except (ValueError, LookupError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:
@@ -115,7 +116,7 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
 
 
 def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> Iterator[np.ndarray]:
-    """Yield the reference values of each channel: none after the end of golden."""
+    """Yield the reference values of each channel; there are none after the end of the golden run."""
     for channel, length in enumerate(lengths):
         row = np.full(length, np.nan, dtype="<f4")
         if golden is not None:
@@ -125,7 +126,7 @@ def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> It
 
 
 def _ordered(values: np.ndarray) -> np.ndarray:
-    """Integers in the order of the values: neighbouring floats differ by 1."""
+    """Map floats to integers in the same order; neighbouring floats differ by 1."""
     words: np.ndarray = values.view("<i4")
     ordered: np.ndarray = words ^ ((words >> 31) & _BELOW_SIGN)
     return ordered
@@ -137,7 +138,7 @@ def _unordered(numbers: np.ndarray) -> np.ndarray:
 
 
 def _words(numbers: np.ndarray) -> np.ndarray:
-    """Second differences of the numbers (modulo 2^32), as words that are small for small values of either
+    """The second differences of the numbers (modulo 2^32), as words that are small for small values of either
     sign.
     """
     steps = np.diff(numbers, n=2, prepend=np.zeros(2, dtype="<i4"))

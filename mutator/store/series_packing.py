@@ -1,6 +1,6 @@
-"""Pack what workers appended into the chunks of a run's series, the best by worth as far as the budget goes.
+"""Pack the series that workers appended into a run's chunks, the highest worth first, up to the budget.
 
-The same experiments with the same worth result in the same files, whatever the workers and order.
+The same experiments with the same worth give the same files, independent of the workers and their order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -14,7 +14,7 @@ from mutator.store.blocks import BlockWriter, read_blocks
 from mutator.store.series import FOLDER, INDEX, Index, SeriesFolder, write_index
 from mutator.store.series_script import name_of, size_in_script, write_script
 
-SUFFIX = ".blocks"  # of the workers' files in series/
+SUFFIX = ".blocks"  # suffix of the workers' files in series/
 GOLDEN, EXPERIMENT = 0, 1  # kinds of blocks
 CHUNK_BYTES = 256_000  # of a chunk's content without its last entry: a page loads it in about 30 ms
 _MB = 1_000_000
@@ -22,7 +22,7 @@ _MB = 1_000_000
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EncodedSeries:
-    """The bytes of an experiment's series, and of the golden run `key` that it refers to."""
+    """The bytes of an experiment's series, and of the golden run `key` to which it refers."""
 
     key: str
     golden: bytes
@@ -30,7 +30,7 @@ class EncodedSeries:
 
 
 class SeriesWriter:
-    """Appends a worker's series, with each golden run once."""
+    """Append a worker's series, and each golden run once."""
 
     def __init__(self, run: Path, worker: str) -> None:
         self._path = run / FOLDER / f"{worker}{SUFFIX}"
@@ -42,17 +42,17 @@ class SeriesWriter:
         self._writer().append(*series_block(experiment_id, one))
 
     def add_golden(self, key: str, golden: Callable[[], bytes]) -> None:
-        """Append the series of a golden run, made by `golden`, unless present."""
+        """Append the series of a golden run, which `golden` returns, unless it is there already."""
         if key not in self._known:
             self._writer().append(GOLDEN, key, golden())
             self._known.add(key)
 
     def extend(self, blocks: bytes) -> None:
-        """Append blocks of `series_block` made elsewhere, whose golden runs were added."""
+        """Append blocks that `series_block` built elsewhere, after the golden runs that they need."""
         self._writer().extend(blocks)
 
     def sync(self) -> None:
-        """Make sure that what was appended survives a power cut."""
+        """Sync the file, so that appended series survive a power cut."""
         if self._blocks is not None:
             self._blocks.sync()
 
@@ -67,7 +67,7 @@ class SeriesWriter:
 
 
 def series_block(experiment_id: str, one: EncodedSeries) -> tuple[int, str, bytes]:
-    """Kind, key and content of the block of an experiment's series."""
+    """The kind, key and content of the block for an experiment's series."""
     return EXPERIMENT, f"{experiment_id} {one.key}", one.faulty
 
 
@@ -77,7 +77,7 @@ Worth = Mapping[str, Any]  # experiment -> sort key, best first
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
-    """Bytes stored somewhere: their digest, size in a script, and how to read them."""
+    """Stored bytes: their digest, their size in a script, and a function that reads them."""
 
     digest: str
     size: int
@@ -86,7 +86,7 @@ class _Entry:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Everything to pack: entries of golden runs, and of experiments with their golden runs."""
+    """Everything to pack: the entries of golden runs, and those of experiments with their golden runs."""
 
     goldens: dict[str, _Entry]
     experiments: dict[str, tuple[str, _Entry]]
@@ -97,15 +97,15 @@ class _Found:
 
 
 def segments(run: Path) -> list[Path]:
-    """Files of workers that are not packed yet."""
+    """The workers' files that are not packed yet."""
     return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
 
 
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
     """Pack the series of a run folder, and those of the run folders `others`.
 
-    `worth` has every experiment that ended well. Damaged series are left out. It can be repeated after a
-    kill.
+    `worth` has every experiment that ended normally. Damaged series are left out. After a kill, you can pack
+    again.
     """
     appended = segments(run)
     if not appended and not others:
@@ -124,7 +124,7 @@ def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Pa
 
 
 def pack_again(run: Path, index: Index) -> None:
-    """Repack the content of `index` without damaged and missing parts. Files of workers stay."""
+    """Repack the content of `index`, without damaged and missing parts. The workers' files stay."""
     worth = {name: place for place, name in enumerate(index.entries)}
     found = _packed(SeriesFolder(run))
     ended = len(worth) + index.left_out
@@ -139,7 +139,7 @@ def _remove_others(run: Path, index: Index) -> None:
 
 
 def _packed(folder: SeriesFolder) -> _Found:
-    """What was packed before, without damaged chunks."""
+    """The series that were packed before, without damaged chunks."""
     found = _Found({}, {})
     try:
         index = folder.index
@@ -162,7 +162,7 @@ def _packed(folder: SeriesFolder) -> _Found:
 
 
 def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
-    """Keys by entry number: runs with the same bytes share one entry."""
+    """The keys of each entry number. Runs with equal bytes share an entry."""
     found: dict[int, list[str]] = {}
     for name, number in entries.items():
         found.setdefault(number, []).append(name)
@@ -170,7 +170,7 @@ def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
 
 
 def _appended(path: Path) -> _Found:
-    """What a worker appended, without damaged blocks."""
+    """The series that a worker appended, without damaged blocks."""
     found = _Found({}, {})
     for block in read_blocks(path).blocks:
         read = _reader(path, block.offset, len(block.data))
@@ -197,7 +197,7 @@ def _reader(path: Path, offset: int, length: int) -> Read:
 
 
 def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: int, ended: int) -> Index:
-    """Write the chunks, then the index; `ended` experiments ended well."""
+    """Write the chunks, then the index; `ended` is the number of experiments that ended normally."""
     kept = _kept(found, worth, budget_mb * _MB)
     golden_of = {name: found.experiments[name][0] for name in kept}
     goldens = {name: found.goldens[name] for name in sorted({*golden_of.values()})}
@@ -220,7 +220,7 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
 
 
 def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
-    """The experiments, best first, whose series fit into `budget` bytes together with their golden runs.
+    """The experiments, best first, that fit into `budget` bytes together with their golden runs.
 
     One that does not fit in one session does not fit in any later one.
     """
@@ -248,7 +248,7 @@ def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
 
 
 def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list[int]]]:
-    """Write entries into chunks; yields name and sizes of each chunk."""
+    """Write entries into chunks; yield the name and entry sizes of each chunk."""
     parts: list[bytes] = []
     for entry in entries:
         parts.append(entry.read())

@@ -1,7 +1,8 @@
-"""Bytes in a script that a page opened from a disk can load, with little overhead.
+"""Store bytes in a script that a page opened from disk can load, with little overhead.
 
-Such a page cannot fetch or read a file, but it can run one. So the file is a call with a string argument, one
-character per byte, loaded as `x-user-defined`, the encoding in which each byte is a character.
+Such a page cannot fetch or read files, but it can run scripts. The file is therefore a call with a string
+argument that has one character per byte. The page loads it as `x-user-defined`, an encoding in which each
+byte is a character.
 """
 
 import re
@@ -20,12 +21,12 @@ NAME_LENGTH = 16  # hex digits of the SHA-256 in a file's name
 
 
 def name_of(data: bytes) -> str:
-    """A name from the content."""
+    """The file name for this content."""
     return digest(data)[:NAME_LENGTH]
 
 
 def size_in_script(data: bytes) -> int:
-    """The size of `data` in a script."""
+    """The size of `data` once written in a script."""
     return len(data) + sum(map(data.count, _ESCAPED))
 
 

@@ -12,8 +12,9 @@ from mutator.errors import MutatorError
 class Stretch:
     """What one session ran with.
 
-    `python` and `packages` must stay the same during a run, unless other versions are accepted and listed in
-    `accepted`. The rest is only recorded: golden runs show whether machines compute alike. None: not known.
+    `python` and `packages` must stay the same during a run, unless the user accepts other versions, which
+    `accepted` lists. The other fields are only recorded: golden runs show whether machines compute the same
+    results.
     """
 
     python: str  # CPython 3.11.7
@@ -24,7 +25,7 @@ class Stretch:
     threads: Mapping[str, str] = field(default_factory=dict)  # in the environment of the target's process
     # `commit` and `changed` of the git clones of mutator, library, templates and target
     git: Mapping[str, Mapping[str, Any]] | None = None
-    records: str = "*"  # glob of its files in records/, timings/ and proof/, without suffix
+    records: str = "*"  # glob of the session's files in records/, timings/ and proof/, without suffix
     accepted: Sequence[str] = ()  # differences of Python and packages from the previous stretch
     # workers on other machines: `worker`, `host`, `mutator`, `python`, `platform`, `cpu`, `blas`, `packages`
     machines: Sequence[Mapping[str, Any]] = added(())
@@ -35,7 +36,7 @@ class Stretch:
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """Those of a run.json, oldest first. An old one has one: that of its planning."""
+    """The stretches of work in a run.json, oldest first. An old run.json has only that of its planning."""
     if "stretches" not in head:
         planned = head["provenance"]
         return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)
@@ -48,7 +49,7 @@ def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
 
 
 def differences(before: Stretch, python: str, packages: Mapping[str, str | None]) -> tuple[str, ...]:
-    """How Python and packages differ here from a stretch: `numpy 1.26.4, here 2.1.0`."""
+    """List the differences between a stretch and this Python and packages: `numpy 1.26.4, here 2.1.0`."""
     found = [] if before.python == python else [f"{before.python}, here {python}"]
     for name in sorted(before.packages.keys() | packages):
         old, new = before.packages.get(name), packages.get(name)
@@ -58,7 +59,7 @@ def differences(before: Stretch, python: str, packages: Mapping[str, str | None]
 
 
 def told(stretches: Iterable[Stretch]) -> dict[str, str]:
-    """What stretches ran with, for people; several values are listed, oldest first."""
+    """The software and machines of stretches, as text for people; several values are listed, oldest first."""
     found: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, text in _texts(stretch).items():
@@ -85,7 +86,7 @@ def _blas_text(library: Mapping[str, Any]) -> str:
 
 
 def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
-    """Version of each package that stretches ran with; several are listed."""
+    """The version of each package in these stretches; if there are several, all are listed."""
     found: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, version in stretch.packages.items():

@@ -1,8 +1,8 @@
-"""Cache of finished runs that this machine has verified, keyed by their bytes.
+"""A cache of finished runs that this machine has verified, keyed by their bytes.
 
-An entry's name is a digest of the SHA-256 of every file that counts and of the verifying version. So a run
-with any changed byte is verified in full, even if its digests were recomputed. An unwritable or damaged cache
-is ignored.
+The name of an entry is a digest of the SHA-256 of every file that counts and of the verifying version. A run
+with any changed byte is therefore verified in full, even if its digests were recomputed. An unwritable or
+damaged cache is ignored.
 """
 
 import json
@@ -18,7 +18,7 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
 _SCHEMA = "verified/1"
-_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # that count, but are not in the ledger
+_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # files that count, but are not in the ledger
 Digests = Mapping[str, str | None]  # SHA-256 by name
 
 
@@ -34,7 +34,7 @@ def key_of(found: Digests) -> str:
 
 
 def recall(key: str) -> dict[str, Any]:
-    """What is known about a run; empty for an unknown one."""
+    """What the cache knows about a run; empty for an unknown run."""
     path = _path(key)
     try:
         data = json.loads(no_pipe(path).read_bytes())
@@ -47,7 +47,7 @@ def recall(key: str) -> dict[str, Any]:
 
 
 def remember(key: str, **facts: Any) -> None:
-    """Add to what is known about a run."""
+    """Add to what the cache knows about a run."""
     data = recall(key) | facts
     path = _path(key)
     try:
