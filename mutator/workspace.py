@@ -30,9 +30,9 @@ from mutator.targets.severity import Scale, load_scale
 class Workspace:
     """A fault library, a templates folder, and optionally a target root that overrides the manifest's."""
 
-    library: Path  #: fault_library/
-    templates: Path  #: templates/
-    target: Path | None = None  #: root of the target's source; None: as the manifest says
+    library: Path  #: the folder fault_library/
+    templates: Path  #: the folder templates/
+    target: Path | None = None  #: root of the target's source; None: as in the manifest
 
     def __repr__(self) -> str:
         counts = ", ".join(counted(len(names), what) for what, names in self._contents())
@@ -63,13 +63,13 @@ class Workspace:
         templates: str | Path | None = None,
         target: str | Path | None = None,
     ) -> "Workspace":
-        """Find each of them in the first place that names or holds it:
+        """Find library, templates and target, each in the first of these places that names or contains it:
 
         1. the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES
         and MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder upward that holds fault_library/; 4. what
         ships with the harness.
 
-        MutatorError if a named folder is missing.
+        MutatorError if a named folder does not exist.
         """
         its_target = Path(target) if target else environment_path("MUTATOR_TARGET")
         if its_target and not its_target.is_dir():
@@ -85,16 +85,15 @@ class Workspace:
         )
 
     def manifest(self, name: str) -> TargetManifest:
-        """The target `name`, or the manifest at that path."""
+        """The manifest of the target `name`, or the manifest at that path."""
         manifest = load_manifest(self._file("targets", name, "target"), self.target)
         check_names(manifest)
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:
-        """The severity scale for a target's contacts, from the library or the harness; None without
-        one.
+        """The severity scale for a target's contacts, from the library or the harness; None without contacts.
 
-        MutatorError at the manifest for an unknown scale.
+        MutatorError, at the manifest's line, for an unknown scale.
         """
         if manifest.contact is None:
             return None
@@ -123,7 +122,7 @@ class Workspace:
         return load_readings(self.library)
 
     def spec_files(self) -> tuple[Path, ...]:
-        """Every fault spec of the library, sorted."""
+        """The file of every fault spec in the library, sorted."""
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
@@ -131,7 +130,7 @@ class Workspace:
         return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
-        """All specs in the order of `spec_files`, each checked to be at `<module>/<fault_type>.yaml`."""
+        """All specs, in the order of `spec_files`. Each must be at `<module>/<fault_type>.yaml`."""
         readings = self.readings()
         specs = tuple(load_spec(path, readings) for path in self.spec_files())
         for spec in specs:
@@ -153,11 +152,10 @@ class Workspace:
         seed: int = 0,
         target: str | None = None,
     ) -> tuple[Fault, ...]:
-        """The faults whose spec matches `pattern`, in the library's order, with values drawn from
-        `seed`.
+        """The faults that match `pattern`, in the library's order, with values drawn from `seed`.
 
         `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or the
-        path of a spec file. `target` names a manifest; default: the library's only one. MutatorError if
+        path of a spec file. `target` names a manifest; default: the library's only target. MutatorError if
         nothing matches, and for a mistake in a spec.
         """
         check_whole("seed", seed)
@@ -185,7 +183,7 @@ class Workspace:
         return faults
 
     def target_name(self, given: str | None = None) -> str:
-        """The given target, or the library's only one; MutatorError if it has none or several."""
+        """The given target, or the library's only target; MutatorError if the library has none or several."""
         names = tuple(self.targets)
         if given is None and not names:
             raise MutatorError(
@@ -222,11 +220,13 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table `name`, or the table at that path; `variables` are what a target observes."""
+        """The context table `name`, or the table at that path; `variables` are the values that a target
+        observes.
+        """
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
-        """Accidents and hazards of fault_library/stpa/hazards.yaml; None without that file."""
+        """The accidents and hazards in fault_library/stpa/hazards.yaml; None without that file."""
         path = self.library / "stpa" / "hazards.yaml"
         return load_hazards(path) if os.path.lexists(path) else None
 
@@ -236,8 +236,8 @@ class Workspace:
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def structure(self, manifest: TargetManifest) -> StructureModel | None:
-        """A target's control structure; None if the library has none or no channel names a component
-        of it.
+        """A target's control structure; None if the library has none, or if no channel names one of its
+        components.
         """
         path = self.library / "stpa" / "control_structure.yaml"
         structure = load_structure(path) if path.exists() else None

@@ -1,4 +1,4 @@
-"""Shared helpers: files, hashing, random streams, locks, interrupts, text, tables.
+"""Shared helpers: files, hashing, random streams, locks, interrupts, text and tables.
 
-They know no fault, target or campaign.
+They do not depend on faults, targets or campaigns.
 """

@@ -1,4 +1,4 @@
-"""The cache that commands share: layout, size, pruning.
+"""The cache that all commands share: layout, size and pruning.
 
     $XDG_CACHE_HOME/mutator, or ~/.cache/mutator
       checks/<digest>/     passed checks of campaigns, with their golden runs
@@ -21,15 +21,15 @@ from urllib.parse import quote
 
 CHECKS, GOLDENS, RUNS = "checks", "goldens", "runs"
 LINES, PICTURES, TARGETS = "lines", "pictures", "targets"
-TARGET_BYTES = 4_000_000_000  # limit for one target, enforced between seeds
+TARGET_BYTES = 4_000_000_000  # size limit for one target, enforced between seeds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Entry:
     """A cached item that is kept or deleted as a whole.
 
-    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures`, `target openpilot`. `size` is
-    its size on disk in bytes, `used` its last use in seconds since the epoch.
+    `what` names its owner: `checks`, `goldens`, `runs`, `lines`, `pictures` or `target openpilot`. `size` is
+    its size on disk in bytes, `used` the time of its last use in seconds since the epoch.
     """
 
     what: str
@@ -38,7 +38,7 @@ class Entry:
     used: float
 
     def delete(self) -> None:
-        """Delete it; a missing entry is ignored."""
+        """Delete the entry; a missing entry is ignored."""
         if self.path.is_dir() and not self.path.is_symlink():
             shutil.rmtree(self.path, ignore_errors=True)
         else:
@@ -46,7 +46,9 @@ class Entry:
 
 
 def folder() -> Path:
-    """The folder of all caches, which may not exist; without a home directory, an impossible path."""
+    """The folder of all caches, which may not exist. Without a home directory, it is a path that cannot
+    exist.
+    """
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named / "mutator"
@@ -82,12 +84,12 @@ def of_pictures() -> Path:
 
 
 def of_target(name: str) -> Path:
-    """The folder that the runs of a target share; any name maps to one folder."""
+    """The folder that the runs of a target share; each name maps to one folder."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
 def entries() -> list[Entry]:
-    """List everything cached: each campaign's checks, each verified run, each file that a target keeps."""
+    """List the cached entries: each campaign's checks, each verified run, each file that a target keeps."""
     found = [_entry(CHECKS, path) for path in _children(of_checks())]
     found += [_entry(GOLDENS, path) for path in _children(of_goldens())]
     found += [_entry(RUNS, path) for path in _children(of_runs())]
@@ -99,15 +101,15 @@ def entries() -> list[Entry]:
 
 
 def prune(most: int) -> list[Entry]:
-    """Delete the least recently used entries until at most `most` bytes remain; returns the deleted ones."""
+    """Delete the least recently used entries until at most `most` bytes remain; return those deleted."""
     return _pruned(entries(), most)
 
 
 def make_room(target: str) -> list[Entry]:
-    """Delete the least recently used files of a target until at most TARGET_BYTES remain; returns the deleted
-    ones.
+    """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
+    entries.
 
-    A run of many seeds calls this before each seed, as each seed has its own images.
+    A run of many seeds calls this before each seed, because each seed has separate images.
     """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
 
@@ -125,7 +127,7 @@ def _pruned(kept: list[Entry], most: int) -> list[Entry]:
 
 
 def clear() -> list[Entry]:
-    """Delete the whole cache; returns the deleted entries."""
+    """Delete the whole cache; return the deleted entries."""
     deleted = entries()
     for entry in deleted:
         entry.delete()
@@ -137,7 +139,7 @@ def _entry(what: str, path: Path) -> Entry:
     return Entry(
         what=what,
         path=path,
-        size=sum(state.st_blocks * 512 for state in states),  # a sparse table takes less than its size
+        size=sum(state.st_blocks * 512 for state in states),  # a sparse file takes less than its size
         used=max((max(state.st_atime, state.st_mtime) for state in states), default=0.0),
     )
 
@@ -153,7 +155,7 @@ def _states(paths: Iterable[Path]) -> Iterator[os.stat_result]:
 def _children(place: Path) -> list[Path]:
     try:
         return sorted(place.iterdir())
-    except OSError:  # missing, or not ours
+    except OSError:  # missing, or owned by somebody else
         return []
 
 

@@ -7,7 +7,7 @@ _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # a container's cgroup v2 quota: micros
 
 
 def usable_cores() -> int:
-    """The cores this process may run on, or fewer if a container has a smaller quota."""
+    """The number of cores on which this process may run; fewer if a container has a smaller quota."""
     cores = len(os.sched_getaffinity(0))
     try:
         quota, period = _QUOTA.read_text().split()

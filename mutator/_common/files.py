@@ -1,4 +1,4 @@
-"""The harness's own files: schemas are checked on reading, and writes are atomic."""
+"""The harness's own files. Schemas are checked on reading, and writes are atomic."""
 
 import errno
 import json
@@ -22,7 +22,7 @@ _NO_FILE = (errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.ELOOP, errno.ENXIO)
 
 
 class DiskFull(MutatorError):
-    """No space left. Finished work is kept; rerun the command once there is room."""
+    """No space left on the disk. Finished work is kept; rerun the command after freeing space."""
 
     exit_code = EXIT_HARNESS_ERRORS
 
@@ -44,7 +44,7 @@ def is_no_file(err: OSError) -> bool:
 
 
 def no_pipe(path: Path) -> Path:
-    """The path; raise OSError (`is_no_file`) for a pipe, socket or device, which could block a reader."""
+    """Return the path; OSError (`is_no_file`) for a pipe, socket or device, which could block a reader."""
     if path.exists() and not (path.is_file() or path.is_dir()):
         raise OSError(errno.ENXIO, os.strerror(errno.ENXIO), str(path))
     return path
@@ -60,7 +60,7 @@ def disk_full(where: str | Path | None) -> DiskFull:
 
 @contextmanager
 def raising_disk_full(where: Path) -> Iterator[None]:
-    """Turn the errors that a full disk causes into DiskFull."""
+    """Convert the errors that a full disk causes into DiskFull."""
     try:
         yield
     except MutatorError:
@@ -72,7 +72,9 @@ def raising_disk_full(where: Path) -> Iterator[None]:
 
 
 def check_is_text(path: Path) -> None:
-    """Raise MutatorError for a path that is not text here: neither digests nor tables could hold it."""
+    """Raise MutatorError for a path that this environment cannot encode, because digests and tables must
+    contain it.
+    """
     try:
         str(path).encode()
     except UnicodeEncodeError:
@@ -103,9 +105,10 @@ def make_folder(path: Path) -> None:
 
 
 def remove_folder(path: Path) -> None:
-    """Delete a folder that a run wrote to, as far as permissions allow, even if it is deep or locked.
+    """Delete a folder that a run wrote to, as far as permissions allow, even if it is nested deeply or
+    read-only.
 
-    `shutil.rmtree` recurses and fails at a depth of some hundred folders.
+    `shutil.rmtree` recurses, and fails at a depth of some hundred folders.
     """
     if path.is_symlink():
         return
@@ -168,8 +171,8 @@ def _emptied(folder: int) -> list[str]:
 
 
 def write_atomic(path: Path, data: bytes) -> None:
-    """Write the whole file or leave the old one; raise DiskFull if there is no room, MutatorError for a
-    folder.
+    """Write the whole file, or leave the old file unchanged; raise DiskFull if there is no room, MutatorError
+    if the path is a folder.
     """
     with half_written(path) as temporary:
         temporary.write_bytes(data)
@@ -177,7 +180,7 @@ def write_atomic(path: Path, data: bytes) -> None:
 
 @contextmanager
 def half_written(path: Path) -> Iterator[Path]:
-    """Yield a path to write in pieces, which becomes the file at `path` unless the block raises."""
+    """Yield a path to which to write in pieces. It becomes the file at `path`, unless the block raises."""
     if path.is_dir():
         raise MutatorError("a folder", where=path, expected="a file to write", remedy="name a file in it")
     temporary = path.with_name(f".{path.name}.{threading.get_native_id()}")
@@ -194,13 +197,13 @@ def half_written(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def writing_atomic(path: Path) -> Iterator[BinaryIO]:
-    """Like `half_written`, opened for writing."""
+    """Like `half_written`, but yield a file opened for writing."""
     with half_written(path) as temporary, temporary.open("wb") as file:
         yield file
 
 
 def is_half_written(name: str) -> bool:
-    """Whether a killed `write_atomic` or `half_written` left a file of that name."""
+    """Whether a file of that name is what a killed `write_atomic` or `half_written` left."""
     return complete(name) != name
 
 
@@ -211,7 +214,7 @@ def complete(name: str) -> str:
 
 
 def write_json(path: Path, data: dict[str, Any]) -> None:
-    """Write `data`, which names its schema, as JSON."""
+    """Write `data`, which contains its schema, as JSON."""
     write_atomic(path, json_bytes(data))
 
 
@@ -221,7 +224,7 @@ def json_bytes(data: dict[str, Any]) -> bytes:
 
 
 def read_json(path: Path, schema: str) -> dict[str, Any]:
-    """Read a JSON object that has this `schema` (`name/version`) or an older version of it."""
+    """Read a JSON object that has the schema `schema` (`name/version`) or an older version of it."""
     try:
         data = json.loads(no_pipe(path).read_bytes())
     except OSError as err:

@@ -1,7 +1,7 @@
 """Content hashes: the same input has the same id on every machine and in every later version.
 
-Ids and plan digests are cited, so they must not change when records gain fields. Declare such a field with
-`added(default)`: ids and plan files omit it while it has that default.
+Publications cite ids and plan digests, so they must not change when records gain fields. Declare such a field
+with `added(default)`: ids and plan files omit it while it has that default.
 """
 
 import dataclasses
@@ -18,7 +18,7 @@ _SCALARS = frozenset((str, int, float, bool, type(None)))
 
 
 def added(default: Any) -> Any:
-    """Declare a dataclass field that joins a hashed record after its first release.
+    """Declare a dataclass field that is added to a hashed record after the record's first release.
 
     No id changes: `plain` omits the field while it equals `default`, and older files are read with `default`.
     The default must be immutable and must never change.
@@ -58,7 +58,7 @@ def plain(value: Any) -> Any:
     """
     if type(value) in _SCALARS:
         return value
-    if isinstance(value, Enum):  # first: finding that an enum has no fields is slow
+    if isinstance(value, Enum):  # test first, because it takes long to find that an enum has no fields
         return value.value
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         found = {}
@@ -73,21 +73,21 @@ def plain(value: Any) -> Any:
     return value
 
 
-# only types unknown to JSON go through `plain`: a plan has a million ids
+# `plain` converts only types that JSON does not have, because a plan has a million ids
 _ENCODER = json.JSONEncoder(default=plain, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
 
 
 def canonical(value: Any) -> str:
-    """One canonical text for a value: sorted keys, no spaces, shortest exact floats."""
+    """Return the canonical JSON text of a value: sorted keys, no spaces, shortest exact floats."""
     return _ENCODER.encode(value)
 
 
 def digest(value: Any) -> str:
-    """The SHA-256 of `value` in hex: of bytes as they are, of anything else in its canonical text."""
+    """The SHA-256 of `value` in hex. Bytes are hashed as they are, any other value in its canonical text."""
     data = value if isinstance(value, bytes) else canonical(value).encode()
     return hashlib.sha256(data).hexdigest()
 
 
 def content_id(value: Any) -> str:
-    """The first 16 hex digits of `digest`: among 10^6 items the odds of a clash are 1 in 37 million."""
+    """The first 16 hex digits of `digest`. Among 10^6 items, a clash has odds of 1 in 37 million."""
     return digest(value)[:16]

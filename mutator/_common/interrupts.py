@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM: both stop the work in order, but never in the middle of a parse."""
+"""Ctrl-C and SIGTERM. Both stop the work in an orderly way, but never during a parse."""
 
 import signal
 from collections.abc import Iterator
@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 @dataclass(slots=True)
 class _State:
-    held: int = 0  # depth
-    asked: bool = False  # an interruption arrived while held
+    held: int = 0  # nesting depth of `held` blocks
+    asked: bool = False  # an interruption arrived in a `held` block
 
 
 _state = _State()
@@ -47,7 +47,7 @@ def terminable() -> Iterator[None]:
 def held() -> Iterator[None]:
     """Delay an interruption to the end of the block.
 
-    Native code that calls Python would replace the exception by another.
+    Otherwise native code that calls Python would replace the exception by another.
     """
     _state.held += 1
     try:

@@ -1,4 +1,4 @@
-"""Folders kept in the cache: written whole or not at all, and verified before use."""
+"""Folders kept in the cache. They are written completely or not at all, and verified before use."""
 
 import shutil
 import tempfile
@@ -22,21 +22,21 @@ def fetch(place: Path, to: Path) -> None:
 
 
 def store(place: Path, fill: Callable[[Path], object]) -> None:
-    """Keep at `place` the folder that `fill` writes; an unwritable cache is ignored."""
+    """Keep the folder that `fill` writes at `place`. If the cache is unwritable, nothing is kept."""
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(prefix=".", dir=place.parent) as scratch:
             made = Path(scratch) / "entry"
             fill(made)
             (made / _SUM).write_bytes(_sum(made))
-            shutil.rmtree(place, ignore_errors=True)  # missing or damaged
+            shutil.rmtree(place, ignore_errors=True)  # the folder at `place` is missing or damaged
             made.rename(place)
     except OSError:
         return
 
 
 def _sum(folder: Path) -> bytes:
-    """Digest of the names and contents of all files of a folder."""
+    """The digest of the names and contents of all files in a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
     return digest(found).encode()

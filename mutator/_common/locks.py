@@ -1,6 +1,6 @@
 """Locks of a run folder: one command at a time, and no worker of an earlier command.
 
-They are flocks, which the kernel drops when their process dies.
+They are flocks, which the kernel releases when the process that holds them ends.
 """
 
 import fcntl
@@ -15,12 +15,12 @@ from mutator.errors import MutatorError
 
 OWNER = "owner.lock"
 WORKERS = "workers"
-_PATIENCE_S = 15.0  # workers of a dead command exit well within this
+_PATIENCE_S = 15.0  # workers of a dead command exit well within this time
 
 
 @contextmanager
 def owned(run: Path, patience_s: float = _PATIENCE_S) -> Iterator[None]:
-    """Own the existing folder `run`; MutatorError while another command or its workers hold it."""
+    """Own the existing folder `run`; MutatorError while another command or its workers use it."""
     with raising_disk_full(run):
         fd = _opened(run / OWNER, os.O_CREAT)
     try:
@@ -91,7 +91,9 @@ def living_workers(run: Path) -> list[int]:
 
 
 def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
-    """Wait until no worker is left in `run`; returns the process ids of those that stay longer."""
+    """Wait until no worker is left in `run`; return the process ids of workers that are still there at the
+    end.
+    """
     deadline = time.monotonic() + patience_s
     while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
@@ -99,7 +101,7 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
 
 
 def _opened(path: Path, more: int = 0) -> int:
-    """Open a file; MutatorError for a folder, pipe or link, so that nothing is written through a link."""
+    """Open a file. MutatorError for a folder, a pipe or a link, so that nothing is written through a link."""
     try:
         return os.open(no_pipe(path), os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:

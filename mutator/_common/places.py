@@ -1,4 +1,4 @@
-"""Find libraries, templates and run folders, without reading their files."""
+"""Find libraries, templates and run folders without reading their files."""
 
 import os
 from pathlib import Path
@@ -15,16 +15,16 @@ _Given = str | Path | None
 
 def library_folder(root: _Given = None, library: _Given = None) -> Path:
     """The fault library: from an argument, the environment, the nearest folder upward, or the shipped
-    one.
+    library.
 
-    It may not exist.
+    The folder may not exist.
     """
     named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
     return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
 
 
 def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
-    """The templates folder, found like `library_folder`. It may not exist."""
+    """The templates folder, found like `library_folder`. The folder may not exist."""
     named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
     return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
 
@@ -51,7 +51,7 @@ def run_folders(root: Path) -> list[Path]:
 
 
 def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | None:
-    """The folder `name` from an argument, directly or by its root, or from the environment."""
+    """The folder `name` from an argument (the folder or its root), or from the environment."""
     if folder or root:
         return Path(folder) if folder else Path(root or "") / name
     base = environment_path("MUTATOR_ROOT")
@@ -59,7 +59,7 @@ def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | Non
 
 
 def _upward(*folders: str) -> Path | None:
-    """The nearest folder upward that holds fault_library/, if it holds all of `folders`."""
+    """The nearest folder upward that contains fault_library/; None if it lacks one of `folders`."""
     here = Path.cwd()
     nearest = next((p for p in (here, *here.parents) if (p / _LIBRARY).is_dir()), None)
     return nearest if nearest and all((nearest / name).is_dir() for name in folders) else None

@@ -1,4 +1,4 @@
-"""Share work among forked processes; results keep the order of the work."""
+"""Share work among forked processes. Results keep the order of the work."""
 
 import gc
 import os
@@ -13,24 +13,24 @@ from typing import Any, TypeVar
 from mutator._common.cores import usable_cores
 from mutator.errors import MutatorError
 
-_MOST = 2  # processes: each needs memory
-_WORTH = 20_000  # experiments
+_MOST = 2  # most processes, because each needs memory
+_WORTH = 20_000  # experiments for which a second process is worth starting
 
 T = TypeVar("T")
 R = TypeVar("R")
 
 
 def processes_for(experiments: int) -> int:
-    """How many processes should share the work for so many experiments."""
+    """The number of processes among which to share the work for so many experiments."""
     return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
 
 
 def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
-    """Yield `made(item)` for each item in order, computed by `processes` processes, or here for fewer than
-    two.
+    """Yield `made(item)` for each item, in order, computed by `processes` processes; fewer than two: by this
+    process.
 
-    The processes inherit this one's memory. Each is at most one result ahead, so results take little room.
-    Exceptions of `made` are raised here. MutatorError if a process dies.
+    The processes inherit this process's memory. Each is at most one result ahead, so results need little
+    memory. Exceptions of `made` are raised here. MutatorError if a process dies.
     """
     if processes < 2:
         yield from map(made, items)
@@ -42,9 +42,10 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
 
 @contextmanager
 def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
-    """Run `work` in another process during the block, which receives a function that waits for the result.
+    """Run `work` in another process during the block. The block receives a function that waits for the
+    result.
 
-    That function raises what `work` raised. With fewer than two processes it does the work itself.
+    That function raises what `work` raised. With fewer than two processes, it does the work itself.
     """
     if processes < 2:
         yield work
@@ -55,7 +56,9 @@ def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
 
 @contextmanager
 def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
-    """Start processes, and yield the connection of each for its results; they end with the block."""
+    """Start processes and yield the connection on which each sends its results. The processes end with the
+    block.
+    """
     context = get_context("fork")
     pipes = [context.Pipe(duplex=False) for _ in range(processes)]
     workers = [
@@ -83,11 +86,11 @@ def _work(
     pipes: Sequence[tuple[Connection, Connection]],
     number: int,
 ) -> None:
-    """Send the result for each item, or the exception, which ends the work."""
+    """Send the result for each item. An exception is sent instead, and ends the work."""
     gc.disable()  # results have no cycles, and a collection would copy shared memory
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all: the first process ends the others
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first one ends the others
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    for receiver, _ in pipes:  # or nobody would notice when the first process dies
+    for receiver, _ in pipes:  # otherwise no process would notice that the first one died
         receiver.close()
     sender = pipes[number][1]
     try:

@@ -1,4 +1,4 @@
-"""Seeded random generators, one per (seed, key), so no draw depends on how many came before it."""
+"""Seeded random generators, one for each (seed, key), so that no draw depends on earlier draws."""
 
 import hashlib
 

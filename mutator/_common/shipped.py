@@ -14,12 +14,12 @@ from zipfile import ZipFile
 from mutator._common.hashing import digest
 from mutator.errors import MutatorError
 
-ARCHIVE = Path(__file__).with_name("shipped.zip")  # made by setup.py; a clone has none
+ARCHIVE = Path(__file__).with_name("shipped.zip")  # created by setup.py; not in a clone
 CLONE = Path(__file__).resolve().parents[2]
-SHIPPED_TARGET = "shipped:target"  # as `root` of a manifest
+SHIPPED_TARGET = "shipped:target"  # value of `root` in a manifest
 _README = Path(__file__).with_name("new_library.md")
 _ROOT_IN_CLONE = "root: ../../target\n"
-_SHOWN = 3  # changed files named in an error
+_SHOWN = 3  # the most changed files that an error names
 
 
 def shipped_folder() -> Path:
@@ -32,7 +32,7 @@ def shipped_folder() -> Path:
 
 
 def refuse_shipped(path: Path) -> None:
-    """Raise MutatorError if `path`, about to be written, is in the unpacked archive."""
+    """Raise MutatorError if `path`, which is about to be written, is in the unpacked archive."""
     if ARCHIVE.exists() and path.absolute().is_relative_to(_home()):
         raise MutatorError(
             "part of the library that ships with mutator, which must not change",
@@ -45,8 +45,8 @@ def refuse_shipped(path: Path) -> None:
 def write_library(folder: Path) -> None:
     """Write an editable library, templates and a README into a new or empty `folder`.
 
-    The manifest in the copy says `root: shipped:target`, so it works wherever the folder moves and whichever
-    mutator is installed. MutatorError for a folder that is not empty.
+    The manifest in the copy says `root: shipped:target`, so it works wherever the folder is moved, and with
+    any installed mutator. MutatorError for a folder that is not empty.
     """
     shipped = shipped_folder()
     make_empty(folder)
@@ -59,7 +59,7 @@ def write_library(folder: Path) -> None:
 
 
 def make_empty(folder: Path) -> None:
-    """Make a folder or find it empty; MutatorError if it is not empty or cannot be made."""
+    """Create a folder, or check that it is empty; MutatorError if it is not empty or cannot be created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""
@@ -82,7 +82,7 @@ def _home() -> Path:
 
 @lru_cache(maxsize=1)
 def _unpacked(archive: Path, home: Path) -> Path:
-    """Unpack the archive atomically into a folder in `home` named by its digest, unless it is there."""
+    """Unpack the archive atomically into a folder in `home`, named by its digest, unless it exists."""
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)
@@ -117,7 +117,7 @@ def _unpack(archive: Path, folder: Path) -> None:
 
 
 def _changed(archive: Path, folder: Path) -> list[str]:
-    """List files that were edited, added or deleted since unpacking; bytecode is ignored."""
+    """List files that were edited, added or deleted since unpacking, except bytecode."""
     files = (path for path in folder.rglob("*") if path.is_file() and path.parent.name != "__pycache__")
     found = {path.relative_to(folder).as_posix(): path for path in files}
     with ZipFile(archive) as file:

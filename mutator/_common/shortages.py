@@ -1,4 +1,4 @@
-"""Errors of a machine that is out of memory, files or processes, which a user can fix."""
+"""Errors of a machine that has run out of memory, files or processes, which a user can fix."""
 
 import errno
 import os
@@ -7,7 +7,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 _FILES = (errno.EMFILE, errno.ENFILE)
 _PROCESSES = "can't start new thread"
-_LOADING = ("failed to map segment", "cannot allocate memory")  # what a library reports when it does not fit
+_LOADING = ("failed to map segment", "cannot allocate memory")  # reports of libraries that do not fit
 _AGAIN = "run the same command again; finished experiments are kept and not repeated"
 
 
@@ -18,7 +18,7 @@ class Shortage(MutatorError):
 
 
 def shortage(err: BaseException | None) -> Shortage | None:
-    """The shortage that an error or one of its causes reports, or None."""
+    """The shortage that an error or one of its causes reports; None if there is none."""
     while err is not None:
         number = getattr(err, "errno", None)
         loading = isinstance(err, ImportError) and any(words in str(err) for words in _LOADING)

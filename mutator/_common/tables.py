@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from markupsafe import Markup
 
-# what Markdown would take for an element, italics or bold; `code` is exempt
+# text that Markdown would read as an element, italics or bold; `code` is exempt
 _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-9])_+|_+(?![A-Za-z0-9])")
 
 
@@ -16,8 +16,8 @@ _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-
 class Table:
     """A table of texts, with one cell per head in each row. Columns in `right` are right-aligned.
 
-    A cell may be Markup, e.g. a link, which HTML shows as it is. With `named` the first cell of a row is its
-    head.
+    A cell may be Markup, e.g. a link, which HTML shows unescaped. With `named`, the first cell of a row is
+    the row's head.
     """
 
     heads: Sequence[str]
@@ -26,7 +26,7 @@ class Table:
     named: bool = False
 
     def as_text(self) -> str:
-        """Columns padded to equal width, two spaces between them, no trailing spaces."""
+        """The table as text: columns padded to equal width, two spaces between them, no trailing spaces."""
         lines = [self.heads, *self.rows]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(self._padded(line, widths) for line in lines)
@@ -36,7 +36,7 @@ class Table:
         return "  ".join(c.rjust(w) if i in self.right else c.ljust(w) for i, (c, w) in pairs).rstrip()
 
     def as_markdown(self, *, escape: bool = True) -> str:
-        """A Markdown table; with `escape=False` the cells are Markdown already."""
+        """The table in Markdown; with `escape=False`, the cells are Markdown already."""
 
         def line(cells: Sequence[str]) -> str:
             texts = [markdown_line(c).replace("|", "\\|") for c in cells] if escape else cells
@@ -46,8 +46,8 @@ class Table:
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":
-        """A scrollable HTML table of class `style` with escaped text, without a head if all heads are
-        empty.
+        """A scrollable HTML table of class `style` with escaped text. If all heads are empty, there is no
+        head row.
 
         A row with an empty first cell continues the row above and has the class `group`; cells of columns in
         `right` have the class `number`.
@@ -76,7 +76,7 @@ class Table:
 
         if not any(self.heads):
             return Markup("")
-        tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # an empty head is a plain cell
+        tags = ("<td>{1}</td>", '<th scope="col"{0}>{1}</th>')  # an empty head becomes a plain cell
         numbers = Markup(' class="number"')
         heads = [
             Markup(tags[bool(head)]).format(numbers if i in self.right else "", head)
@@ -86,8 +86,8 @@ class Table:
 
 
 def markdown_line(text: str) -> str:
-    """A text as one line of Markdown that shows every character: `<class 'float'>` is not an HTML
-    element, `__init__` is not bold.
+    """Convert text to one line of Markdown that shows every character: `<class 'float'>` does not become an
+    HTML element, and `__init__` does not become bold.
     """
     return _MARKUP.sub(_escaped, " ".join(text.splitlines()))
 

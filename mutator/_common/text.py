@@ -7,12 +7,12 @@ from typing import Any
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """A count with its noun: 1 run, 2 runs; `plural` where an s is not enough."""
+    """A count with its noun: 1 run, 2 runs; give `plural` if adding an s is not enough."""
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
 def shown(value: Any) -> str:
-    """A value as errors show it: at most 60 characters, text quoted, numbers not."""
+    """A value as errors show it: at most 60 characters; text is quoted, numbers are not."""
     if value is None:
         return "nothing"
     if isinstance(value, bool):
@@ -33,7 +33,7 @@ _QUOTED = re.compile(r"\"[^\"]*\"|'[^']*'")
 
 
 def operator_hint(text: str) -> str:
-    """What to write instead of other languages' operators in an expression, or an empty text."""
+    """What to write instead of an operator of another language in an expression; '' if there is none."""
     found = dict.fromkeys(_WRONG.findall(_QUOTED.sub("", text)))
     return ", ".join(f"write '{_OPERATORS[one]}' for '{one}'" for one in found)
 
@@ -47,7 +47,7 @@ def folded(text: str, width: int) -> str:
     """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
     whole.
 
-    Continuation lines are indented, to the value in a line `name  value`.
+    Continuation lines are indented; in a line `name  value` they are indented to the value.
     """
     return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
 

@@ -1,4 +1,4 @@
-"""The hazard analysis: context tables, unsafe control actions, checks, coverage, drawings.
+"""The hazard analysis: context tables, unsafe control actions, checks, coverage and drawings.
 
 This package does not run targets or read results.
 """

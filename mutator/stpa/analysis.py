@@ -1,7 +1,7 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-References between the files are checked on load, with file and line. `stpa_checks` compares the analysis with
-fault specs and target.
+Loading checks all references between the files and reports errors with file and line. `mutator.stpa.checks`
+compares the analysis with fault specs and target.
 """
 
 from collections.abc import Collection, Mapping
@@ -15,7 +15,7 @@ from mutator._common.text import suggestion
 from mutator.config.yaml_files import Keys, Source, StrictModel, read
 from mutator.stpa.context_tables import ContextTable, HazardList, load_context_table, load_hazards
 
-_WIDEST = 100  # rows and columns of the drawing
+_WIDEST = 100  # most rows and columns of the drawing
 
 
 class Kind(StrEnum):
@@ -39,103 +39,108 @@ class Category(StrEnum):
 
 
 class VariableModel(StrictModel, title="A variable"):
-    """What a controller believes about the process."""
+    """What a controller assumes about the process."""
 
-    about: str = Field(description="What it is.")
+    about: str = Field(description="What the variable means.")
     observed: str | None = Field(
-        description="The observed variable that stands for it in triggers; `null` if none."
+        description="The observed variable that represents it in triggers; `null` if there is none."
     )
 
 
 class ComponentModel(StrictModel, title="A component"):
-    """A box of the drawing."""
+    """A component, drawn as a box."""
 
-    kind: Kind = Field(strict=False, description="What it is.")
-    label: str = Field(description="What the drawing calls it.")
-    about: str = Field(description="What it does.")
+    kind: Kind = Field(strict=False, description="The kind of component.")
+    label: str = Field(description="The name in the drawing.")
+    about: str = Field(description="What the component does.")
     modules: list[str] = Field(
         default_factory=list,
-        description="Its sources, files of the target: a fault in one of them begins its path here.",
+        description="The component's source files in the target. The path of a fault in one of them begins "
+        "at this component.",
     )
     process_model: dict[str, VariableModel] = Field(
-        default_factory=dict, description="Name -> variable of a controller's process model."
+        default_factory=dict, description="Name -> variable in a controller's process model."
     )
     drawn: list[int] = Field(
         min_length=3,
         max_length=3,
-        description="Row from the top, column from the left, width in columns, of the drawing.",
+        description="The place in the drawing: row from the top, column from the left, width in columns.",
     )
 
 
 class LinkModel(StrictModel, title="A link"):
-    """An arrow of the drawing."""
+    """A link, drawn as an arrow."""
 
-    from_: str = Field(alias="from", description="The component it comes from.")
-    to: str = Field(description="The component it goes to.")
-    label: str = Field(description="What it carries.")
+    from_: str = Field(alias="from", description="The component at which the link begins.")
+    to: str = Field(description="The component at which the link ends.")
+    label: str = Field(description="What the link carries.")
     studied: bool = Field(
-        True, description="`false`: the link is drawn dashed and is not part of fault paths."
+        True, description="`false`: the link is drawn dashed and does not belong to fault paths."
     )
 
 
 class ActionModel(StrictModel, title="A control action"):
-    """What a controller does to the process that it controls."""
+    """An action by which a controller influences the process that it controls."""
 
-    link: str = Field(description="The link that carries it.")
-    channel: str = Field(description="The recorded channel that shows it.")
-    about: str = Field(description="What it does.")
+    link: str = Field(description="The link that carries the action.")
+    channel: str = Field(description="The recorded channel that shows the action.")
+    about: str = Field(description="What the action does.")
 
 
 class StructureModel(StrictModel, title="control_structure.yaml"):
-    """Who controls what, by which actions, and with which feedback."""
+    """The controllers, what they control by which actions, and the feedback that they get."""
 
-    about: str = Field(description="What is shown.")
+    about: str = Field(description="What the control structure shows.")
     components: dict[str, ComponentModel] = Field(description="Name -> component.")
     control_actions: dict[str, ActionModel] = Field(description="Name -> control action.")
     links: dict[str, LinkModel] = Field(description="Name -> link.")
 
 
 class UnsafeActionModel(StrictModel, title="An unsafe control action"):
-    """One way in which a control action leads to a hazard."""
+    """One way in which a control action causes a hazard."""
 
     action: str = Field(description="The control action.")
-    category: Category = Field(strict=False, description="Which of the four ways of being unsafe.")
+    category: Category = Field(strict=False, description="In which of the four ways the action is unsafe.")
     about: str = Field(description="What happens.")
-    hazards: list[str] = Field(min_length=1, description="The hazards that follow.")
+    hazards: list[str] = Field(min_length=1, description="The hazards that it causes.")
     contexts: list[str] = Field(
-        min_length=1, description="The contexts in which they follow, as `table/row`."
+        min_length=1, description="The contexts in which it causes them, as `table/row`."
     )
 
 
 class UnsafeActionsModel(StrictModel, title="unsafe_control_actions.yaml"):
-    """How each control action can be unsafe, and when."""
+    """How each control action can be unsafe, and in which contexts."""
 
-    about: str = Field(description="What is listed.")
-    tables: list[str] = Field(description="The context tables that they come from.")
+    about: str = Field(description="What the file lists.")
+    tables: list[str] = Field(
+        description="The context tables from which the unsafe control actions are taken."
+    )
     unsafe_control_actions: dict[str, UnsafeActionModel] = Field(description="Id -> unsafe control action.")
 
 
 class FactorModel(StrictModel, title="A causal factor"):
-    """Either `faults` or `no_fault` is given."""
+    """A cause of unsafe control actions. Give either `faults` or `no_fault`."""
 
     about: str = Field(description="What goes wrong.")
-    where: list[str] = Field(min_length=1, description="Links or components of the control structure.")
-    at: list[str] = Field(default_factory=list, description="Where in the target, as `file::function`.")
-    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions it may lead to.")
+    where: list[str] = Field(
+        min_length=1, description="The links or components of the control structure where it goes wrong."
+    )
+    at: list[str] = Field(default_factory=list, description="The places in the target, as `file::function`.")
+    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions to which it may lead.")
     faults: list[str] = Field(default_factory=list, description="The fault specs that represent it.")
-    no_fault: str | None = Field(None, description="Why no fault spec represents it.")
+    no_fault: str | None = Field(None, description="The reason why no fault spec represents it.")
 
 
 class FactorsModel(StrictModel, title="causal_factors.yaml"):
-    """What can make a controller act unsafely, and which faults represent it."""
+    """What can make a controller act unsafely, and the faults that represent it."""
 
-    about: str = Field(description="What is listed.")
+    about: str = Field(description="What the file lists.")
     causal_factors: dict[str, FactorModel] = Field(description="Id -> causal factor.")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Analysis:
-    """The whole analysis with consistent names; `*_source` point at the files."""
+    """The whole analysis, in which all names are consistent; `*_source` refer to the files."""
 
     hazards: HazardList
     structure: StructureModel
@@ -148,7 +153,7 @@ class Analysis:
 
 
 def load_structure(path: Path) -> StructureModel:
-    """Read a control structure; MutatorError with file and line for a mistake in it."""
+    """Read a control structure; MutatorError with file and line for a mistake."""
     structure, source = read(path, StructureModel, "control_structure/1")
     _check_structure(structure, source)
     return structure
@@ -158,7 +163,7 @@ def load_analysis(folder: Path) -> Analysis:
     """Read hazards, control structure, unsafe control actions, context tables and causal factors from
     `folder`.
 
-    MutatorError with file and line for the first dangling name, uncovered context or other mistake.
+    MutatorError with file and line for the first unknown name, uncovered context or other mistake.
     """
     hazards = load_hazards(folder / "hazards.yaml")
     structure, s_source = read(folder / "control_structure.yaml", StructureModel, "control_structure/1")
@@ -226,7 +231,7 @@ def _check_grid(structure: StructureModel, source: Source) -> None:
 def _tables(
     folder: Path, unsafe: UnsafeActionsModel, source: Source, structure: StructureModel
 ) -> dict[str, ContextTable]:
-    """Load the context tables of the unsafe actions; they may only judge control actions of the structure."""
+    """Load the context tables of the unsafe actions. They may judge only control actions of the structure."""
     known = sorted(path.stem for path in folder.glob("*.yaml"))
     tables = {}
     for i, name in enumerate(unsafe.tables):

@@ -1,4 +1,4 @@
-"""Check that the hazard analysis is complete and consistent, and that the fault library follows from it."""
+"""Check that the hazard analysis is complete and consistent, and that the fault library matches it."""
 
 import ast
 from collections.abc import Iterator
@@ -18,11 +18,12 @@ Specs = dict[str, FaultSpec]
 def check_analysis(
     analysis: Analysis, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> list[MutatorError]:
-    """List every gap and contradiction in the order of the files.
+    """List every gap and contradiction, in the order of the files.
 
-    * Each hazard follows from an unsafe action; unsafe actions and context tables agree.
+    * Each hazard has an unsafe action that causes it; unsafe actions and context tables agree.
     * Each action is judged in all four categories; each unsafe action has a causal factor.
-    * Each factor's faults are where it says and aim at hazards it leads to; each spec belongs to a factor.
+    * Each factor's faults are injected at the factor's places and aim at hazards to which it leads; each spec
+      belongs to a factor.
     """
     by_name = {spec.name: spec for spec in specs}
     return [
@@ -77,7 +78,7 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
 
 
 def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield process model variables that the target does not observe."""
+    """Yield variables of process models that the target does not observe."""
     known = manifest.observation.variables
     for name, component in analysis.structure.components.items():
         for variable, model in component.process_model.items():
@@ -91,7 +92,7 @@ def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator
 
 
 def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield contexts with a variable that is in no process model."""
+    """Yield contexts that use a variable that is in no process model."""
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
     for table in analysis.tables.values():
@@ -118,7 +119,7 @@ def _categories(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield unsafe actions that the context tables do not call hazardous."""
+    """Yield unsafe actions that are not hazardous according to the context tables."""
     for name, action in analysis.unsafe.items():
         for i, context in enumerate(action.contexts):
             row = _row(analysis, context)
@@ -135,7 +136,7 @@ def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _unjudged(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield hazardous cells of the context tables that match no unsafe action."""
+    """Yield hazardous cells of the context tables that no unsafe action matches."""
     known = {
         (context, action.action, action.category, hazard)
         for action in analysis.unsafe.values()
@@ -161,7 +162,9 @@ def _row(analysis: Analysis, context: str) -> ContextRow:
 
 
 def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
-    """The row's hazards for an action of that category; wrong timing or duration can mean either column."""
+    """The row's hazards for an action of that category. For wrong timing or duration, these are the hazards
+    of both columns.
+    """
     verdicts = row.actions.get(action.action)
     if verdicts is None:
         return set()
@@ -185,7 +188,7 @@ def _causeless(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield modules of components and places of factors that the target lacks."""
+    """Yield modules of components and places of factors that do not exist in the target."""
     files = manifest.tree.files
     for name, component in analysis.structure.components.items():
         for i, path in enumerate(component.modules):
@@ -209,7 +212,7 @@ def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorErr
 
 
 def functions(code: bytes) -> Iterator[str]:
-    """Qualified names of a module's functions and of its classes' methods."""
+    """The qualified names of a module's functions and of the methods of its classes."""
     for node in ast.parse(code).body:
         if isinstance(node, ast.FunctionDef):
             yield node.name
@@ -248,7 +251,7 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
 
 
 def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """Check that every fault aims at a hazard that the factor leads to."""
+    """Check that every fault aims at a hazard to which the factor leads."""
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:
@@ -262,7 +265,7 @@ def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Spe
 
 
 def injected(spec: FaultSpec) -> set[str]:
-    """Where a spec injects, in any reading: `file::function`."""
+    """The places at which a spec injects in any reading, as `file::function`."""
     return {
         f"{injection.location.path}::{injection.location.function}"
         for variant in spec

@@ -1,4 +1,4 @@
-"""Hazards and context tables, the source of guided triggers."""
+"""Hazards and context tables, from which guided triggers are taken."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -20,7 +20,9 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """For one control action in one context: the hazard if it is provided, and if it is not (None: none)."""
+    """The hazards of one control action in one context: if it is provided, and if it is not (None: no
+    hazard).
+    """
 
     provided: str | None
     not_provided: str | None
@@ -28,7 +30,7 @@ class Verdicts:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContextRow:
-    """A context: its id (`C1`), its condition with constants inserted, and the verdict for each control
+    """A context: its id (`C1`), its condition with constants inserted, and the verdict on each control
     action.
     """
 
@@ -40,8 +42,8 @@ class ContextRow:
 
 @dataclass(frozen=True, kw_only=True)
 class ContextTable:
-    """A context table of the hazard analysis. Its rows cover everything exactly once, as `coverage`
-    reports.
+    """A context table of the hazard analysis. Its rows cover every situation exactly once; `coverage` has the
+    proof.
     """
 
     name: str
@@ -53,7 +55,7 @@ class ContextTable:
     source: Source
 
     def check(self, variables: Collection[str]) -> None:
-        """Raise MutatorError, with its line, for a row that uses an unknown variable."""
+        """Raise MutatorError, with the line, for a row that uses an unknown variable."""
         _check_names(self.rows, variables, self.source)
 
     def triggers(
@@ -63,9 +65,9 @@ class ContextTable:
         armed_after_s: float = 0.0,
         rows: tuple[str, ...] | None = None,
     ) -> tuple[Trigger, ...]:
-        """One trigger per row (or per row in `rows`), named like the row; MutatorError for an unknown row.
+        """One trigger per row, or per row in `rows`, with the row's name; MutatorError for an unknown row.
 
-        It is active while the row's condition holds, or for `hold_s` from then on.
+        A trigger is active while the row's condition holds, or for `hold_s` from its start.
         """
         by_id = {row.id: row for row in self.rows}
         unknown = [name for name in rows or () if name not in by_id]
@@ -87,7 +89,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards by id with descriptions; hazards also name the accidents they may lead to."""
+    """Accidents and hazards by id, with descriptions, and the accidents to which each hazard may lead."""
 
     source: Source
     accidents: Mapping[str, str]
@@ -96,49 +98,50 @@ class HazardList:
 
 
 class _VerdictsModel(StrictModel, title="A verdict"):
-    """For one control action in one context; `null` where there is no hazard."""
+    """The verdicts on one control action in one context; `null` means no hazard."""
 
-    provided: str | None = Field(description="The hazard that follows if the action is provided.")
-    not_provided: str | None = Field(description="The hazard that follows if it is not.")
+    provided: str | None = Field(description="The hazard that occurs if the action is provided.")
+    not_provided: str | None = Field(description="The hazard that occurs if the action is not provided.")
 
 
 class _RowModel(StrictModel, title="A context"):
     when: str = Field(
-        description="A condition over `t` (s), the values that the target observes, and the constants."
+        description="A condition. It may use `t` (s), the values that the target observes, and the constants."
     )
     about: str = Field(description="A description.")
     actions: dict[str, _VerdictsModel] = Field(
-        description="Control action -> verdict; every row judges the same actions."
+        description="Control action -> verdict. Every row must judge the same actions."
     )
 
 
 class TableModel(StrictModel, title="contexts/*.yaml"):
-    """A context table. Its rows cover everything exactly once: [what is
-    proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table)."""
+    """A context table. Its rows must cover every situation exactly once: [what is
+    proved](../explanation/hazard-analysis.md#what-is-proved-about-a-context-table).
+    """
 
-    name: str = Field(description="The name, equal to the file's.")
-    about: str = Field("", description="What it is about.")
+    name: str = Field(description="The name. It must match the file name without `.yaml`.")
+    about: str = Field("", description="The subject of the table.")
     constants: dict[str, float] = Field(description="Name -> number, for use in the conditions.")
     contexts: dict[str, _RowModel] = Field(description="Id -> context.")
 
 
 class _HazardModel(StrictModel, title="A hazard"):
-    about: str = Field(description="What it is.")
-    leads_to: list[str] = Field(description="The accidents it may lead to.")
+    about: str = Field(description="What the hazard is.")
+    leads_to: list[str] = Field(description="The accidents to which it may lead.")
 
 
 class HazardsModel(StrictModel, title="hazards.yaml"):
-    """Accidents, and the hazards that lead to them."""
+    """Accidents, and the hazards that may lead to them."""
 
-    accidents: dict[str, str] = Field(description="Id -> what it is.")
+    accidents: dict[str, str] = Field(description="Id -> description.")
     hazards: dict[str, _HazardModel] = Field(description="Id -> hazard.")
 
 
 def load_context_table(path: Path, variables: Collection[str] | None = None) -> ContextTable:
-    """Read a context table; conditions are checked as triggers over `variables` (None: any, checked later).
+    """Read a context table. Conditions are checked as triggers over `variables` (None: any names, to be
+    checked later).
 
-    MutatorError also for contexts that provably overlap or leave a gap, and for rows that judge different
-    control actions.
+    MutatorError also if contexts provably overlap or leave a gap, or if rows judge different control actions.
     """
     model, source = read(path, TableModel, CONTEXT_SCHEMA)
     for name in model.constants:
@@ -221,7 +224,7 @@ def _condition(text: str, constants: Mapping[str, float], source: Source, row: s
 
 
 def load_hazards(path: Path) -> HazardList:
-    """Read accidents and hazards; MutatorError for a hazard that leads to an unknown accident."""
+    """Read accidents and hazards; MutatorError if a hazard names an unknown accident."""
     model, source = read(path, HazardsModel, HAZARDS_SCHEMA)
     for name, hazard in model.hazards.items():
         for i, accident in enumerate(hazard.leads_to):

@@ -1,8 +1,8 @@
-"""Prove that the conditions of a context table cover everything exactly once.
+"""Prove that the conditions of a context table cover every situation exactly once.
 
-The constants in conditions cut each variable's line into points and open intervals. Conditions are constant
-within such a cell, so testing one place per cell is a proof. Variables count as independent: a table that is
-complete only because one variable depends on another fails.
+The constants in the conditions divide each variable's axis into points and open intervals. All conditions are
+constant within such a cell, so a test of one value per cell is a proof. Variables are treated as independent:
+a table that is complete only because one variable depends on another fails.
 """
 
 import ast
@@ -13,12 +13,12 @@ from itertools import pairwise, product
 
 from mutator.triggers.conditions import evaluate
 
-MAX_TESTS = 400_000  # contexts times cells
+MAX_TESTS = 400_000  # most tests: contexts times cells
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
-    """A piece of a variable's line: `value` is in it, `text` describes it (`gap > 2.0`)."""
+    """A part of a variable's axis: `value` lies in it, and `text` describes it (`gap > 2.0`)."""
 
     value: float
     text: str
@@ -26,9 +26,9 @@ class Cell:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Coverage:
-    """The number of tested cells, and the first place that is not covered exactly once.
+    """The number of tested cells, and the first place that the contexts do not cover exactly once.
 
-    `beyond` says why nothing could be proved; `rows` are the contexts that hold at `place`.
+    `beyond` says why no proof was possible; `rows` are the contexts that hold at `place`.
     """
 
     cells: int = 0
@@ -38,7 +38,7 @@ class Coverage:
 
 
 class _BeyondError(Exception):
-    """A comparison that is not of one variable with a constant."""
+    """A comparison that does not compare one variable with a constant."""
 
 
 def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
@@ -81,7 +81,7 @@ def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
 
 
 def _constant(node: ast.expr) -> float | None:
-    """The value of a signed number; None for anything else."""
+    """The value of a number with or without a sign; None for any other expression."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         value = _constant(node.operand)
         return None if value is None else -value
@@ -89,7 +89,7 @@ def _constant(node: ast.expr) -> float | None:
 
 
 def _cells(name: str, cuts: list[float]) -> list[Cell]:
-    """The cells of one variable's line, from minus to plus infinity."""
+    """The cells of one variable's axis, from minus to plus infinity."""
     cells = [Cell(value=-math.inf, text=f"{name} < {cuts[0]}")]
     for low, high in pairwise(cuts):
         cells.append(Cell(value=low, text=f"{name} = {low}"))

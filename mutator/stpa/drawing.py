@@ -1,4 +1,4 @@
-"""Draw the control structure as SVG, with the places where faults are injected highlighted."""
+"""Draw the control structure as SVG and highlight where faults are injected."""
 
 from collections.abc import Iterator
 from html import escape
@@ -17,7 +17,7 @@ FILLS = {
 INK = "#222222"
 # Okabe and Ito's palette, for colour-blind readers; dashes and width carry the same information.
 ACTION, FEEDBACK, FAULT = "#0072b2", "#555555", "#d55e00"
-LEGEND = 54  # px at the foot
+LEGEND = 54  # height of the key at the bottom, in px
 STYLE = (
     "text{font-family:Helvetica,Arial,sans-serif;font-size:13px;fill:#222222}"
     ".name{font-weight:bold;font-size:14px}"
@@ -27,7 +27,7 @@ STYLE = (
 
 
 def draw(analysis: Analysis) -> str:
-    """The SVG text, the same for the same analysis."""
+    """Return the SVG text; the same analysis always gives the same text."""
     layout = lay_out(analysis.structure)
     height = layout.height + LEGEND
     lines = [
@@ -49,7 +49,7 @@ def draw(analysis: Analysis) -> str:
 
 
 def faulty_places(analysis: Analysis) -> dict[str, list[str]]:
-    """Links and components where faults enter, with the causal factors of those faults."""
+    """The links and components at which faults enter, with the causal factors of these faults."""
     places: dict[str, list[str]] = {}
     for name, factor in analysis.factors.items():
         for place in factor.where if factor.faults else ():
@@ -124,7 +124,7 @@ def _labels(analysis: Analysis, layout: Layout) -> Iterator[str]:
 
 
 def short(names: list[str]) -> str:
-    """Names with their common prefix once: CF9, 10, 11."""
+    """Join names and write their common prefix once: CF9, 10, 11."""
     first, *rest = names
     prefix = first.rstrip("0123456789")
     return ", ".join([first, *(name.removeprefix(prefix) for name in rest)])

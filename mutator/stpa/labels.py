@@ -1,6 +1,6 @@
-"""Place the labels of arrows: next to their arrow, clear of boxes, other arrows and other labels.
+"""Place the labels of arrows next to their arrow, clear of boxes, other arrows and other labels.
 
-Lengths are in px, y points down. A label has two lines: what the arrow carries, and an addition of the
+Lengths are in px, y points down. A label has two lines: what the arrow carries, and a second text from the
 drawing.
 """
 
@@ -8,10 +8,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-_STEP = 6  # between places that are tried
-_BESIDE, _ACROSS = 17, 25  # from line to line, next to an arrow or across it
+_STEP = 6  # step between the places that are tried
+_BESIDE, _ACROSS = 17, 25  # distance from line to line, next to an arrow and across it
 _LETTER = 7  # average width of a letter
-_SHORTEST = 126  # room for `1092 of 1128, 97 %`
+_SHORTEST = 126  # room for text such as `1092 of 1128, 97 %`
 _ASCENT, _DESCENT = 12, 4
 
 Point = tuple[float, float]
@@ -30,8 +30,8 @@ class Label:
 def place_labels(
     words: Mapping[str, str], arrows: Mapping[str, Sequence[Point]], boxes: Iterable[Area]
 ) -> dict[str, Label]:
-    """A place for the label of each arrow with corners in `arrows`; the preferred one if no place is
-    clear.
+    """A place for the label of each arrow in `arrows` (its corners). If no place is clear, the preferred one
+    is used.
     """
     taken = list(boxes)
     lines = {name: [_around(a, b) for a, b in pairwise(points)] for name, points in arrows.items()}
@@ -48,7 +48,7 @@ def place_labels(
 
 
 def _bearer(points: Sequence[Point]) -> tuple[Point, Point]:
-    """The segment of an arrow that bears the label, level if possible."""
+    """The segment of an arrow that carries the label, a horizontal one if possible."""
     return next((pair for pair in pairwise(points) if pair[0][1] == pair[1][1]), (points[0], points[-1]))
 
 
@@ -59,8 +59,8 @@ def _length(start: Point, end: Point) -> float:
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
     """Yield places for a label, the best first.
 
-    These are around the middle of a level segment, or next to an upright one, near its tip where fewest
-    others cross.
+    They are around the middle of a horizontal segment. At a vertical segment they are next to it, near the
+    tip, where fewest other arrows cross.
     """
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:

@@ -1,7 +1,7 @@
-"""Lay out a control structure: rows of boxes, channels with one track per arrow.
+"""Lay out a control structure: rows of boxes, and between them channels with one track per arrow.
 
-Lengths are in px, y points down. An arrow that cannot go straight up or down gets its own track between two
-rows; one that would cross a box takes the left margin.
+Lengths are in px, y points down. An arrow that cannot go straight up or down gets a separate track between
+two rows. An arrow that would cross a box runs along the left margin.
 """
 
 from collections import defaultdict
@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from mutator.stpa.analysis import ComponentModel, LinkModel, StructureModel
 from mutator.stpa.labels import Label, Point, place_labels
 
-PITCH = 212  # from column to column
-GAP = 88  # between adjacent boxes
-MARGIN = 110  # left of the first column, for arrows around the rows
+PITCH = 212  # distance between columns
+GAP = 88  # distance between adjacent boxes
+MARGIN = 110  # margin left of the first column, for arrows around the rows
 EDGE = 20
 BOX_HEIGHT = 46
 LINE = 17  # one more line of text in a box
 TRACK = 44
-CHANNEL = 64  # a channel without tracks
-APART = 24  # between parallel arrows
+CHANNEL = 64  # height of a channel without tracks
+APART = 24  # distance between parallel arrows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,7 @@ class Box:
         return self.y + self.height
 
     def holds(self, x: float) -> bool:
-        """Whether an arrow at `x` meets the box well inside its edges."""
+        """Whether an arrow at `x` meets the box, not too close to its edges."""
         return self.x + 8 <= x <= self.x + self.width - 8
 
 
@@ -61,7 +61,7 @@ class Layout:
 
 
 def lay_out(structure: StructureModel, lines: int = 1) -> Layout:
-    """Place every component and link; each box has room for `lines` lines, or more if it needs them."""
+    """Place every component and link. Each box has room for at least `lines` lines of text."""
     boxes = _boxes(structure, lines)
     ports = _ports(structure.links, boxes)
     points: dict[str, tuple[Point, ...]] = {}
@@ -117,7 +117,7 @@ def _boxes(structure: StructureModel, lines: int) -> dict[str, Box]:
 
 
 def _tracks(structure: StructureModel, row: int) -> int:
-    """How many arrows need a track below `row`, i.e. have ends without a common column."""
+    """The number of arrows that need a track below `row`, because their ends have no common column."""
     count = 0
     for link in structure.links.values():
         (row1, first1, width1), (row2, first2, width2) = (
@@ -135,15 +135,15 @@ def _lines(component: ComponentModel) -> tuple[str, ...]:
 
 
 def _ports(links: dict[str, LinkModel], boxes: dict[str, Box]) -> dict[str, tuple[float, float]]:
-    """x of each link's tail and tip: above each other if possible, else apart from all others."""
+    """The x of each link's tail and tip: the same x if possible, otherwise apart from all others."""
     ports = dict.fromkeys(links, (0.0, 0.0))
-    edges: dict[tuple[str, bool], list[str]] = defaultdict(list)  # (box, lower edge?) -> its links
+    edges: dict[tuple[str, bool], list[str]] = defaultdict(list)  # (box, at its lower edge) -> its links
     for name, link in links.items():
         down = boxes[link.from_].row < boxes[link.to].row
         if boxes[link.from_].row != boxes[link.to].row:
             edges[link.from_, down].append(name)
             edges[link.to, not down].append(name)
-    taken: dict[int, list[float]] = defaultdict(list)  # channel -> x of arrows in it
+    taken: dict[int, list[float]] = defaultdict(list)  # channel -> x of the arrows in it
     bent = []
     for name, link in links.items():
         if boxes[link.from_].row == boxes[link.to].row:
@@ -171,7 +171,9 @@ def _spread(
     links: dict[str, LinkModel],
     boxes: dict[str, Box],
 ) -> float:
-    """x of a link at the box `own`: an edge's links are spread evenly, in the order of their other ends."""
+    """The x of a link at the box `own`. The links of an edge are spread evenly, in the order of their other
+    ends.
+    """
     other = links[name].to if links[name].from_ == own else links[name].from_
     mates = edges[own, boxes[own].row < boxes[other].row]
     mates = sorted(mates, key=lambda mate: _middle(boxes, links[mate], own))
@@ -179,9 +181,10 @@ def _spread(
 
 
 def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
-    """The place nearest to `x` on the box's edge that keeps its distance from `others`, to which it is added.
+    """The place on the box's edge that is nearest to `x` and keeps its distance from `others`; it is added to
+    `others`.
 
-    The side of the other end, `toward`, is tried first, which saves a crossing.
+    The side towards the other end, `toward`, is tried first, because this saves a crossing.
     """
     side = 1.0 if toward > x else -1.0
     edge = range(int(box.x) + 10, int(box.x + box.width) - 9)
@@ -197,7 +200,7 @@ def _middle(boxes: dict[str, Box], link: LinkModel, own: str) -> float:
 
 
 def _blocked(ports: tuple[float, float], tail: Box, tip: Box, boxes: Iterable[Box]) -> bool:
-    """Whether a box between the rows blocks the long vertical part of the arrow."""
+    """Whether a box between the rows is in the way of the long vertical part of the arrow."""
     upper, lower = sorted((tail.row, tip.row))
     x = ports[0] if tail.row > tip.row else ports[1]
     return any(upper < box.row < lower and box.x - 8 <= x <= box.x + box.width + 8 for box in boxes)
