@@ -126,7 +126,7 @@ class FactorModel(StrictModel, title="A causal factor"):
         min_length=1, description="The links or components of the control structure where it goes wrong."
     )
     at: list[str] = Field(default_factory=list, description="The places in the target, as `file::function`.")
-    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions to which it may lead.")
+    leads_to: list[str] = Field(min_length=1, description="The unsafe control actions that it may cause.")
     faults: list[str] = Field(default_factory=list, description="The fault specs that represent it.")
     no_fault: str | None = Field(None, description="The reason why no fault spec represents it.")
 

@@ -22,7 +22,7 @@ def check_analysis(
 
     * Each hazard has an unsafe action that causes it; unsafe actions and context tables agree.
     * Each action is judged in all four categories; each unsafe action has a causal factor.
-    * Each factor's faults are injected at the factor's places and aim at hazards to which it leads; each spec
+    * Each factor's faults are injected at the factor's places and aim at hazards that it leads to; each spec
       belongs to a factor.
     """
     by_name = {spec.name: spec for spec in specs}
@@ -251,7 +251,7 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
 
 
 def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """Check that every fault aims at a hazard to which the factor leads."""
+    """Check that every fault aims at a hazard that the factor leads to."""
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:

@@ -89,7 +89,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards by id, with descriptions, and the accidents to which each hazard may lead."""
+    """Accidents and hazards by id, with descriptions, and the accidents that each hazard may cause."""
 
     source: Source
     accidents: Mapping[str, str]
@@ -127,7 +127,7 @@ class TableModel(StrictModel, title="contexts/*.yaml"):
 
 class _HazardModel(StrictModel, title="A hazard"):
     about: str = Field(description="What the hazard is.")
-    leads_to: list[str] = Field(description="The accidents to which it may lead.")
+    leads_to: list[str] = Field(description="The accidents that it may cause.")
 
 
 class HazardsModel(StrictModel, title="hazards.yaml"):
