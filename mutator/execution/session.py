@@ -53,22 +53,22 @@ Notify = Callable[[Progress], None]
 class Summary:
     """The outcome of a session. `outcomes` is as in Progress."""
 
-    planned: int  #: planned experiments of this folder
-    done: int  #: those with a record that counts
-    ran: int  #: of these, the ones that ran in this session
-    outcomes: Counter[str]  #: how many experiments ended how
+    planned: int  #: number of planned experiments in this folder
+    done: int  #: number of them with a record that counts
+    ran: int  #: number of these that ran in this session
+    outcomes: Counter[str]  #: number of experiments by outcome or status
     harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
     problem: str  #: why the session ended early (disk full, a worker died); empty if it did not
     interrupted: bool  #: whether a signal ended it
-    results: Path | None  #: results.csv; None when there was no room for it
-    proof: equivalence.Proof | None  #: the equivalence check; None: the reference engine ran everything
-    seal: str | None  #: the seal of a finished run
-    not_forked: str  #: why nothing was forked or proved; empty also where you asked for that
-    elapsed_s: float  #: duration of the session in s
+    results: Path | None  #: path of results.csv; None if the disk was full
+    proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
+    seal: str | None  #: the seal; None if the run is not finished
+    not_forked: str  #: why nothing was forked; empty if some was, or the reference engine was requested
+    elapsed_s: float  #: duration of the session (s)
 
     @property
     def proof_note(self) -> str:
-        """How far the proof is, or why there is none; empty if the reference engine was requested."""
+        """The state of the proof, or why there is none; empty if the reference engine was requested."""
         if self.not_forked:
             return f"none is needed, as no experiment was forked: {self.not_forked}"
         return str(self.proof) if self.proof else ""
