@@ -12,7 +12,7 @@
     row, text: row.textContent.toLowerCase(), changes: [...row.querySelectorAll(".change")].map((e) => e.textContent),
   }));
 
-  /** Show the rows with all chosen changes and words, up to the limit. */
+  /** Show the rows that have all chosen changes and words, up to the limit. */
   function filter() {
     const chosen = buttons.filter((b) => b.getAttribute("aria-pressed") === "true").map((b) => b.dataset.change);
     const parts = words.value.toLowerCase().split(/\s+/).filter(Boolean);

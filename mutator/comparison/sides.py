@@ -58,8 +58,8 @@ class Side:
 def read_side(run: Path, only: str | None = None) -> Side:
     """Read the run folder `run` and its experiments that match `only`, a filter over plan columns.
 
-    Uses plan and records, and writes nothing. MutatorError if it is not a run folder; CheckFailed if its
-    equivalence check failed.
+    The function uses plan and records, and writes nothing. Raise MutatorError if `run` is not a run folder,
+    and CheckFailed if its equivalence check failed.
     """
     folder = RunFolder.open(run)
     records = folder.records()

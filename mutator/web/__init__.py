@@ -1,6 +1,7 @@
-"""Assets of the HTML pages (CSS and JavaScript files of this package), and data embedded in pages.
+"""Assets of the HTML pages (the CSS and JavaScript files of this package), and data embedded in pages.
 
-Scripts are plain, in the order in which a page names them; each declares one constant.
+Scripts are plain, not modules. A page loads them in the order in which it names them. Each declares one
+constant.
 """
 
 import base64
@@ -13,7 +14,7 @@ from typing import Any
 
 @cache
 def asset(name: str) -> str:
-    """The text of a file of this folder; CSS and JavaScript are safe inside `<style>` and `<script>`."""
+    """The text of a file in this folder. CSS and JavaScript are safe inside `<style>` and `<script>`."""
     text = files(__package__).joinpath(name).read_text(encoding="utf-8")
     if not name.endswith(".html") and ("</script" in text or "</style" in text):
         raise ValueError(f"{name} would end the element it is put into")
@@ -21,18 +22,18 @@ def asset(name: str) -> str:
 
 
 def packed(value: Any) -> str:
-    """`value` as compressed JSON in base64, deterministic; packed.js reads it."""
+    """Pack `value` as compressed JSON in base64, which packed.js reads. Equal values give equal text."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return base64.b64encode(gzip.compress(text.encode(), compresslevel=9, mtime=0)).decode("ascii")
 
 
 def plainly_embedded(value: Any, name: str) -> str:
-    """A script element with id `name` that carries `value` as plain JSON, for scripts that need it
+    """A script element with id `name` that contains `value` as plain JSON, for scripts that need it
     immediately."""
     text = json.dumps(value, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{name}">{text}</script>'
 
 
 def embedded(value: Any, name: str) -> str:
-    """A script element with id `name` that carries `value`, compressed; `Packed.read(name)` reads it."""
+    """A script element with id `name` that contains `value`, compressed. `Packed.read(name)` reads it."""
     return f'<script type="application/octet-stream+gzip" id="{name}">{packed(value)}</script>'

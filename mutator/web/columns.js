@@ -1,5 +1,5 @@
 "use strict";
-// The choice of the list's columns: a fold-out of all available ones.
+// The fold-out in which the user chooses the columns of the list.
 
 class Columns {
   constructor(place, grid, state) {

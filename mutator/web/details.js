@@ -4,7 +4,7 @@
 class Details {
   static #made = null;
 
-  /** The page's details, unpacked once. */
+  /** The details in the page, which are unpacked once. */
   static read() {
     Details.#made ??= Packed.read("details").then((data) => new Details(data));
     return Details.#made;
@@ -12,12 +12,12 @@ class Details {
 
   constructor(data) {
     this.data = data;
-    // a shape's members follow row order
+    // the members of a shape are in row order
     const seen = new Uint32Array(data.shapes.length);
     this.member = data.shape.map((shape) => (shape < 0 ? -1 : seen[shape]++));
   }
 
-  /** The diff of a row, with its values in the holes of its shape; null: no diff. */
+  /** The diff of a row: its shape with the row's values in the holes; null: no diff. */
   patch(row) {
     const shape = this.data.shapes[this.data.shape[row]];
     if (!shape) return null;

@@ -12,7 +12,7 @@ const Diff = (() => {
   const TAGS = JSON.parse(document.getElementById("tags").textContent);
   const MARK = TAGS.mark.replace(/[^\w\s]/g, "\\$&");
   const TAG = new RegExp(`${MARK}\\S+[^\\n]*$`);
-  // The lines that every mutant needs to call the probe.
+  // Lines that every mutant has, because it calls the probe.
   const PROBE = new RegExp(`${MARK}(?:${TAGS.probe.join("|")})\\b`);
   // In order: holes of a shape, tag of an injected line, comment, string (complete or to the end of the line), number, word.
   const REST =
@@ -47,11 +47,11 @@ const Diff = (() => {
     return files;
   }
 
-  /** For each line of a hunk: does it begin inside a docstring? The docstring may begin above the hunk. */
+  /** Whether each line of a hunk begins inside a docstring, which may begin above the hunk. */
   function prose(lines) {
     const isOdd = (line) => (line.text.match(/"""/g) || []).length % 2 === 1;
     const first = lines.find(isOdd);
-    // the first quotes open a docstring if text follows them, else they close one
+    // the first quotes open a docstring if text follows them; else they close one
     let inside = Boolean(first) && !/^\s*[rRfFbB]*"""./.test(first.text);
     return lines.map((line) => {
       const before = inside;
@@ -89,7 +89,7 @@ const Diff = (() => {
   const unifiedRow = (line) => el(`tr.${CHANGE[line.sign]}`, {}, number(line.old), number(line.new), code(line));
   const splitRow = ([a, b]) => el("tr", {}, number(a && a.old), code(a), number(b && b.new), code(b));
 
-  /** Lines of a hunk side by side: removed lines next to the added lines that follow. */
+  /** The lines of a hunk side by side, with removed lines next to the added lines that follow them. */
   function pairs(lines) {
     const made = [];
     for (let i = 0; i < lines.length; ) {
@@ -116,7 +116,7 @@ const Diff = (() => {
     return el(`table.diff.${split ? "split" : "unified"}`, { "aria-label": `Changes of ${path}` }, widths, el("tbody", {}, body));
   }
 
-  // The probe's own lines are folded.
+  // The lines that call the probe are folded.
   const changes = (hunk) => hunk.lines.filter((line) => line.sign !== " ");
   const isProbe = (hunk) => changes(hunk).every((line) => PROBE.test(line.text));
 
@@ -138,7 +138,7 @@ const Diff = (() => {
     element.append(fold);
   }
 
-  /** Only the injected lines, without tags and without the probe's own lines: [{path, lines}]. */
+  /** The injected lines alone, without tags and without the lines that call the probe: [{path, lines}]. */
   function injected(patch) {
     return parse(patch).filter((file) => !file.isNew).map((file) => ({
       path: file.path,

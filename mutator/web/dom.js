@@ -1,5 +1,5 @@
 "use strict";
-// Creates elements in one expression; strings become text, never markup.
+// Creates elements in one expression. Strings become text, never markup.
 
 const Dom = (() => {
   /** An element: `el("a.link", {href, onclick}, "text", child, [more])`. Null attributes and children are left out. */
@@ -41,7 +41,7 @@ const Dom = (() => {
     return button;
   }
 
-  /** Select the text of an element, for pages that are not allowed to copy. */
+  /** Select the text of an element, so that the user can copy it where the page is not allowed to. */
   function select(element) {
     if (element) getSelection().selectAllChildren(element);
   }

@@ -2,11 +2,11 @@
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
-  static open = null; // {id, experiment} for scripts that add buttons; the event `filled` announces it
+  static open = null; // {id, experiment} for scripts that add buttons, which the event `filled` notifies
   static NO_PICTURES = "A campaign with camera images makes stills of only some of its worst experiments, because each needs a rerun. "
     + "This command makes stills of this experiment; then rebuild the report to see them here:";
 
-  /** `move(by)` moves in the list, `place()` returns the position in it, `close()` closes the panel. */
+  /** `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
   constructor(place, table, state, facts, actions) {
     Object.assign(this, { place, table, state, facts, actions, title: document.title });
     this.mode = innerWidth > 1100 ? "split" : "unified";
@@ -17,7 +17,7 @@ class Experiment {
     return !this.place.hidden;
   }
 
-  /** Show the experiment of the state, or nothing. */
+  /** Show the experiment that the state names, or hide the panel. */
   async show() {
     const id = this.state.experiment, row = id ? this.table.find(id) : -1;
     if (!id) {
@@ -33,14 +33,14 @@ class Experiment {
       return;
     }
     const wasOpen = this.isOpen, hadFocus = this.place.contains(document.activeElement);
-    const button = document.activeElement?.getAttribute("aria-label"); // next/previous are pressed repeatedly
+    const button = document.activeElement?.getAttribute("aria-label"); // users press next and previous repeatedly
     this.row = row;
     this.place.hidden = false;
     if (row < 0) this.#none(id);
     else this.#fill();
     this.#showPlace();
     this.place.scrollTop = 0;
-    // restore the focus that was lost, or keys would scroll the page below
+    // restore the lost focus, or keys would scroll the page below
     if (!wasOpen || hadFocus) {
       const same = hadFocus && [...this.place.querySelectorAll("header button")].find((b) => b.getAttribute("aria-label") === button);
       (same || this.place.querySelector("h2")).focus({ preventScroll: true });
@@ -121,7 +121,7 @@ class Experiment {
       this.#severity(), this.#metrics());
   }
 
-  /** Why there are no events. */
+  /** The reason why there are no events. */
   static #nothing(status, outcome) {
     if (status === "invalid_mutant") return "The mutant could not be built. This says nothing about the fault.";
     if (status === "harness_error") return "The harness failed. This says nothing about the fault.";
@@ -134,7 +134,7 @@ class Experiment {
     return `hazard ${name}${about ? `: ${about}` : ""}`;
   }
 
-  /** The severity class of the contact, and its meaning. */
+  /** The severity class of the contact and its meaning. */
   #severity() {
     const { el } = Dom;
     const name = this.text("severity"), scale = this.facts.severity;
@@ -144,7 +144,7 @@ class Experiment {
       about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), `${scale.name}: ${scale.source}`));
   }
 
-  /** The metrics of this run, with meanings. */
+  /** The metrics of this run and their meanings. */
   #metrics() {
     const { el } = Dom;
     const known = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
@@ -162,13 +162,13 @@ class Experiment {
   #commands() {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
-    const tried = this.text("module") === "operators" ? [] // no spec has these
+    const tried = this.text("module") === "operators" ? [] // specs have no operators
       : [el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try())];
     return el("div", {}, el("p", {}, "Rerun it and compare it with its record; show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
 
-  /** The `mutator try` command for this fault; random triggers become a time. It always names the reading, because
+  /** The `mutator try` command for this fault. A random trigger becomes a time. The reading is always named, because
    *  the default depends on the library. */
   #try() {
     const value = this.text("value"), isNumber = value !== "" && !Number.isNaN(Number(value));
@@ -192,7 +192,7 @@ class Experiment {
     return this.place.querySelector(`section.${name} .content`);
   }
 
-  /** The parts that are unpacked on first use: diff, spec, stills, series. */
+  /** Fill the parts that are unpacked on first use: diff, spec, stills and series. */
   async #fillLate(row) {
     const id = this.text("experiment_id");
     this.#path();
@@ -250,7 +250,7 @@ class Experiment {
     const { el } = Dom;
     const place = this.#content("pictures");
     if (!kept && !(this.facts.filmed && this.#endedWell)) {
-      place.parentElement.remove(); // the target has no films, or the run has no channels
+      place.parentElement.remove(); // without films of the target, or without channels of the run
       return;
     }
     const hazard = this.table.number(this.row, "t_hazard"), begin = this.table.number(this.row, "t_activation");
@@ -264,14 +264,14 @@ class Experiment {
       this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
   }
 
-  /** The event at a still's time, from its file name. */
+  /** The event at the time of a still, which its file name has. */
   #moment(time) {
     const moments = { t_activation: "fault first active", t_alert: "first alert", t_hazard: "first hazard" };
     const what = Object.keys(moments).filter((name) => this.table.number(this.row, name).toFixed(2) === time).map((name) => moments[name]);
     return `${[`${time} s`, ...what].join(", ")} (the nearest still)`;
   }
 
-  /** Why there is no replay, and how to get one; `error`: why an existing series cannot be read. */
+  /** The reason why there is no replay, and how to get one. `error` says why an existing series cannot be read. */
   #noSeries(id, error) {
     const { el } = Dom;
     const place = this.#content("replay");

@@ -1,5 +1,5 @@
 "use strict";
-// The filters above the table: a fold-out for each facet, with counts, and removable chips for chosen values.
+// The filters above the table: a fold-out with counts for each facet, and removable chips for chosen values.
 
 class Filters {
   constructor(place, chips, table, state) {
@@ -14,7 +14,7 @@ class Filters {
       if (!open) return;
       open.open = false;
       open.querySelector("summary").focus();
-      event.preventDefault(); // do not also close an open experiment
+      event.preventDefault(); // so that the key does not also close an open experiment
     });
   }
 
@@ -24,7 +24,7 @@ class Filters {
 
   #facet(facet) {
     const { el } = Dom;
-    if (facet.values.length < 2) return null; // no choice
+    if (facet.values.length < 2) return null; // nothing to choose from
     const options = facet.values.map((value) => {
       const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
       const count = el("span.count");
@@ -37,12 +37,12 @@ class Filters {
     return { facet, options, badge, element };
   }
 
-  /** A value's display text. */
+  /** The text that shows a value. */
   static shown(facet, value) {
     return facet.show ? facet.show(value) : value;
   }
 
-  /** Show the chosen values and the counts of `filter`. */
+  /** Show the chosen values, and the counts of `filter`. */
   show(counts) {
     for (const { facet, options, badge, element } of this.facets) {
       const chosen = this.state.chosen.get(facet.name) || new Set();

@@ -3,10 +3,10 @@
 
 class Grid {
   static ROW_PX = 30;
-  static SPARE = 8; // extra rows above and below
+  static SPARE = 8; // extra rows rendered above and below the visible ones
   static PRINTED = 500; // rows printed on paper
 
-  /** Column, title, width in px, cell content; `narrow`: also shown on a phone. */
+  /** Column name, title, width in px and cell content. `narrow` columns are also shown on a phone. */
   static COLUMNS = [
     { name: "kind", title: "fault type", px: 174, narrow: true },
     { name: "variant", title: "variant", px: 72 },
@@ -31,12 +31,12 @@ class Grid {
     return Dom.el(`span.ending.${text || "none"}`, {}, text.replaceAll("_", " "));
   }
 
-  /** A severity class, labelled so that it is not mistaken for a scenario. */
+  /** A severity class with a label, because S1 alone could be a scenario. */
   static severity(text) {
     return text ? Dom.el("span.class", { title: `severity ${text}` }, Dom.el("span.word", {}, "severity "), text) : "";
   }
 
-  /** A number with three significant digits; '' for none. */
+  /** A number with three significant digits, or '' if there is none. */
   static number(value) {
     return Number.isNaN(value) ? "" : String(Number(value.toPrecision(3)));
   }
@@ -48,7 +48,7 @@ class Grid {
     this.rows = [];
     this.current = 0; // index in `rows` of the focused row
     this.isOnPaper = false;
-    this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // not every target has alerts
+    this.usual = Grid.COLUMNS.filter((column) => !table.count || table.columns.has(column.name)); // some targets have no alerts
     this.more = Grid.#more(table, metrics);
     this.#choose();
     this.#build();
@@ -56,7 +56,7 @@ class Grid {
     new ResizeObserver(() => this.#soon()).observe(place);
   }
 
-  /** The columns that are not shown by default; metrics have unit and meaning. */
+  /** The columns that are hidden by default. Metrics have unit and meaning. */
   static #more(table, metrics) {
     const known = new Map(metrics.map(([name, unit, about]) => [name, { unit, about }]));
     const names = [...table.columns.keys()].filter((name) => !Grid.COLUMNS.some((column) => column.name === name));
@@ -69,7 +69,7 @@ class Grid {
     });
   }
 
-  /** Use the state's columns, or the defaults. */
+  /** Show the columns that the state names, or the defaults. */
   #choose() {
     const wanted = this.state.columns;
     this.chosen = wanted.join();
@@ -104,11 +104,11 @@ class Grid {
     this.state.set({ sort: by === name ? `-${name}` : by === `-${name}` ? "" : name });
   }
 
-  /** Show these rows, from the first if they changed. The open experiment gets the focus if it is among them. */
+  /** Show these rows, from the first one if they changed. If the open experiment is among them, it gets the focus. */
   show(rows) {
     const areOthers = rows.length !== this.rows.length || rows.some((row, at) => row !== this.rows[at]);
     this.rows = rows;
-    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // a short list has a low window
+    this.place.style.setProperty("--rows", Math.max(1, rows.length)); // so that the window of a short list is low
     if (this.state.columns.join() !== this.chosen) {
       this.#choose();
       this.#build();
@@ -142,7 +142,7 @@ class Grid {
    */
   print(isOnPaper) {
     if (isOnPaper === this.isOnPaper) return;
-    if (isOnPaper) this.scrolled = this.place.scrollTop; // paper has fewer rows, so the scroll position is lost
+    if (isOnPaper) this.scrolled = this.place.scrollTop; // paper has fewer rows, so the position would be lost
     this.isOnPaper = isOnPaper;
     this.draw();
     if (isOnPaper) return;
@@ -150,7 +150,7 @@ class Grid {
     this.draw();
   }
 
-  /** The rows to render: visible ones plus a margin; on paper the first ones. */
+  /** The rows to render: the visible ones and a margin; on paper, the first ones. */
   #span() {
     if (this.isOnPaper) return [0, Math.min(this.rows.length, Grid.PRINTED)];
     const seen = Math.ceil(this.place.clientHeight / Grid.ROW_PX);
@@ -198,7 +198,7 @@ class Grid {
     this.state.set({ experiment: this.table.text(this.rows[at], "experiment_id") }, options);
   }
 
-  /** Move the focus by a number of rows; the open experiment follows. */
+  /** Move the focus by a number of rows. If an experiment is open, open the one with the focus. */
   move(by) {
     if (!this.rows.length) return;
     this.current = Math.max(0, Math.min(this.rows.length - 1, this.current + by));
@@ -207,7 +207,7 @@ class Grid {
     else this.focus();
   }
 
-  /** The position of an experiment among the rows: `3 of 16`. */
+  /** The position of an experiment among the rows, such as `3 of 16`. */
   placeOf(experiment) {
     const at = this.rows.indexOf(this.table.find(experiment)), all = this.rows.length.toLocaleString("en");
     return at < 0 ? "not in this list" : `${(at + 1).toLocaleString("en")} of ${all}`;

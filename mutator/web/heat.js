@@ -1,11 +1,11 @@
 "use strict";
-// Fault type x scenario: each cell shows a share, or a metric's median or worst value, as text and colour.
+// The map of fault type by scenario. Each cell shows a share, or a metric's median or worst value, as text and colour.
 // Selecting a cell sets the filters.
 
 class HeatMap {
   static ROW = "kind";
   static COLUMN = "scenario";
-  /** Facets that do not filter the map: its own two, and the results that it counts. */
+  /** Facets that do not filter the map: its two axes, and the results that it counts. */
   static FREE = ["kind", "scenario", "outcome", "status", "severity", "hazards", "alerts", "warning", "reached", "stopped_at", "through"];
 
   constructor(place, picker, table, state, metrics = []) {
@@ -23,7 +23,7 @@ class HeatMap {
     this.picker = picker;
   }
 
-  /** The share of activated faults with a contact of at least each class. */
+  /** For each severity class, the share of activated faults with a contact of at least that class. */
   static severities(table) {
     const found = table.facets.find((f) => f.name === "severity");
     const classes = found ? found.values.filter((value) => value !== found.none).sort() : [];
@@ -33,7 +33,7 @@ class HeatMap {
     }));
   }
 
-  /** Median and worst value of each metric over activated faults. */
+  /** The median and worst value of each metric over activated faults. */
   static values(table, metrics) {
     const of = (row) => table.text(row, "t_activation") !== "";
     return metrics.filter(([name]) => table.columns.get(name)?.numbers).flatMap(([name, unit, , worse]) => ["median", "worst"].map((which) => ({
@@ -42,7 +42,7 @@ class HeatMap {
     })));
   }
 
-  /** The shares: rows counted, and rows in the base. */
+  /** The shares, each with the rows that it counts and the rows in its base. */
   static shares(table) {
     const has = (name) => (row) => table.text(row, name) !== "";
     const isActive = has("t_activation"), isHazard = has("hazards"), isAlert = has("alerts"), all = () => true;
@@ -79,7 +79,7 @@ class HeatMap {
     for (const row of rows) {
       if (!this.table.usable(row) || !measure.of(row)) continue;
       const told = measure.value ? measure.value(row) : measure.part(row);
-      if (Number.isNaN(told)) continue; // the run has no value
+      if (Number.isNaN(told)) continue; // this run has no value
       const [y] = this.rows.members[this.rows.codes[row]], [x] = this.columns.members[this.columns.codes[row]];
       // last row and column: totals
       for (const at of [y * width + x, y * width + width - 1, (height - 1) * width + x, height * width - 1]) cells[at].push(told);
@@ -87,7 +87,7 @@ class HeatMap {
     this.#draw(measure, measure.value ? HeatMap.#summaries(measure, cells) : cells.map(HeatMap.#share), width, height);
   }
 
-  /** Text, description and colour (0 to 1) of a share's cell. */
+  /** The text, description and colour (0 to 1) of each cell of a share. */
   static #share(told) {
     return HeatMap.#shareOf(told.filter(Boolean).length, told.length);
   }
@@ -96,7 +96,7 @@ class HeatMap {
     return { all, text: `${n}/${all}`, what: all ? `${n} of ${all}, ${HeatMap.interval(n, all)}` : "", rate: all ? n / all : 0 };
   }
 
-  /** The same for a metric's cells; the worst has full colour. */
+  /** The same for the cells of a metric. The worst cell has full colour. */
   static #summaries({ which, turn }, cells) {
     return HeatMap.#coloured({ turn }, cells.map((told) => {
       const sorted = told.sort((a, b) => turn * (a - b)), middle = (sorted.length - 1) / 2;
@@ -105,7 +105,7 @@ class HeatMap {
     }));
   }
 
-  /** The same for values (null: none), each with its number of runs. */
+  /** The same for values (null if there is none), each with its number of runs. */
   static #coloured({ turn }, told) {
     const values = told.map(([value]) => value ?? NaN);
     const known = values.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
@@ -140,7 +140,7 @@ class HeatMap {
     return this.state.chosen.has(HeatMap.ROW) || this.state.chosen.has(HeatMap.COLUMN);
   }
 
-  /** Whether a facet has exactly `value` chosen; null: nothing. */
+  /** Whether exactly `value` is chosen in a facet; null stands for nothing. */
   #isChosen(name, value) {
     const chosen = this.state.chosen.get(name);
     return value === null ? !chosen : Boolean(chosen) && chosen.size === 1 && chosen.has(value);
@@ -151,7 +151,7 @@ class HeatMap {
     this.state.choose({ [HeatMap.ROW]: values(kind), [HeatMap.COLUMN]: values(scenario) });
   }
 
-  /** `30 % (18 to 45)`: the rate and its 95 % Wilson interval. */
+  /** The rate and its 95 % Wilson interval, such as `30 % (18 to 45)`. */
   static interval(n, all) {
     const z = 1.959964, p = n / all, scale = 1 + (z * z) / all;
     const middle = (p + (z * z) / (2 * all)) / scale;

@@ -7,15 +7,15 @@ const Jobs = (() => {
   const SOON_MS = 1000, LATER_MS = 5000, SHOWN = 20;
   const ACTIVE = ["queued", "running"];
   const isActive = (job) => ACTIVE.includes(job.state);
-  const rows = new Map(); // id of a job -> its row
+  const rows = new Map(); // job id -> row
   const watchers = [];
   let place = null, timer = null, known = [];
 
-  /** A server error as text. */
+  /** An error of the server as text. */
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** The server's answer; throws an Error with text if it refuses or is unreachable. */
+  /** The answer of the server. Throws an Error with a text if the server refuses or is unreachable. */
   async function ask(address, body) {
     const post = body && { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) };
     let response = null;
@@ -81,7 +81,7 @@ const Jobs = (() => {
     });
   }
 
-  /** A job's row. It stays the same element, so that its buttons keep the focus. */
+  /** The row of a job. It stays the same element, so that its buttons keep the focus. */
   function rowOf(id) {
     const state = el("span.job-state"), title = el("b"), progress = el("progress", { max: 1 }), message = el("span.quiet"), result = el("a", {}, "Show it");
     const button = (text, onclick) => el("button", { type: "button", onclick }, text);
@@ -106,7 +106,7 @@ const Jobs = (() => {
     return { element: el("li", {}, state, title, progress, message, el("span.job-do", {}, result, cancel, log)), update };
   }
 
-  /** A link to the open page reloads it, because its report was rebuilt. */
+  /** A link to the page that is open reloads it, because the job rebuilt its report. */
   function opened(event) {
     const to = new URL(event.currentTarget.href);
     if (to.pathname !== location.pathname) return;
@@ -131,7 +131,7 @@ const Jobs = (() => {
     }
   }
 
-  /** Put the list into the section `jobs`, or into a bar at the bottom. */
+  /** Put the list into the section `jobs`, if the page has it, or into a bar at the bottom. */
   function install() {
     const section = document.getElementById("jobs");
     place = section || el("aside.jobs", { id: "jobs", "aria-label": "Jobs", hidden: true });

@@ -1,5 +1,5 @@
 "use strict";
-// Reads data embedded in a page: gzipped JSON as base64 in a script element (web/__init__.py: embedded).
+// Reads data that is embedded in a page as gzipped JSON in base64 (web/__init__.py: embedded).
 
 const Packed = (() => {
   const read_ = new Map(); // element id -> promise of its value
@@ -12,7 +12,7 @@ const Packed = (() => {
     return JSON.parse(await new Response(stream).text());
   }
 
-  /** The value in the element `id`, unpacked once; null if there is no such element. */
+  /** The value in the element `id`, which is unpacked once; null if there is no such element. */
   function read(id) {
     if (!read_.has(id)) {
       const element = document.getElementById(id);

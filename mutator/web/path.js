@@ -11,7 +11,7 @@ const Path = (() => {
     held: { sign: "■", word: "held", about: "it stayed equal to the golden run" },
     unseen: { sign: "?", word: "not recorded", about: "it has no recorded channels" },
   };
-  let shown = null; // the strip that a replay highlights: {boxes: [[element, time]]}
+  let shown = null; // the strip in which a replay highlights boxes: {boxes: [[element, time]]}
 
   /** An experiment's channels that left the golden run, by component, with first times and largest deviations. */
   function departures(paths, row) {
@@ -54,7 +54,7 @@ const Path = (() => {
     return "No component of the control structure contains the file with the fault.";
   }
 
-  /** How far the fault got, as a sentence. */
+  /** A sentence that says how far the fault got. */
   function said(results, paths) {
     const label = (name) => paths.components[name]?.label || name;
     const all = (names) => names.split(";").map(label).join(" and ");
@@ -69,7 +69,7 @@ const Path = (() => {
     return { name, state, column, channels, own, t: Number.isNaN(t) ? Infinity : t, by: state !== "injected" && by !== undefined, begin };
   }
 
-  /** The boxes; components at the same distance along the path share a column. */
+  /** The boxes. Components at the same distance along the path share a column. */
   function drawn(stages, paths, boxes) {
     const { el } = Dom;
     const columns = [];
@@ -94,7 +94,7 @@ const Path = (() => {
       one.t === Infinity ? "" : el("span.time", {}, one.by ? "by " : "", seconds(one.t), one.state === "injected" ? "" : el("span.quiet", {}, ` ${since(one.t, one.begin)}`)));
   }
 
-  /** Why a component may change after one further along. */
+  /** The reason why a component may change after one further along the path. */
   function late(stages, paths) {
     const { el } = Dom;
     const all = stages.filter((one) => one.state === "reached" && stages.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
@@ -114,7 +114,7 @@ const Path = (() => {
           el("td.time", {}, seconds(c.t)), el("td.time", {}, since(c.t, begin)), el("td.time", {}, amount(c.largest, c.unit)), el("td", {}, c.about)))))));
   }
 
-  /** Follow the replay of the same experiment. */
+  /** Show the time of a replay of the same experiment. */
   function listen(place) {
     const panel = place.closest("#experiment");
     if (!panel || panel.dataset.path) return;
