@@ -39,7 +39,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.slow
 def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, Path], tmp_path: Path) -> None:
-    """Each record equals that of a run with the seed alone, and the run can be proved."""
+    """Each record equals that of a run with only this seed. The equivalence check of the run passes."""
     workspace, run = made
     several = RunFolder.open(run)
     path = workspace.campaign("small")
@@ -56,7 +56,8 @@ def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, P
 def test_a_known_run_is_not_looked_into_again(
     made: tuple[Workspace, Path], cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The second time only its bytes are compared, with the same summary; an audit checks everything."""
+    """The second time, only the bytes of the run are compared, and the summary is the same. An audit
+    checks everything."""
     workspace, run = made
     first = run_campaign(workspace, "small", run)
     assert ended_before(RunFolder.open(run)) is not None
@@ -73,9 +74,8 @@ def test_a_known_run_is_not_looked_into_again(
 
 
 def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A changed patch is found, though the folder was verified before; so is any change with recomputed
-    digests, since that is another run.
-    """
+    """A changed patch is found, although the folder was verified before. A change with recomputed digests
+    is found, too, because it makes another run."""
     run = made[1]
     RunFolder.open(run)
     patches = Patches(run)
@@ -92,7 +92,7 @@ def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path)
 
 
 def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A hand-made cache entry is ignored."""
+    """A cache entry made by hand is ignored."""
     run = made[1]
     RunFolder.open(run)
     key = integrity.content_key(run)
@@ -119,7 +119,8 @@ def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Pa
 def test_room_is_made_for_the_pictures_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run of several seeds frees space after the golden runs, and when a worker moves to another seed."""
+    """A run of several seeds frees space after the golden runs, and each time a worker changes to another
+    seed."""
     asked = []
     monkeypatch.setattr(caches, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
