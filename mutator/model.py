@@ -294,9 +294,7 @@ class Record:
     error: RunError | None = added(None)  #: the exception that ended the run: `kind`, `message`, `place`
     patch: str = ""  #: digest of the stored patch; empty without a mutant, and in old records
     t_end: float | None = added(None)  #: when a terminal hazard ended the drive, in s
-    dev: tuple[tuple[str, float], ...] = added(
-        ()
-    )  #: `max_dev` up to `t_end`; empty if no terminal hazard did
+    dev: tuple[tuple[str, float], ...] = added(())  #: `max_dev` up to `t_end`; empty without `t_end`
     #: metrics of the manifest and margins of its hazards, if they have a value
     metrics: tuple[tuple[str, float], ...] = added(())
     #: (channel, first time in s, largest deviation) of each channel that left golden before the end

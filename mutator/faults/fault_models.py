@@ -135,9 +135,7 @@ class FaultModels:
     folder: Path
     models: Mapping[str, FaultModel]
     probe: str
-    digest: (
-        str  # covers templates, probe, and models that raise: a mutant's text and how its exceptions count
-    )
+    digest: str  # covers what decides a mutant's text and how its exceptions count
 
     def __iter__(self) -> Iterator[FaultModel]:
         return iter(self.models.values())

@@ -111,9 +111,7 @@ class _Resolver:
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Whether it is a constant but not a number: a truth value, None, or a text other than the draw's
-        name.
-        """
+        """Whether it is a constant but no number: a truth value, None, or a text other than the draw's name."""
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
@@ -181,9 +179,7 @@ class _Resolver:
         return number
 
     def _constant(self, param: ParamSpec) -> Value:
-        """Return the value; MutatorError if it is a text that resembles the draw's name, a likely
-        misspelling.
-        """
+        """Return the value; MutatorError for a text that resembles the draw's name, a likely typing error."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
             raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that resembles it less")

@@ -73,9 +73,7 @@ class Variant:
         return self.readings[self._written(reading)]
 
     def hold(self, reading: str) -> Hold | None:
-        """How long the fault stays active under `reading` or the default; None: as long as its trigger
-        specifies.
-        """
+        """How long the fault stays active under `reading` or the default; None: as long as its trigger."""
         return self.holds[self._written(reading)]
 
     def _written(self, reading: str) -> str:

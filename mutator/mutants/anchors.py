@@ -57,9 +57,7 @@ class ParsedFile:
     fixed: tuple[FixedValue, ...]
     outer: tuple[range, ...]  # the lines of each outermost function
     where: Path
-    sound: set[Hashable] = field(
-        default_factory=set, repr=False, compare=False
-    )  # edits that passed all checks
+    sound: set[Hashable] = field(default_factory=set, repr=False, compare=False)  # edits that passed checks
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve_value(self, location: FaultLocation) -> Expression:
@@ -75,9 +73,7 @@ class ParsedFile:
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """The first line (from 0) of the statement or value that the location names, and the line after its
-        last.
-        """
+        """The first line (from 0) of the statement or value at the location, and the line after its last."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1

@@ -18,9 +18,8 @@ from mutator.model import AnchorKind
 from mutator.mutants.expression_roles import Found, Role, expressions_in, source_of
 from mutator.mutants.places import Positions
 
-_Point = tuple[
-    int, int
-]  # line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
+# line and column, from 0; in `Expression`, columns count bytes, elsewhere characters
+_Point = tuple[int, int]
 
 _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | ast.List | ast.Dict | ast.Set
 

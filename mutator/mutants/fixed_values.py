@@ -89,9 +89,7 @@ class _Finder:
     def of_body(
         self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
     ) -> Iterator[tuple[FixedValue, _Owner]]:
-        """Yield the values in a module's or class's statements; `around` is the statement of its body around
-        them.
-        """
+        """Yield the values in statements of a module or class; `around` is the outermost statement."""
         for statement in body:
             whole = around or statement
             match statement:

@@ -182,7 +182,7 @@ def _check_own_names(
             where=file.where,
             line=site.first + 1,
             expected="lines that set only parameters and names that the function does not use",
-            remedy=f"rename the name in {model.template_path.name}, or make it a parameter",
+            remedy=f"rename it in {model.template_path.name}, or make it a parameter",
         )
 
 

@@ -59,9 +59,8 @@ def reading(where: Path) -> Iterator[None]:
         message, line = str(error), None
         if isinstance(error, cst.ParserSyntaxError):
             message = error.message.partition(": expected")[0]
-            line = (
-                None if message.startswith("tokenizer") else error.raw_line
-            )  # counted in a part of the file
+            # the tokenizer counts lines within a part of the file
+            line = None if message.startswith("tokenizer") else error.raw_line
         raise MutatorError(
             f"LibCST cannot read it: {message}",
             where=where,

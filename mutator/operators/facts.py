@@ -30,9 +30,7 @@ class Facts:
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
-        """All lines of the statements that contain one of these lines, because a statement executes as a
-        whole.
-        """
+        """All lines of the statements that contain one of these lines; a statement executes as a whole."""
         ran = [own for own in self.own if any(line in lines for line in own)]
         return frozenset(lines).union(*ran)
 

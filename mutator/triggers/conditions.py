@@ -16,11 +16,7 @@ from mutator.errors import MutatorError
 TIME = "t"  # s; every target has it
 _FUNCTIONS = ("abs", "min", "max", "hypot")
 _OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
-_ARGUMENTS = {
-    "abs": (1, 1),
-    "hypot": (2, 2),
-    "rate": (1, 1),
-}  # minimum and maximum number; others take two or more
+_ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # minimum, maximum; others take two or more
 _NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not allowed as variables
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}

@@ -181,7 +181,7 @@ def test_as_yaml_writes_them() -> None:
         ({"call": 2, "every": 3}, "`call` and `every`; expected one of them"),
         (
             {"at": {"file": "m.py", "constant": "C"}, "where": "x == 1"},
-            "`where` at a constant; expected none",
+            "`where` at a constant; expected no `where`",
         ),
         ({"at": {"file": "m.py", "function": "f", "default": "x"}, "call": 1}, "`call` at a default"),
     ],
