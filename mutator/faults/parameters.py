@@ -111,7 +111,10 @@ class _Resolver:
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Whether it is a constant but no number: a truth value, None, or a text other than the draw's name."""
+        """Whether it is a constant but not a number.
+
+        Then it is a truth value, None, or a text other than the draw's name.
+        """
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
