@@ -35,7 +35,7 @@ class Audit:
     facts: Mapping[str, str]  #: what was audited, by name
     checks: tuple[Check, ...]  #: what was checked: `what`, `count` and `differences` of each
     seal: str | None  #: the seal computed from the content; None: not finished, or not verifiable
-    repaired: tuple[str, ...] = ()  #: what was put aside
+    repaired: tuple[str, ...] = ()  #: what was set aside
 
     def __repr__(self) -> str:
         return f"<Audit of {self.run.name}: {self._outcome}>"

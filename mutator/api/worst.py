@@ -19,7 +19,7 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
     updated first. MutatorError for an invalid filter.
     """
     texts = Results.up_to_date(run).texts()
-    order = places(texts).argsort().tolist()  # of all rows; filtering keeps the order
+    order = places(texts).argsort().tolist()  # sort all rows first, because filtering keeps the order
     if only is not None:
         accepts = compile_filter(only, list(texts.columns))
         batches = range(0, len(texts), _BATCH)

@@ -19,11 +19,9 @@ if TYPE_CHECKING:
 
 SomeGroups = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or their starts; none with --only."),
+    typer.Argument(metavar="[GROUP...]", help="Ids of groups, or the start of each; leave out with --only."),
 ]
-Yes = Annotated[
-    bool, typer.Option("--yes", "-y", help="Do not ask before deciding all groups that --only finds.")
-]
+Yes = Annotated[bool, typer.Option("--yes", "-y", help="Decide all groups that --only finds without asking.")]
 Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to each group.")]
 
 

@@ -26,7 +26,7 @@ OnlyGroups = Annotated[
 ExcludeGroups = Annotated[
     str | None, typer.Option("--exclude", metavar="EXPR", help="Leave out groups that match.")
 ]
-Groups = Annotated[list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or their starts.")]
+Groups = Annotated[list[str], typer.Argument(metavar="GROUP...", help="Ids of groups, or the start of each.")]
 By = Annotated[
     str | None, typer.Option("--by", metavar="NAME", help="The reviewer. Default: git's user.name.")
 ]

@@ -146,7 +146,7 @@ def clean(
     runs: Annotated[
         list[Path], typer.Argument(metavar="DIR", help="Run folders.", autocompletion=completion.runs)
     ],
-    yes: Annotated[bool, typer.Option("--yes", "-y", help="Do not ask.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", "-y", help="Delete without asking.")] = False,
 ) -> None:
     """Delete run folders.
 

@@ -35,7 +35,7 @@ class Module:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """A source tree in a manifest's terms.
+    """A source tree, described in a manifest's terms.
 
     `root` is the folder for `sys.path`; `packages` are its import packages and flat modules (`drive.py`).
     `modules` were read; `unread` were not: path and line, and reason. `requires` is the tree's installed

@@ -80,7 +80,7 @@ class CalledCode:
         return text.decode("utf-8", "surrogateescape")
 
     def _files(self, path: str, node: ast.AST) -> Iterator[_Place]:
-        """Files next to this one that are not Python and that its source names: C code, a table."""
+        """The files in the same folder that the source names and that are not Python: C code, a table."""
         folder = PurePosixPath(path).parent
         for one in ast.walk(node):
             if isinstance(one, ast.Constant) and isinstance(one.value, str) and "." in one.value:

@@ -27,7 +27,7 @@ class _Commit:
 
 
 def _names(person: str) -> set[str]:
-    """A person's identities: name, address, both."""
+    """The ways to write a person: name, address, or both."""
     name, _, rest = person.partition("<")
     return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 

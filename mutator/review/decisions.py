@@ -130,7 +130,7 @@ class Review:
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
     def describe(self, group: Group) -> str:
-        """Who decided about the group, and changes since; empty without a decision."""
+        """The reviewer who decided about the group, and the changes since then; empty without a decision."""
         decision = self.decision(group.id)
         if decision is None:
             return ""

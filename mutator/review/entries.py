@@ -28,10 +28,10 @@ class Verdict(StrEnum):
 class Bound:
     """Digests of a decision's subject. If one changes, the decision is no longer valid."""
 
-    diff: str  # of hunks with injected lines, without values and line numbers
-    function: str  # of the changed target functions, without injected lines
-    template: str  # of the templates of the injected lines
-    calls: str | None = None  # of the target code that the injected lines call; None: not stored
+    diff: str  # digest of the hunks with injected lines, without values and line numbers
+    function: str  # digest of the changed target functions, without injected lines
+    template: str  # digest of the templates of the injected lines
+    calls: str | None = None  # digest of the target code that the injected lines call; None: not stored
 
     def changed(self, now: "Bound") -> list[str]:
         """The changed parts, as text."""

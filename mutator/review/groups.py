@@ -21,8 +21,8 @@ from mutator.triggers.conditions import TIME, names_in
 Span = tuple[int, int, str]  # position of a value in a patch: begin, end, name (empty: not yet known)
 
 HOLE = "\0"  # never in Python source
-_WORD = r"\w.\\\x80-\U0010ffff"  # next to a number: it continues, or is part of a name
-_NUMBER = (  # with its sign, and with that of a sum: `- 3.0`
+_WORD = r"\w.\\\x80-\U0010ffff"  # next to one of these, a number is part of a longer number or of a name
+_NUMBER = (  # with its sign, and the operator of a sum: `- 3.0`
     rf"(?:[+-] ?){{0,2}}(?:(?<![{_WORD}])[0-9]+(?:\.[0-9]*)?(?:e[+-]?[0-9]+)?(?![{_WORD}])"
     r"|float\('-?(?:nan|inf)'\))|(?<![\w.])(?:True|False)(?!\w)"
 )

@@ -55,7 +55,7 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
     try:
         written = table.path.stat().st_mtime_ns
     except OSError:
-        written = 0  # reading reports the error
+        written = 0  # reading the table reports the error
     with _reading:
         return _of_run(run.path, written).get(group.what)
 

@@ -100,7 +100,7 @@ _ORDERS: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """A checked request: the `words` of its command line, and its run `folder`."""
+    """A checked request: the arguments of its command line (`words`), and the folder of its run."""
 
     order: Order
     title: str

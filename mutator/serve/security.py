@@ -53,7 +53,7 @@ class Guarded:
         await (answer or self._app)(scope, receive, send)
 
     def _refused(self, scope: Scope) -> Response | None:
-        """Return the response to a request from elsewhere."""
+        """Return the response that refuses a request from elsewhere; None if the request may pass."""
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
         if method not in _METHODS:
