@@ -44,7 +44,7 @@ def arguments(tmp_path: Path) -> list[str]:
 
 
 def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, object]]:
-    """Trace and record of a run."""
+    """The trace and the record of a run."""
     Ball.main(arguments)
     out = Path(arguments[5])
     with np.load(out / "trace.npz") as trace:
@@ -268,7 +268,7 @@ def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
 
 
 def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
-    """A run leaves the process's generators unchanged; only `seed_globals` seeds them."""
+    """A run leaves the random generators of the process unchanged. Only `seed_globals` seeds them."""
     before = random.getstate()
     driven(arguments)
     assert random.getstate() == before

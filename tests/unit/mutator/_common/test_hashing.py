@@ -18,28 +18,28 @@ CONDITION = "hwt <= 2.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection(model.Injection):
-    """An injection of a later version."""
+    """The Injection class of a later version, with one more field."""
 
     every: int = added(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger(model.Trigger):
-    """A trigger of a later version."""
+    """The Trigger class of a later version, with one more field."""
 
     fade: Hold | None = added(None)
 
 
 @dataclass(frozen=True)
 class Fault(model.Fault):
-    """A fault of a later version."""
+    """The Fault class of a later version, with one more field."""
 
     tags: tuple[str, ...] = added(())
 
 
 @dataclass(frozen=True)
 class Experiment(model.Experiment):
-    """An experiment of a later version."""
+    """The Experiment class of a later version, with one more field."""
 
     repeat: int = added(0)
 

@@ -56,7 +56,7 @@ def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
 
 
 def test_another_archive_has_another_folder(archive: Path) -> None:
-    """Two versions of the harness do not disturb each other."""
+    """Two versions of the harness unpack their files into separate folders."""
     folder = shipped_folder()
     with ZipFile(archive, "a") as file:
         file.writestr("target/selfdrive/new.py", b"")

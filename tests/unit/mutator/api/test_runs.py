@@ -171,7 +171,8 @@ def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
 
 
 def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
-    """An experiment has diff, fault, record, verdict and plot, and a notebook shows a table and a figure."""
+    """An experiment has a diff, a fault, a record, a verdict and a plot. A notebook shows it as a table
+    and a figure."""
     [name] = driven.results.index
     experiment = driven.experiment(name)
     assert "# fi:" in experiment.diff
@@ -286,7 +287,7 @@ def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: C
 
 
 def test_reports_and_exports(run: Run) -> None:
-    """A run writes its report and its exports; the CSV export is results.csv."""
+    """A run writes its report and its exports. The CSV export equals results.csv."""
     assert run.export("csv").read_bytes() == (run.path / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match=r"'xls'.*expected one of mutation-elements, junit, csv, parquet"):
         run.export("xls")

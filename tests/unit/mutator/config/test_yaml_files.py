@@ -90,7 +90,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
     ],
 )
 def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:
-    """The error names file and line and shows the offending value."""
+    """The error names file and line and shows the invalid value."""
     with pytest.raises(MutatorError) as caught:
         read(tmp_path, text)
     message = str(caught.value)
@@ -113,7 +113,7 @@ def test_bytes_that_are_no_text(tmp_path: Path) -> None:
 
 
 def test_a_file_made_to_hurt(tmp_path: Path) -> None:
-    """Very deep nesting and very large files are refused at once."""
+    """Very deep nesting and very large files are refused immediately."""
     with pytest.raises(MutatorError):
         read(tmp_path, "[" * 20_000)
     with pytest.raises(MutatorError, match="at most 1000000 bytes"):

@@ -139,7 +139,7 @@ def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
 
 
 def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
-    """A function on the first line of a file with a byte order mark has mutants that compile."""
+    """A file that begins with a byte order mark and a function has mutants that compile."""
     (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
     tree = read_tree(tmp_path, ["m.py"])
     file, models = parsed(tree, "m.py"), clone.fault_models()

@@ -1,4 +1,4 @@
-"""The one reader of a run's results."""
+"""The reader of a run's results, which is the only one."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Counts over the results table."""
+"""Counts of the experiments in the results table."""
 
 import csv
 from pathlib import Path

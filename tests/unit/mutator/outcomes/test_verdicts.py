@@ -43,7 +43,7 @@ def test_events_before_the_activation_do_not_count(time: float, counts: bool) ->
 
 
 def test_no_event_counts_without_activation() -> None:
-    """Without activation no event is attributed to the fault."""
+    """If the fault was never activated, no event is attributed to it."""
     assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
 
 

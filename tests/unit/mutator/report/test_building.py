@@ -26,7 +26,7 @@ HERE = Workspace.find(Path(__file__).parents[4])
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    """A made-up run of a campaign without a study."""
+    """A made-up run of a campaign that requests no study."""
     return make_run(tmp_path)
 
 

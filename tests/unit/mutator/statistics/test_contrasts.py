@@ -46,7 +46,8 @@ def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
 
 
 def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
-    """Mantel-Haenszel: sum of a*d/n over sum of b*c/n, here (10*15/40 + 4*18/40) / (10*5/40 + 16*2/40)."""
+    """The Mantel-Haenszel ratio is the sum of a*d/n over the sum of b*c/n: (10*15/40 + 4*18/40) / (10*5/40
+    + 16*2/40)."""
     pooled = contrasts.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high

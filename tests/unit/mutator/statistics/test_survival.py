@@ -54,11 +54,11 @@ def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
 def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any]) -> None:
-    """The interval is where lifelines' interval of the curve contains one half.
+    """The interval consists of the times at which lifelines' interval of the curve contains one half.
 
-    Lifelines uses (0, 0) as the interval of a curve at 0, so its interval ends there at the latest: four
-    times alone would bound a median, though all of them are below it once in sixteen. The report leaves it
-    open, like R.
+    Lifelines uses (0, 0) as the interval where the curve is 0, so its interval for the median ends there
+    at the latest. With four times, this would bound the median, although all four are below it in one case
+    of sixteen. The report leaves the interval open, as R does.
     """
     found = reaction(sample)
     high = sample["median_high"]
@@ -72,8 +72,8 @@ def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any])
 
 
 def test_the_published_curve_of_freireich() -> None:
-    """6-MP: 0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448; medians of 23 and 8 weeks (Kleinbaum and Klein,
-    Survival Analysis: A Self-Learning Text, chapter 2)."""
+    """The curve for 6-MP is 0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448, and the medians are 23 and 8
+    weeks (Kleinbaum and Klein, Survival Analysis: A Self-Learning Text, chapter 2)."""
     drug, placebo = LIFELINES["6-MP"], LIFELINES["placebo"]
     curve = [round(reaction(drug, week).survival, 3) for week in (6, 7, 10, 13, 16, 22, 23)]
     assert curve == [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448]
@@ -81,7 +81,8 @@ def test_the_published_curve_of_freireich() -> None:
 
 
 def test_the_published_medians_of_miller() -> None:
-    """31 weeks maintained, 23 not maintained: what R's `survfit` prints of its data set `aml`."""
+    """The medians are 31 weeks if maintained and 23 if not, as R's `survfit` prints for its data set
+    `aml`."""
     medians = [reaction(LIFELINES[name]).median for name in ("maintained", "not maintained")]
     assert medians == [31.0, 23.0]
 

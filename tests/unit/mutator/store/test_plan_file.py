@@ -1,4 +1,4 @@
-"""The frozen plan on disk, and plans of other versions."""
+"""The frozen plan on disk, and plans that other versions wrote."""
 
 import json
 import os

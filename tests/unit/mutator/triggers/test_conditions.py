@@ -113,7 +113,7 @@ def test_names_come_in_the_order_of_the_text() -> None:
     ("a", "b", "result"), [(1.0, 0.0, math.inf), (-1.0, 0.0, -math.inf), (1.0, -0.0, -math.inf)]
 )
 def test_division_by_zero_is_infinite(a: float, b: float, result: float) -> None:
-    """Division follows IEEE 754, so a condition is true or false everywhere."""
+    """Division follows IEEE 754, so every condition is either true or false."""
     assert divide(a, b) == result
     assert math.isnan(divide(0.0, b))
     assert evaluate("1 / t > 5", {**FOLLOWING, "t": 0.0})

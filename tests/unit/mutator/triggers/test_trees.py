@@ -37,5 +37,5 @@ def test_a_formula_is_a_tree_of_its_operators(text: str, made: object) -> None:
     ],
 )
 def test_a_chain_of_comparisons_is_all_of_them(text: str, made: object) -> None:
-    """`a < b <= c` becomes `a < b and b <= c`; truth values are unchanged."""
+    """`a < b <= c` becomes `a < b and b <= c`. Truth values are unchanged."""
     assert tree(check_condition(text, variables=KNOWN, over_time=True), {}) == made
