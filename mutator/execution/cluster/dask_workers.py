@@ -39,7 +39,7 @@ class ClusterWorkers:
             with suppress(RuntimeError):  # the loop has just closed
                 loop.call_soon_threadsafe(deal.cancel)
             over.wait()
-            if not isinstance(err, KeyboardInterrupt):  # in case warnings are errors
+            if not isinstance(err, KeyboardInterrupt):  # a warning that is raised as an error
                 raise
             session.interrupted = True
         if not deal.cancelled() and (error := deal.exception()) is not None:
@@ -53,7 +53,7 @@ class ClusterWorkers:
 
 def _run(loop: asyncio.AbstractEventLoop, deal: "asyncio.Task[None]", over: threading.Event) -> None:
     try:
-        with suppress(BaseException):  # whoever waits for the task gets the error
+        with suppress(BaseException):  # the code that awaits the task gets the error
             loop.run_until_complete(deal)
         loop.run_until_complete(loop.shutdown_asyncgens())
         loop.run_until_complete(loop.shutdown_default_executor())
