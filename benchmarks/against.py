@@ -1,10 +1,10 @@
-"""Compare a campaign by this version and by an older one: `python benchmarks/against.py CLONE [--campaign
-NAME]`.
+"""Compare the times of a campaign between this version and an older one.
 
-CLONE is a checkout of the older commit, installed into its .venv as its README says. Both run alternately,
-each time with an empty cache. Code that an old version compiles with a separate command is compiled before
-its clock starts. CPU time covers all processes. Wall time needs otherwise idle cores. The parts are the
-stages that the command reports; idle is the time of cores without work. Exit code 1 when a run fails.
+`python benchmarks/against.py CLONE [--campaign NAME]`. CLONE is a checkout of the older commit, installed
+into its .venv as its README says. Both versions run alternately, each time with an empty cache. Code that an
+old version compiles with a separate command is compiled before its clock starts. CPU time covers all
+processes. Wall time needs otherwise idle cores. The parts are the stages that the command reports. Idle is
+the time of cores without work. The exit code is 1 if a run fails.
 """
 
 import argparse
@@ -28,7 +28,7 @@ Parts = dict[str, dict[str, float]]  # by stage: wall_s, cpu_s
 
 
 def run(clone: Path, campaign: str, workers: int, more: list[str]) -> Parts:
-    """Run a campaign with the version of `clone` and no caches; return the time of each part."""
+    """Run a campaign with the version of `clone` and no caches. Return the time of each part."""
     python = sys.executable if clone == ROOT else str(clone / ".venv" / "bin" / "python")
     with tempfile.TemporaryDirectory() as place:
         # older versions keep frames, detections and helpers in ~/.cache, whatever XDG_CACHE_HOME says
@@ -49,7 +49,7 @@ def compile_helpers(python: str, clone: Path, env: dict[str, str]) -> None:
 
 
 def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:
-    """The time of each stage of a command, from the line that names it to the next stage's line."""
+    """Return the time of each stage of a command, from the line that names it to the next stage's line."""
     parts = {stage: {"wall_s": 0.0, "cpu_s": 0.0} for stage in STAGES}
     stage, line, since, used = STAGES[0], "", time.monotonic(), 0.0
 
@@ -79,7 +79,7 @@ def followed(command: list[str], folder: Path, env: dict[str, str]) -> Parts:
 
 
 def cpu_of(root: int) -> float:
-    """CPU time (s) of a process, of those that it started, and of those that all of these waited for."""
+    """Return the CPU time (s) of a process and its descendants, including those that have ended."""
     children: dict[int, list[int]] = defaultdict(list)
     used: dict[int, float] = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
@@ -99,7 +99,7 @@ def cpu_of(root: int) -> float:
 
 
 def show(parts: dict[str, Parts], workers: int) -> None:
-    """Print the time of each part in both versions, and how long cores were idle."""
+    """Print the time of each part in both versions and how long cores were idle."""
     print(f"{'':14}" + "".join(f"{name:>9} wall s    CPU s   idle s" for name in parts) + "     CPU ratio")
     for stage in (*STAGES, WHOLE):
         cells = ""

@@ -1,8 +1,9 @@
-"""Whole campaigns with one worker and with two: `python benchmarks/campaigns.py [--campaign paper_smoke]`.
+"""Measure whole campaigns with one worker and with two.
 
-Checks, experiments, proof, tables and report, by the user's command; CPU time covers all processes. An
-uncounted run first fills the caches (frames, detections, passed checks) for both; then they alternate. Wall
-time needs otherwise idle cores. Exit code 1 when a run fails or the results differ in a byte.
+`python benchmarks/campaigns.py [--campaign paper_smoke]`. The user's command runs checks, experiments,
+equivalence check, tables and report. CPU time covers all processes. A run that does not count first fills the
+caches (frames, detections, passed checks). Then one worker and two alternate. Wall time needs otherwise idle
+cores. The exit code is 1 if a run fails or the results differ in a byte.
 """
 
 import argparse
@@ -21,7 +22,7 @@ WORKERS = (1, 2)
 
 
 def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str, float]:
-    """Run a campaign into the new folder `out`; return wall and CPU seconds."""
+    """Run a campaign into the new folder `out` and return wall and CPU seconds."""
     command = [sys.executable, "-m", "mutator", "run", campaign, "--out", str(out), "-n", str(workers)]
     before, began = _cpu(), time.monotonic()
     subprocess.run([*command, *more], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
@@ -29,7 +30,7 @@ def run(campaign: str, workers: int, out: Path, more: Sequence[str]) -> dict[str
 
 
 def _cpu() -> float:
-    """CPU time (s) of this process's finished children and their descendants."""
+    """Return the CPU time (s) of this process's finished children and their descendants."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -1,9 +1,11 @@
-"""Campaigns on a cluster: `python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`.
+"""Measure campaigns on a cluster.
 
-`overhead`: CPU time of all processes for a campaign on two local Dask workers and on two local workers, with
-warm caches, alternately. `intake`: results a second that the command takes in from two workers, with patches
-and series of usual size, from an engine that takes no time. `ends`: when 64 made-up workers finish 10,000
-experiments with a campaign's durations: the last one compared with their mean. Without a name, all three.
+`python benchmarks/cluster.py [overhead] [intake] [ends] [--campaign NAME]`. Without a name, it measures all
+three. `overhead` is the CPU time of all processes for a campaign on two Dask workers of this machine and on
+two local workers, alternately and with warm caches. `intake` is the number of results a second that the
+command takes from two workers. Their engine takes no time, and patches and series have their usual size.
+`ends` simulates 64 workers that run 10,000 experiments with a campaign's durations. It compares the end of
+the last worker with the mean.
 """
 
 import argparse
@@ -95,7 +97,7 @@ def cpu_s(command: list[str], env: dict[str, str]) -> float:
 
 @contextmanager
 def planned(name: str = "paper") -> Iterator[tuple[Workspace, RunFolder, tuple[Pending, ...]]]:
-    """A frozen plan of 11,280 experiments, without running anything."""
+    """Return a frozen plan of 11,280 experiments without running anything."""
     workspace = Workspace.find(ROOT)
     with tempfile.TemporaryDirectory() as place:
         folder = freeze(make_plan(workspace, name), Path(place) / "run", workspace)
@@ -125,7 +127,7 @@ def leave(run: str) -> None:
 
 
 def work(run: str, data: bytes) -> bytes:
-    """The made-up result of a piece of work."""
+    """Return the synthetic result of a piece of work."""
     piece = Piece.of(data)
     line = json.dumps({"experiment_id": "@"} | RECORD, separators=(",", ":")).encode()
     timing = b'{"cpu_s":0.3,"engine":"fork","experiment_id":"@","host":"here","wall_s":0.3,"worker":"w"}'
@@ -186,7 +188,7 @@ def intake() -> None:
 
 
 def ends(seed: int) -> None:
-    """Simulate when made-up workers finish."""
+    """Simulate when the workers finish."""
     with planned() as (_, folder, left):
         some, count = [], 0
         for one in left:
@@ -203,7 +205,7 @@ def ends(seed: int) -> None:
 def simulated(
     folder: RunFolder, left: Sequence[Pending], draw: random.Random
 ) -> tuple[list[float], float, int]:
-    """When each worker finished its last piece, their total working time, and the number of pieces."""
+    """Return when each worker finished, their total working time and the number of pieces."""
     now = [0.0]
     board = Board(folder, left, (), now=lambda: now[0])
     names = [f"w{number}" for number in range(WORKERS)]

@@ -1,7 +1,8 @@
-"""What compiled helpers save: runs of 30 s without and with them, alternately, with identical traces.
+"""Measure what compiled helpers save in runs of 30 s.
 
-`python benchmarks/compiled.py [--rounds N] [--json FILE]`; it first compiles them into a separate folder. CPU
-time of this process in one thread; medians and their ratio. Exit code 1 if a trace differs.
+`python benchmarks/compiled.py [--rounds N] [--json FILE]`. It first compiles the helpers into a separate
+folder. Runs without and with helpers alternate and must have identical traces. Times are CPU times of this
+process in one thread. It prints medians and their ratio. The exit code is 1 if a trace differs.
 """
 
 import argparse
@@ -28,7 +29,7 @@ KINDS = (None, *DETECTORS)
 
 
 def run(kind: str | None, cache: Path, helpers: Path | None) -> tuple[float, bytes]:
-    """CPU seconds and the trace of one run with frames that no run has seen before."""
+    """Return CPU seconds and the trace of one run with frames that no other run has seen."""
     (cache / FILE).unlink(missing_ok=True)
     compiled.use(helpers)
     pictures = Pictures(detector=kind, cache=cache) if kind else None

@@ -1,11 +1,11 @@
-"""What ending runs early could save, once the fault is over and the run is the golden run's again.
+"""Estimate what a campaign could save by ending runs that have become equal to the golden run.
 
-`python benchmarks/converged.py RUN [--json FILE]`. A fork with the golden run's state after its fault is over
-could end there and take the rest from the golden run. This prints an upper bound of the saving, as a share of
-the CPU of all runs. If a trace has the golden run's bytes, everything after the last activation counts as
-saved; otherwise, everything after the last difference from golden in any channel of the series (six digits,
-20 values a second). Equal channels are necessary for equal states, but not sufficient; and while a fault may
-act again, its past does not predict its future.
+`python benchmarks/converged.py RUN [--json FILE]`. If a fork's state equals the golden run's after the fault
+is over, the fork could end there and take the rest from the golden run. This prints an upper bound of the
+saving, as a share of the CPU of all runs. If a trace has the golden run's bytes, everything after the last
+activation counts as saved. Otherwise, everything counts that follows the last difference from golden in any
+channel of the series (six digits, 20 values a second). Equal channels are necessary for equal states, but not
+sufficient. While a fault may act again, its past does not predict its future.
 """
 
 import argparse
@@ -45,7 +45,7 @@ class Saved:
 
 
 def last_difference(golden: Series, faulty: Series) -> float:
-    """Time (s) of the last sample or point where a channel differs from golden; -inf: none does."""
+    """Return the time (s) of the last sample or point where a channel differs from golden, or -inf."""
     last = -math.inf
     for number, (one, other) in enumerate(zip(golden.rows, faulty.rows, strict=True)):
         times, known = faulty.times(number), golden.times(number)
@@ -61,7 +61,7 @@ def last_difference(golden: Series, faulty: Series) -> float:
 
 
 def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
-    """An upper bound of what a campaign could save, and the CPU (s) of all its runs."""
+    """Return an upper bound of what a campaign could save and the CPU (s) of all its runs."""
     manifest, series = workspace.manifest(folder.head["target"]), SeriesFolder(folder.path)
     timings, records = folder.timings(), folder.records()
     digests: dict[Path, str] = {}
@@ -80,7 +80,7 @@ def bound(folder: RunFolder, workspace: Workspace) -> tuple[Saved, float]:
 
 
 def _saved(record: Record, golden: str, series: SeriesFolder) -> tuple[str, float]:
-    """The kind of a run, and the share of its simulation that could be saved."""
+    """Return the kind of a run and the share of its simulation that could be saved."""
     found, active = series.read(record.experiment_id), record.activation
     if found is None or active is None:
         return "without a series", 0.0

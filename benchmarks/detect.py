@@ -1,9 +1,10 @@
-"""The paper's lane detector's CPU time: `python benchmarks/detect.py [--repeat N]`.
+"""Measure the CPU time of the paper's lane detector.
 
-Prints the median CPU time (ms, one thread) of a detection, compiled and in readable Python, and of the
-latter's steps, on the rendered road: clean, and with rain, snow and noise that fill it with edges. A run of
-30 s makes 600 detections. The last column is the detection that a run uses (compiled, or Python's if nothing
-is compiled) over its goal. Exit code 1 if one misses it.
+`python benchmarks/detect.py [--repeat N]`. It prints the median CPU time (ms, one thread) of a detection,
+compiled and in Python, and of the steps in Python. The frames show the rendered road, clean and with rain,
+snow and noise that fill it with edges. A run of 30 s makes 600 detections. The last column divides the time
+of the detection that a run uses by its goal. A run uses the compiled one, or Python's if nothing is compiled.
+The exit code is 1 if a detection misses its goal.
 """
 
 import argparse
@@ -41,7 +42,10 @@ COLUMNS = "compiled", "Python", "hog", "edges", "dbscan", "lines", "edge pixels"
 
 
 def median_ms(work: Callable[[], object], repeat: int) -> float:
-    """Median CPU time of `work` over many repeats, unaffected by other work on the machine."""
+    """Return the median CPU time of `work` over many repeats.
+
+    Other work on the machine does not affect it.
+    """
     times = []
     for _ in range(repeat):
         start = time.thread_time()
@@ -51,7 +55,7 @@ def median_ms(work: Callable[[], object], repeat: int) -> float:
 
 
 def pictures(model: CameraModel) -> dict[str, np.ndarray]:
-    """Frames of the same moment on the road, in fair weather and foul."""
+    """Return frames of the same moment on the road, in fair weather and foul."""
     clean = RoadRenderer(model, "solid", 0).grey(3.0)
     moment = SimpleNamespace(t=2.0, position=3.0, v_ego=26.8)
     found = {"clean": clean}

@@ -1,8 +1,9 @@
-"""The geometric detector's and the as-coded detector's time for a frame: medians over a drive.
+"""Measure the geometric and the as-coded detector's time for a frame, as medians over a run.
 
-`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core, in clean and in bad weather. It uses
-compiled code unless given `--plain`; the last column says whether it did. Times are of this process, so other
-work on the machine matters little, except through shared caches. Exit code 1 if a median is above its goal.
+`python benchmarks/detect_drive.py [--repeat N] [--plain]`, on one core, in clear and in bad weather. It uses
+compiled code unless given `--plain`. The last column says whether it did. Times are CPU times of this
+process, so other work on the machine has little effect, except through shared caches. The exit code is 1 if a
+median is above its goal.
 """
 
 import argparse
@@ -48,7 +49,7 @@ class Moment(NamedTuple):
 
 
 def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
-    """The frames of two seconds."""
+    """Return the frames of two seconds."""
     camera = CameraModel()
     road = RoadRenderer(camera, marks, 0)
     pictures = [road.grey(STEP * k) for k in range(DIFFERENT)]
@@ -62,7 +63,7 @@ def drive(marks: str, weather: str | None, amount: float) -> list[np.ndarray]:
 
 
 def times(detector: RobustDetector | CodedDetector, pictures: list[np.ndarray], repeat: int) -> list[float]:
-    """CPU time (ms) of each detection; only the very first has no past."""
+    """Return the CPU time (ms) of each detection. Only the very first has no history."""
     found = []
     for k in range(repeat):
         view = CameraView(

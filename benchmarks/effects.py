@@ -1,8 +1,9 @@
-"""Image effects' time for a frame: medians over a drive, mild and strong, for the default camera.
+"""Measure the image effects' time for a frame, as medians over a run.
 
-`python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core. It uses compiled code unless
-given `--plain`; the last column says for each effect whether any of it was. Times are of this process, so
-other work on the machine matters little, except through shared caches. Exit code 1 if a median is above 3 ms.
+`python benchmarks/effects.py [EFFECT ...] [--repeat N] [--plain]`, on one core, for mild and strong effects
+and the default camera. It uses compiled code unless given `--plain`. The last column says for each effect
+whether it used any. Times are CPU times of this process, so other work on the machine has little effect,
+except through shared caches. The exit code is 1 if a median is above 3 ms.
 """
 
 import argparse
@@ -37,7 +38,7 @@ class Moment(NamedTuple):
 
 
 def milliseconds(work: Callable[[], object]) -> float:
-    """CPU time of one call."""
+    """Return the CPU time of one call."""
     start = process_time()
     work()
     return 1000.0 * (process_time() - start)

@@ -1,10 +1,10 @@
-"""Reference, warm and fork engine on the same experiments of the paper's campaign, half guided, half random.
+"""Compare the reference, warm and fork engines on the same experiments of the paper's campaign.
 
-`python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. CPU time (user and
-system) of this process and all its children; golden runs and work done once for a campaign (loading the
-target, observing each golden run) are counted separately. `--library DIR --campaign NAME` uses another
-library, such as an example with steps so fast that the overhead shows. Exit code 1 when records differ, or
-when the fork engine exceeds its goals.
+`python benchmarks/engines.py [--experiments 200] [--json FILE] [--skip reference]`. Half of the experiments
+are guided and half random. Times are CPU times (user and system) of this process and all its children. Golden
+runs and the work done once for a campaign (loading the target, observing each golden run) are counted
+separately. `--library DIR --campaign NAME` uses another library, such as an example with steps so fast that
+the overhead shows. The exit code is 1 if records differ or the fork engine exceeds its goals.
 """
 
 import argparse
@@ -72,7 +72,7 @@ class Bench:
         return self.folder / "golden" / GoldenRun.of(experiment, several_seeds=False).key
 
     def steps(self, experiment: Experiment) -> int:
-        """Steps of the golden run, which every run that ends well has."""
+        """Return the steps of the golden run, which every run that ends well also has."""
         trace = golden.load_trace(self.manifest, self.golden(experiment))
         return len(trace[self.manifest.time_channel])
 
@@ -89,7 +89,7 @@ class Bench:
             execution.out.rename(self.folder / "golden" / one.key)
 
     def measure(self, name: str, experiments: Sequence[Experiment]) -> tuple[Measured, float]:
-        """An engine's time for all the experiments, and beforehand for each golden run."""
+        """Return an engine's time for all the experiments and, before that, for each golden run."""
         engine = self.engines[name]()
         runner = Runner(
             self.manifest, self.models, engine, Goldens(self.manifest, self.golden), self.workspace.scenario
@@ -117,7 +117,7 @@ class Bench:
 
 
 def _cpu() -> float:
-    """CPU time (s) of this process and its finished children."""
+    """Return the CPU time (s) of this process and its finished children."""
     used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in used)
 

@@ -1,9 +1,9 @@
-"""Growth of time and memory with the campaign: plans of 1,000 to 50,000 experiments, a table of 100,000, and
-opening the paper's 11,280.
+"""Measure how time and memory grow with the campaign.
 
-`python benchmarks/growth.py [--json FILE]`. Each size runs in its own process, because the peak memory of a
-process is measured: it plans and freezes, or does a worker's work before and after each run (read the chunk,
-build the mutant, append the record). Times are CPU. Exit code 1 if a goal is missed.
+`python benchmarks/growth.py [--json FILE]`. It measures plans of 1,000 to 50,000 experiments, a table of
+100,000 and opening the paper's 11,280. Each size runs in its own process, because the peak memory of a
+process is measured. The process plans and freezes, or does a worker's work before and after each run (read
+the chunk, build the mutant, append the record). Times are CPU times. The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -45,7 +45,7 @@ MORE_MEMORY_MB = 5.0  # of a worker, between 1,000 and 50,000 experiments
 
 
 def plan_of(workspace: Workspace, size: int) -> Plan:
-    """The paper's campaign, in as many scenarios as needed, cut to size."""
+    """Return the paper's campaign, in as many scenarios as needed, cut to size."""
     text = workspace.campaign("paper").read_text()
     names = list(workspace.scenarios)
     scenarios = names[: -(-size // 2256)]  # a scenario has 282 faults, 4 contexts and 2 methods
@@ -59,7 +59,7 @@ def plan_of(workspace: Workspace, size: int) -> Plan:
 
 
 def record(experiment: Experiment, number: int) -> Record:
-    """A made-up record, so that every column is filled in some rows and empty in others."""
+    """Return a synthetic record. Every column is filled in some rows and empty in others."""
     active, hazard = number % 5 > 0, number % 10 > 6
     return Record(
         experiment_id=experiment.id,
@@ -84,14 +84,14 @@ def _channels() -> tuple[str, ...]:
 
 
 def _left(number: int) -> tuple[tuple[str, float, float], ...]:
-    """Almost every channel has left golden, each at another time."""
+    """Return divergences in which almost every channel has left golden, each at another time."""
     start = 2.05 + number % 997 / 100
     names = [name for place, name in enumerate(_channels()) if (number + place) % 7]
     return tuple((name, start + place / 100, number / (7 + place)) for place, name in enumerate(names))
 
 
 def most_mb() -> float:
-    """The peak memory of this process."""
+    """Return the peak memory of this process."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
@@ -107,7 +107,7 @@ def planning(size: int, out: Path) -> dict[str, float]:
 
 
 def working(size: int, out: Path) -> dict[str, float]:
-    """A worker's work around its runs, for a whole frozen plan of `size`."""
+    """Do a worker's work around its runs for a whole frozen plan of `size`."""
     workspace = Workspace.find(root=ROOT)
     folder = RunFolder.open(out)
     manifest, models = workspace.manifest(folder.head["target"]), workspace.fault_models()
@@ -125,7 +125,7 @@ def working(size: int, out: Path) -> dict[str, float]:
 
 
 def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
-    """A run folder with that many made-up records and, if they name a patch, as many patches."""
+    """Write a run folder with that many synthetic records and, if they name a patch, as many patches."""
     workspace = Workspace.find(root=ROOT)
     plan = make_plan(workspace, "paper")
     more = (replace(e, seed=e.seed + k) for k in range(size) for e in plan.experiments)
@@ -144,8 +144,9 @@ def written_run(size: int, out: Path, patch: bytes = b"") -> RunFolder:
 
 
 def opening(size: int, out: Path) -> dict[str, float]:
-    """Open a finished run of that many experiments, comparing all digests, checksums and ids; return its
-    seal.
+    """Open a finished run of that many experiments and compare all digests, checksums and ids.
+
+    Return its seal.
     """
     folder = written_run(size, out, bytes(PATCH_BYTES))
     head, data = folder.head, bytes(GOLDEN_BYTES)

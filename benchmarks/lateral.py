@@ -1,7 +1,7 @@
-"""Figures of the lateral behaviour at 60 mph: overshoot, settling time, steady error.
+"""Measure the lateral behaviour at 60 mph: overshoot, settling time and steady error.
 
-`python benchmarks/lateral.py [--figure FILE.svg]` simulates L01 to L03 and a step of the lane, prints a
-table, and plots offset, steering angle and torque over time. Equal sources give equal bytes.
+`python benchmarks/lateral.py [--figure FILE.svg]` simulates L01 to L03 and a step of the lane and prints a
+table. With `--figure` it plots offset, steering angle and torque over time. Equal sources give equal bytes.
 """
 
 import argparse
@@ -30,7 +30,7 @@ Trace = Mapping[str, np.ndarray]
 
 
 def drive(name: str, step: float) -> Trace:
-    """Simulate a scenario; `step` moves its lane to the left instead of the car's start."""
+    """Simulate a scenario. `step` moves its lane to the left instead of the car's start."""
     simulator = Simulator()
     simulator.reset(load_scenario(ROOT / "fault_library" / "scenarios" / f"{name}.yaml"), 0)
     if step:
@@ -63,7 +63,7 @@ def measure(trace: Trace, start: float, band: float) -> tuple[float, ...]:
 
 
 def figure(traces: Mapping[str, Trace], path: Path) -> None:
-    """Three rows of curves, one column for each case."""
+    """Draw three rows of curves with one column for each case."""
     import matplotlib
 
     matplotlib.use("svg")

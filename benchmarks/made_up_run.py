@@ -1,8 +1,8 @@
-"""Build a made-up finished run folder of any size, for other benchmarks to read.
+"""Build a synthetic finished run folder of any size, for other benchmarks to read.
 
 `python benchmarks/made_up_run.py SIZE OUT`. The experiments are those of the paper's campaign without frames,
 with as many seeds as needed. Golden runs are simulated. Records, patches, timings and series are a few
-hundred real or made-up ones, repeated under other ids, with the checksums and digests of a run of this size:
+hundred real or synthetic ones, repeated under other ids. Checksums and digests match a run of this size, so
 the folder opens and has a seal.
 """
 
@@ -59,7 +59,7 @@ _NO_ID = "0" * 16
 
 
 def make(size: int, out: Path) -> str:
-    """Write the run folder `out` with that many experiments; return its seal."""
+    """Write the run folder `out` with that many experiments and return its seal."""
     workspace = Workspace.find(root=ROOT)
     folder = planned(workspace, size, out)
     first = tuple(islice(_experiments(folder), SEED))
@@ -102,7 +102,7 @@ def campaign(folder: Path, size: int) -> Path:
 
 
 def planned(workspace: Workspace, size: int, out: Path) -> RunFolder:
-    """The plan of at least that many experiments, frozen in `out`."""
+    """Return the plan of at least that many experiments, frozen in `out`."""
     with TemporaryDirectory() as place:
         return freeze(Planning(workspace, campaign(Path(place), size)), out, workspace)
 
@@ -142,14 +142,14 @@ def goldens(workspace: Workspace, folder: RunFolder, experiments: Sequence[Exper
 
 
 def patches_of(workspace: Workspace, experiments: Sequence[Experiment]) -> list[bytes]:
-    """The patches of the mutants of some of them."""
+    """Return the patches of the mutants of some of the experiments."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     some = experiments[:: max(1, len(experiments) // PATCHES)][:PATCHES]
     return [build(manifest, models, one.fault, one.trigger).patch_bytes for one in some]
 
 
 def made_up_records(workspace: Workspace, experiments: Sequence[Experiment]) -> list[Record]:
-    """Records with all fields, some fields or none."""
+    """Return records with all fields, some fields or none."""
     draw = np.random.default_rng(1)
     names = [metric.name for metric in workspace.manifest("openpilot").measures]
     step = max(1, len(experiments) // KINDS)
@@ -171,7 +171,7 @@ class Lines:
         self.write(canonical({**head, "file": f"{path.parent.name}/{path.name}"}).encode()[1:])
 
     def write(self, body: bytes) -> None:
-        """A line, without its first brace."""
+        """Write a line without its first brace."""
         self._last = sha256(self._last + body).hexdigest()[:16].encode()
         self._file.write(b'{"sum":"%b",%b\n' % (self._last, body))
 
@@ -207,18 +207,18 @@ def write_segments(
 
 
 def _patch_of(count: int, patches: int) -> int:
-    """The number of the patch of a file's experiment: the first one where it is stored whole."""
+    """Return the number of the patch of a file's experiment. It is the first one where it is stored whole."""
     return count % patches if count % _WHOLE_EVERY else 0
 
 
 def _blocks(patches: Sequence[bytes]) -> list[tuple[int, bytes]]:
-    """The first patch whole, each other one as a difference from it."""
+    """Return the first patch whole, and each other one as a difference from it."""
     packer = _Packer()
     return [packer.block(patch) for patch in patches]
 
 
 def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callable[[str, int], bytes]]:
-    """For each kind of record, the line of an experiment with a patch."""
+    """Return, for each kind of record, the line of an experiment with a patch."""
     named = [digest(patch).encode() for patch in patches]
 
     def body(one: Record) -> Callable[[str, int], bytes]:
@@ -233,7 +233,7 @@ def _bodies(records: Sequence[Record], patches: Sequence[bytes]) -> list[Callabl
 def write_proof(
     folder: RunFolder, ids: Sequence[str], records: Sequence[Record], patches: Sequence[bytes]
 ) -> None:
-    """Write the proof's sample with the experiments' records."""
+    """Write the sample of the equivalence check with the experiments' records."""
     lines = _bodies(records, patches)
     proof = Lines(
         folder.path / equivalence.FOLDER / "0001-gw0.jsonl", {"plan": folder.head["plan"], "schema": SCHEMA}

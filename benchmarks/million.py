@@ -1,12 +1,12 @@
-"""The cost of a million experiments apart from their runs: plan, tables, resume, report and page, at three
-sizes.
+"""Measure the cost of a million experiments without their runs.
 
-`python benchmarks/million.py [--sizes N ...] [--keep DIR]`. The runs are made up (`made_up_run.py`) and kept
-in DIR for the next time. Each row is a separate process: CPU and wall seconds, and the peak memory of it and
-its children together, with shared pages counted once (sampled twice a second). The page opens in the system's
-Chromium, headless: its wall time is from the navigation until its list is usable. Growth: CPU time per
-experiment, relative to that of the smallest size. `new here`: on a machine that has not seen the run before,
-so that all of it is verified; afterwards only its bytes are compared.
+`python benchmarks/million.py [--sizes N ...] [--keep DIR]`. It measures plan, tables, resume, report and page
+at three sizes. The runs are synthetic (`made_up_run.py`) and kept in DIR for the next time. Each row is a
+separate process. It has CPU and wall seconds and the peak memory of the process and its children together.
+Shared pages count once, and memory is sampled twice a second. The page opens in the system's Chromium,
+headless. Its wall time is from the navigation until its list is usable. Growth is the CPU time per experiment
+relative to that of the smallest size. `new here` means a machine that has not seen the run before and
+verifies all of it. Afterwards only its bytes are compared.
 """
 
 import argparse
@@ -54,7 +54,7 @@ def opened(size: int, run: Path) -> None:
 
 
 def resume(size: int, run: Path) -> None:
-    """Repeat the command, with nothing left to do."""
+    """Repeat the command when there is nothing left to do."""
     summary = run_campaign(Workspace.find(root=made_up_run.ROOT), run / "campaign.yaml", run)
     if summary.done < size or summary.ran:
         raise SystemExit(f"{summary.done} done, {summary.ran} now")
@@ -73,7 +73,7 @@ def report(size: int, run: Path) -> None:
 
 
 def page(size: int, run: Path) -> float:
-    """Open the report's page; return the seconds until its list is usable."""
+    """Open the report's page and return the seconds until its list is usable."""
     with sync_playwright() as playwright:
         browser = report_page.launched(playwright)
         times = report_page.opened(
@@ -90,7 +90,7 @@ ROWS: dict[str, Callable[[int, Path], float | None]] = {
 
 
 def apart(row: str, size: int, run: Path) -> dict[str, float]:
-    """Measure a row in its own process."""
+    """Measure a row in a separate process."""
     command = [sys.executable, __file__, "--row", row, str(size), str(run)]
     cache = run.parent / "cache"
     if row == "open, new here":
@@ -109,7 +109,7 @@ def apart(row: str, size: int, run: Path) -> dict[str, float]:
 
 
 def family(pid: int) -> list[int]:
-    """A process and all its descendants."""
+    """Return a process and all its descendants."""
     try:
         told = [path.read_text() for path in Path(f"/proc/{pid}/task").glob("*/children")]
     except OSError:  # it has ended
@@ -118,7 +118,7 @@ def family(pid: int) -> list[int]:
 
 
 def memory_mb(pid: int) -> float:
-    """Memory (MB) of a process, with its share of shared pages."""
+    """Return the memory (MB) of a process with its share of shared pages."""
     try:
         lines = Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()
     except OSError:
@@ -127,7 +127,7 @@ def memory_mb(pid: int) -> float:
 
 
 def measured(row: str, size: int, run: Path) -> dict[str, float]:
-    """Do a row's work; return the seconds and the peak memory (MB) of one process."""
+    """Do a row's work and return the seconds and the peak memory (MB) of one process."""
     began = perf_counter()
     told = ROWS[row](size, run)
     wall = perf_counter() - began if told is None else told
@@ -160,7 +160,7 @@ def main() -> int:
 
 
 def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[int, dict[str, float]]]:
-    """Measure and print, size by size."""
+    """Measure and print each size."""
     found: dict[str, dict[int, dict[str, float]]] = {row: {} for row in rows}
     print(f"{'experiments':>12} {'':18}{'CPU s':>9}{'wall s':>9}{'MB':>8}{'us CPU each':>13}{'growth':>8}")
     for size in sizes:
@@ -181,7 +181,7 @@ def figures(sizes: list[int], rows: list[str], place: Path) -> dict[str, dict[in
 
 
 def told(found: dict[str, dict[int, dict[str, float]]]) -> int:
-    """Print the missed goals; return 1 if there are any."""
+    """Print the missed goals. Return 1 if there are any."""
     code = 0
     for row, (seconds, memory) in GOALS.items():
         one = found.get(row, {}).get(GOAL_SIZE)

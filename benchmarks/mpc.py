@@ -1,8 +1,8 @@
-"""CPU time of both model-predictive controllers: build, iteration, and the solver's share of it.
+"""Measure the CPU time of both model-predictive controllers: build, iteration and the solver's share.
 
 `python benchmarks/mpc.py [--plain] [--rounds N] [--json FILE]`. The solvers are those compiled at
-installation; with `--plain` CasADi's. Each round measures all of them, so that other work on the machine
-affects all alike; printed are the medians and the best rounds.
+installation, or CasADi's with `--plain`. Each round measures all of them, so that other work on the machine
+affects all equally. It prints the medians and the best rounds.
 """
 
 import argparse
@@ -49,14 +49,17 @@ def steer(mpc: LateralMpc) -> None:
 
 
 def cpu_us(task: Callable[[], object], divisor: int = 1) -> float:
-    """CPU time of `task` in microseconds, for one of `divisor` parts."""
+    """Return the CPU time of `task` in microseconds, for one of `divisor` parts."""
     start = process_time()
     task()
     return (process_time() - start) / divisor * 1e6
 
 
 def measure(rounds: int) -> dict[str, list[float]]:
-    """Microseconds of each subject in each round; the first build also loads the solver's plug-in."""
+    """Return the microseconds of each subject in each round.
+
+    The first build also loads the solver's plug-in.
+    """
     first = cpu_us(lambda: LongitudinalMpc(1))
     long_mpc, lateral_mpc = LongitudinalMpc(1), LateralMpc(get_params())
     subjects: dict[str, Callable[[], float]] = {
@@ -81,7 +84,7 @@ def repeat(task: Callable[[], object]) -> None:
 
 
 def main() -> None:
-    """Measure and print; exit with 1 if a median misses its goal."""
+    """Measure and print. Exit with 1 if a median misses its goal."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--plain", action="store_true", help="without compiled code")
     parser.add_argument("--rounds", type=int, default=15)

@@ -1,11 +1,11 @@
-"""Mutants per second: from reused changes, spliced, and spliced with each file parsed again by LibCST; and
-those of operators, each in a different place.
+"""Measure how many mutants a second are built.
 
-`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. First it builds the mutant of every
-experiment of the paper's campaign, including diff, compile check and digests; then all ways build the same
-sample alternately, round by round. Operators' mutants are found in the shipped controller, and each of a
-sample is built once; its files are parsed before. CPU time of this process. Exit code 1 if either kind misses
-the goal.
+`python benchmarks/mutants.py [--sample N] [--rounds N] [--json FILE]`. Mutants are built from reused changes,
+spliced, or spliced with each file parsed again by LibCST. First it builds the mutant of every experiment of
+the paper's campaign, including diff, compile check and digests. Then the three ways build the same sample
+alternately, in rounds. The mutants of operators, each at a different place, are found in the shipped
+controller. Each mutant of a sample is built once, and its files are parsed before. Times are CPU times of
+this process. The exit code is 1 if either kind misses the goal.
 """
 
 import argparse
@@ -34,7 +34,7 @@ PLACES = ["selfdrive/controls/**"]
 
 
 def rate(make: Callable[[Experiment], object], experiments: list[Experiment]) -> float:
-    """Experiments per second of CPU."""
+    """Return experiments per second of CPU."""
     start = process_time()
     for experiment in experiments:
         make(experiment)

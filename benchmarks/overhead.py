@@ -1,11 +1,11 @@
-"""The cost of an experiment apart from its simulation: faults that first act in the last steps of a 30 s run.
+"""Measure the cost of an experiment without its simulation.
 
-`python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The fork engine runs
-faults of the paper's campaign with ideal vision, each at its own time shortly before the end, with all of a
-worker's steps: mutant, run, comparison with golden, patch, record. It prints the CPU of the worker, of its
-children and of the processes that they are forks of, and for comparison that of 30 s of the same simulation.
-With `--against`, a checkout of an older commit runs alternately; compare the ratio. Exit code 1 if the
-overhead exceeds its goal.
+`python benchmarks/overhead.py [--experiments 200] [--against CLONE] [--json FILE]`. The faults first act in
+the last steps of a 30 s run. The fork engine runs faults of the paper's campaign with ideal vision, each at
+its own time shortly before the end, with all of a worker's steps: mutant, run, comparison with golden, patch,
+record. It prints the CPU of the worker, of its children and of the processes from which they fork. For
+comparison it prints the CPU of 30 s of the same simulation. With `--against`, a checkout of an older commit
+runs alternately. Compare the ratio. The exit code is 1 if the overhead exceeds its goal.
 """
 
 import argparse
@@ -54,7 +54,7 @@ class Cost:
 
 
 def late(workspace: Workspace, count: int) -> list[Experiment]:
-    """Faults of the campaign that leave the scenario unchanged, first active in the last steps."""
+    """Return faults of the campaign that leave the scenario unchanged and first act in the last steps."""
     plan = make_plan(workspace, "paper", Choices(limit=8 * count))
     known = {e.fault.id: e for e in plan.experiments if e.scenario == SCENARIO and not e.fault.changes}
     made = []
@@ -78,7 +78,7 @@ class Bench:
         self.common = (self.manifest, prepare_base(self.manifest, folder / "base"), self.work, limits)
 
     def golden(self) -> float:
-        """Simulate the golden run; return CPU time (s) in addition to that of a two-step run."""
+        """Simulate the golden run and return the CPU time (s) in addition to that of a two-step run."""
         job = Job(name="golden", scenario=self.workspace.scenario(SCENARIO), seed=1)
         engine = ReferenceEngine(*self.common)
         whole = engine.execute(job, self.folder / "golden")
@@ -87,8 +87,9 @@ class Bench:
         return whole.cpu_s - short.cpu_s
 
     def cost(self, experiments: Sequence[Experiment]) -> Cost:
-        """An engine's time for the experiments, without the first `FEW`, which do one-time work; all of them
-        must be forked.
+        """Return an engine's time for the experiments, without the first `FEW`, which do one-time work.
+
+        All experiments must be forked.
         """
         null = build(self.manifest, self.models, None, always()).files
         engine = ForkEngine(*self.common, null=null)
@@ -115,7 +116,7 @@ class Bench:
         return Cost(worker=worker, children=children, server=sum(after.values()) - sum(before.values()))
 
     def _server(self) -> dict[str, float]:
-        """CPU time (s) of each process of the fork server, without its finished children."""
+        """Return the CPU time (s) of each process of the fork server, without its finished children."""
         found = {}
         for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
@@ -125,8 +126,9 @@ class Bench:
 
 
 def against(clone: Path, options: argparse.Namespace) -> int:
-    """Run this version and the one in `clone` alternately, each in separate processes; return the ratios of
-    medians.
+    """Run this version and the one in `clone` alternately, each in separate processes.
+
+    Return the ratios of medians.
     """
     found: dict[str, list[dict[str, float]]] = {"older": [], "this": []}
     for number in range(options.rounds):
@@ -146,7 +148,7 @@ def against(clone: Path, options: argparse.Namespace) -> int:
 
 
 def _told_by(root: Path, experiments: int) -> dict[str, float]:
-    """The figures of that checkout's benchmark, ms by part."""
+    """Return the figures of that checkout's benchmark, ms by part."""
     with tempfile.TemporaryDirectory() as folder:
         told = Path(folder) / "told.json"
         words = ["--experiments", str(experiments), "--json", str(told)]

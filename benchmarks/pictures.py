@@ -1,9 +1,10 @@
-"""A frame's time in a run by this version and by an older one: `python benchmarks/pictures.py CLONE`.
+"""Compare the time of a frame in a run between this version and an older one.
 
-CLONE is a checkout of the older commit. Each version has its own interpreter, compiled helpers and empty
-cache, and they process frames alternately: all frames are new, and none is remembered. Prints the CPU time of
-moving a frame to the car's pose, the image effect and the detection together, and the ratio. A detector or
-effect that the older version lacks is left out; lines that the two see differently are reported.
+`python benchmarks/pictures.py CLONE`. CLONE is a checkout of the older commit. Each version has its own
+interpreter, compiled helpers and empty cache. They process frames alternately, and all frames are new. It
+prints the CPU time of moving a frame to the car's pose, image effect and detection together, and the ratio. A
+detector or effect that the older version lacks is left out. If the two versions see different lines, it
+reports them.
 """
 
 import argparse
@@ -54,7 +55,7 @@ class Version:
         self.detectors, self.effects = self.ask("has")
 
     def ask(self, *words: object) -> Any:
-        """The process's answer."""
+        """Return the process's answer."""
         assert self._process.stdout is not None
         print(json.dumps(words), file=self._process.stdin, flush=True)
         return json.loads(self._process.stdout.readline())
@@ -87,7 +88,7 @@ def answers(cache: Path) -> Iterator[object]:
 
 
 class Drive:
-    """A moving car that never repeats a pose, and takes frames with an effect."""
+    """A moving car that never repeats a pose and takes frames with an effect."""
 
     def __init__(self, detector: str, effect: str, cache: Path) -> None:
         from selfdrive.sim import effects, vision
@@ -105,7 +106,7 @@ class Drive:
             self._effect = getattr(effects, name)(amount, 1, self._seen.model).ready()
 
     def pictures(self, count: int) -> tuple[list[float], str]:
-        """CPU time (ms) of that many frames, and a digest of their lines."""
+        """Return the CPU time (ms) of that many frames and a digest of their lines."""
         times, lines = [], sha256()
         for _ in range(count):
             truth = self._truth()
@@ -163,7 +164,7 @@ def main() -> int:
 def _compared(
     versions: list[Version], detector: str, effect: str, options: argparse.Namespace
 ) -> list[list[float]]:
-    """Times of the older version and of this one, measured alternately; a line of the table."""
+    """Measure the older version and this one alternately and return a line of the table."""
     times: list[list[float]] = [[], []]
     same = True
     for number in range(options.rounds + 1):

@@ -140,8 +140,9 @@ class Counting(ast.NodeVisitor):
         self.generic_visit(node)
 
     def bound(self, target: ast.expr, value: ast.expr | None) -> None:
-        """Record a place for each assigned name, attribute or item; at the level of a module or class, the
-        constants.
+        """Record a place for each assigned name, attribute or item.
+
+        At the level of a module or class, record the constants.
         """
         if isinstance(target, ast.Tuple | ast.List):
             for element in target.elts:
@@ -216,7 +217,7 @@ class Counting(ast.NodeVisitor):
                 self.inside("f-string", part.value)
 
     def visit_arg(self, node: ast.arg) -> None:
-        """Annotations make no value."""
+        """Skip annotations, because they make no value."""
 
     def visit_Expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Constant):
@@ -237,7 +238,7 @@ class Reach:
         return _spot(site.node) in self.spots or (bool(site.name) and self.is_assigned(site))
 
     def sets(self, site: Site) -> bool:
-        """Whether the probe can set it: build its edit, with all modules of the package in view."""
+        """Whether the probe can set the place. It builds the edit with all modules of the package in view."""
         function, _, name = site.name.rpartition(":")
         kind = AnchorKind.DEFAULT if site.kind == "default" else AnchorKind.CONSTANT
         location = FaultLocation(path=self.file.path, function=function, anchor=Anchor(kind=kind, name=name))
@@ -270,7 +271,7 @@ def _spot(node: ast.AST) -> Spot:
 
 
 def reason(site: Site) -> str:
-    """Why no anchor leads to a place."""
+    """Return why no anchor leads to a place."""
     if site.within:
         return site.within
     if isinstance(site.node, ast.Starred | ast.GeneratorExp | ast.Yield | ast.YieldFrom | ast.NamedExpr):
@@ -281,7 +282,7 @@ def reason(site: Site) -> str:
 
 
 def counted(name: str, models: FaultModels) -> Iterator[tuple[Site, bool]]:
-    """The places of a module, and whether anchors lead to each."""
+    """Return the places of a module and whether anchors lead to each."""
     spec = importlib.util.find_spec(name)
     assert spec is not None and spec.origin is not None
     root, path = Path(spec.origin).parents[name.count(".")], f"{name.replace('.', '/')}.py"

@@ -1,9 +1,9 @@
-"""CPU time of work around the paper's 11,280 experiments: plan, freeze, reach the first experiment, resume a
-complete run.
+"""Measure the CPU time of work around the paper's 11,280 experiments.
 
-`python benchmarks/planning.py`. The complete run is made up: every experiment has a record of a masked fault.
-So are the cached checks of a start, which ends where the first mutant would be run (no workers). Each time is
-also printed per experiment and relative to planning.
+`python benchmarks/planning.py`. It measures planning, freezing, reaching the first experiment and resuming a
+complete run. The complete run is synthetic: every experiment has a record of a masked fault. The cached
+checks of a start are synthetic, too. A start ends where the first mutant would be run (no workers). Each time
+is also printed per experiment and relative to planning.
 """
 
 import argparse
@@ -34,7 +34,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 class Table:
-    """Prints times as they come; the others are relative to the first."""
+    """Prints times as they are measured. The others are relative to the first."""
 
     def __init__(self) -> None:
         self.count = 0  # experiments
@@ -85,7 +85,7 @@ def make_up_checks(workspace: Workspace, folder: RunFolder) -> None:
 
 
 def until_the_first_run(workspace: Workspace, out: Path) -> float:
-    """CPU seconds from the command to the point where the first mutant would be run."""
+    """Return the CPU seconds from the command to the point where the first mutant would be run."""
     reached = []
 
     def stop(self: ReferenceEngine, job: Job, folder: Path) -> Execution:

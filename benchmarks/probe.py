@@ -1,8 +1,8 @@
-"""The cost of a probe that never acts: the null mutant against the pristine program, in 30 s of simulation.
+"""Measure the cost of a probe that never acts: the null mutant against the pristine program.
 
-`python benchmarks/probe.py [--rounds N]`. Both simulate the same scenario in one interpreter, alternating
-every 20 steps, so that other work on the machine affects both; the result is the median of the ratios of such
-pairs. Exit code 1 if the null mutant is slower by more than its goal.
+`python benchmarks/probe.py [--rounds N]`. Both simulate the same scenario for 30 s in one interpreter. They
+alternate every 20 steps, so that other work on the machine affects both. The result is the median of the
+ratios of such pairs. The exit code is 1 if the null mutant is slower by more than its goal.
 """
 
 import argparse

@@ -1,8 +1,8 @@
-"""Frame rate of an experiment's replay in a headless Chromium without a GPU.
+"""Measure the frame rate of an experiment's replay in a headless Chromium without a GPU.
 
-`python benchmarks/replay.py [--seconds N]`. A made-up drive of the shipped target, its scene and all of its
-channels at 20 samples a second, plays on a narrow, a wide and a very sharp screen. The page counts frames
-over the last second; the browser draws at most 60. Exit code 1 if it draws fewer than 30.
+`python benchmarks/replay.py [--seconds N]`. A synthetic run of the shipped target, with its scene and all of
+its channels at 20 samples a second, plays on a narrow, a wide and a very sharp screen. The page counts frames
+over the last second. The browser draws at most 60. The exit code is 1 if it draws fewer than 30.
 """
 
 import argparse
@@ -36,7 +36,7 @@ window.player = Replay.show(document.getElementById("place"), series, facts);
 
 
 def made_series(manifest: TargetManifest) -> dict[str, Any]:
-    """A drive in which the fault lets every channel diverge from 5 s on."""
+    """Return a run in which the fault lets every channel diverge from 5 s on."""
     t = np.arange(0.0, DURATION, STEP)
     made = {c.name: 0.1 * np.sin(t + i) for i, c in enumerate(manifest.channels)}
     made |= {
@@ -65,7 +65,7 @@ def made_series(manifest: TargetManifest) -> dict[str, Any]:
 
 
 def frame_rate(browser: Any, page_file: Path, width: int, ratio: int, seconds: float) -> float:
-    """Frames per second after that many seconds of playback."""
+    """Return the frames per second after that many seconds of playback."""
     context = browser.new_context(
         viewport={"width": width, "height": 1000}, device_scale_factor=ratio, reduced_motion="no-preference"
     )

@@ -1,10 +1,10 @@
-"""Size and opening time of the report's page for 1,000, 11,280 and 100,000 experiments.
+"""Measure the size and opening time of the report's page for 1,000, 11,280 and 100,000 experiments.
 
 `python benchmarks/report_page.py [--json FILE]`. The experiments are those of the paper's campaign, with more
-seeds if needed, with made-up records; their diffs are those of their mutants. The page opens in the system's
-Chromium, headless; times are wall time in the browser from the navigation, best of several: until the table
-is usable, then for the first filter, sort, search and opened experiment. Exit code 1 if 11,280 experiments do
-not open in a second or take more than 8 MB.
+seeds if needed. Their records are synthetic, and their diffs are those of their mutants. The page opens in
+the system's Chromium, headless. Times are wall times in the browser from the navigation, best of several:
+until the table is usable, then for the first filter, sort, search and opened experiment. The exit code is 1
+if 11,280 experiments do not open in a second or take more than 8 MB.
 """
 
 import argparse
@@ -84,7 +84,7 @@ STEPS = {  # what a reader does first
 
 
 def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
-    """Write a run folder with results of made-up records; return its experiments.
+    """Write a run folder with results of synthetic records and return its experiments.
 
     They are those of the paper's campaign, with more seeds if needed.
     """
@@ -104,7 +104,7 @@ def written_run(workspace: Workspace, size: int, out: Path) -> list[Experiment]:
 
 
 def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator[tuple[str, str, str]]:
-    """The diffs without the probe: they are the same for every seed."""
+    """Return the diffs without the probe. They are the same for every seed."""
     manifest, models = workspace.manifest("openpilot"), workspace.fault_models()
     known: dict[tuple[str, Trigger], str] = {}
     for experiment in experiments:
@@ -115,7 +115,7 @@ def patches(workspace: Workspace, experiments: Sequence[Experiment]) -> Iterator
 
 
 def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> float:
-    """Write series of traces with realistic lengths, each for many records; return KB of the index."""
+    """Write series of traces with realistic lengths, each for many records. Return KB of the index."""
     manifest = workspace.manifest("openpilot")
     draw = np.random.default_rng(1)
     names = [channel.name for channel in manifest.channels]
@@ -138,7 +138,7 @@ def write_series(workspace: Workspace, records: Sequence[Record], out: Path) -> 
 
 
 def write(size: int, out: Path) -> dict[str, float]:
-    """Write the page of that many experiments; return its time and the size of its parts, KB."""
+    """Write the page of that many experiments. Return its time and the size of its parts in KB."""
     workspace = Workspace.find(root=ROOT)
     experiments = {e.id: e for e in written_run(workspace, size, out)}
     began = process_time()
@@ -177,7 +177,7 @@ def write(size: int, out: Path) -> dict[str, float]:
 
 
 def opened(browser: Any, page_file: Path, repeat: int, steps: Mapping[str, str] = STEPS) -> dict[str, float]:
-    """The best times in ms: until the page is ready, and for each later step."""
+    """Return the best times in ms until the page is ready and for each later step."""
     times: dict[str, list[float]] = {"open_ms": [], **{f"{name}_ms": [] for name in steps}}
     for _ in range(repeat):
         context = browser.new_context(viewport={"width": 1400, "height": 900})

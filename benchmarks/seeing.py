@@ -107,7 +107,7 @@ class Case(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """The contexts reached, the first hazard ("" for none), and whether there was an alert."""
+    """The contexts reached, the first hazard ("" for none) and whether there was an alert."""
 
     reached: frozenset[str]
     hazard: str
@@ -148,7 +148,7 @@ class FaultyCamera(PictureCamera):
             self._move = CodedView()
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """The view at this moment."""
+        """Return the view at this moment."""
         self._update(truth)
         frame = self._library.frame(truth.t, truth.position)
         if self._active and PLACE in self._parts:
@@ -178,14 +178,14 @@ class FaultyCamera(PictureCamera):
 
 @cache
 def drawing(name: str, level: int, coded: bool, number: int, camera: CameraModel) -> Effect:
-    """One of the effect's drawings at a level of 1 to 10."""
+    """Return one of the effect's drawings at a level of 1 to 10."""
     kind = KINDS[name][coded]
     amounts = LEVELS[kind]
     return kind(amounts[-(-level * len(amounts) // 10) - 1], 1 + number, camera)
 
 
 class MixedDetector:
-    """The detector of either reading, with the other one's rule for missing lines and the path."""
+    """The detector of either reading, with the other's rule for missing lines and the path."""
 
     def __init__(self, row: Row, camera: CameraModel) -> None:
         self._parts = row.parts
@@ -196,7 +196,7 @@ class MixedDetector:
         self._last = [RoadLine(y=side * LANE_WIDTH) for side in (0.5, -0.5)]
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in this view."""
+        """Return the lines in this view."""
         lines = list(self._detector.detect(view)[:2])
         if CLUSTERS in self._parts and MISSING not in self._parts:
             lines = [self._unseen(*pair) for pair in enumerate(lines)]
@@ -207,11 +207,11 @@ class MixedDetector:
         return LaneLines(left, right, path)
 
     def _unseen(self, side: int, line: RoadLine) -> RoadLine:
-        """The line, with zero probability if the detector as coded has no cluster."""
+        """Return the line, with zero probability if the detector as coded has no cluster."""
         return line._replace(prob=0.0) if line.y == self._nowhere[side] else line
 
     def _sent(self, lines: list[RoadLine]) -> list[RoadLine]:
-        """The lines, with a missing one 8 m to the left; if none is seen, the last ones."""
+        """Return the lines, with a missing one 8 m to the left. If none is seen, return the last ones."""
         if any(line.prob > 0.0 for line in lines):
             pairs = zip(lines, self._nowhere, strict=True)
             self._last = [line if line.prob > 0.0 else RoadLine(y=nowhere) for line, nowhere in pairs]
@@ -238,7 +238,7 @@ def drive(case: Case) -> tuple[Case, Ending]:
 
 
 def faulty(free: dict[Case, Ending], names: Iterable[str], levels: Sequence[int]) -> Iterator[Case]:
-    """The runs with these effects, based on the fault-free ones."""
+    """Return the runs with these effects, based on the fault-free ones."""
     for golden, ending in free.items():
         for context, name, level in product(sorted(ending.reached), names, levels):
             yield golden._replace(context=context, effect=name, level=level)

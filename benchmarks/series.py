@@ -1,9 +1,9 @@
-"""The cost of series and patches: bytes per experiment, and their share of its CPU.
+"""Measure the cost of series and patches: bytes per experiment and their share of its CPU.
 
-`python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. Runs that many
-experiments of a campaign in this process and measures the time for building and appending series and patch,
-over the CPU time of the same experiments: ratios, paired. Bytes are those of the finished run folder, with
-the parts that grow with the experiments scaled to 11,280. Exit code 1 if a goal is missed.
+`python benchmarks/series.py [--campaign paper_sample] [--experiments 60] [--json FILE]`. It runs that many
+experiments of a campaign in this process and measures the time for building and appending series and patch.
+It prints the paired ratios to the CPU time of the same experiments. Bytes are those of the finished run
+folder. The parts that grow with the experiments are scaled to 11,280. The exit code is 1 if a goal is missed.
 """
 
 import argparse
@@ -53,7 +53,7 @@ class Clock:
 
 
 def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
-    """Run the experiments; return shares of CPU, and bytes."""
+    """Run the experiments and return shares of CPU and bytes."""
     made, series, patches = Clock(), Clock(), Clock()
     made.on(runner.Runner, "_series")
     series.on(SeriesWriter, "append")
@@ -84,7 +84,7 @@ def measured(campaign: str, count: int, out: Path) -> dict[str, float]:
 
 
 def size_of(path: Path) -> int:
-    """Bytes of a file, or of all files in a folder."""
+    """Return the bytes of a file, or of all files in a folder."""
     files = path.rglob("*") if path.is_dir() else [path]
     return sum(file.stat().st_size for file in files if file.is_file())
 

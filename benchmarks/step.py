@@ -1,13 +1,13 @@
-"""CPU time of one simulated run, without imports, and its distribution over the loop's parts.
+"""Measure the CPU time of one simulated run, without imports, and of the loop's parts.
 
-`python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`; the parts are measured in a separate run,
-because measuring slows it down. Times are of this process, so other work on the machine matters little. It
-uses the code compiled at installation, unless given `--plain`. Exit code 1 if 30 s of simulation exceed their
-goal.
+`python benchmarks/step.py [scenario.yaml] [--plain] [--repeat N]`. The parts are measured in a separate run,
+because measuring slows it down. Times are CPU times of this process, so other work on the machine has little
+effect. It uses the code compiled at installation unless given `--plain`. The exit code is 1 if 30 s of
+simulation exceed their goal.
 
-`--against CLONE` instead compares this version with a checkout of an older commit, alternately, each time in
-a fresh interpreter with bytecode and compiled code ready: imports, building and loop, over those of the older
-one.
+With `--against CLONE` it instead compares this version with a checkout of an older commit. They alternate,
+each time in a fresh interpreter with bytecode and compiled code ready. It divides the times of imports,
+building and loop by those of the older version.
 """
 
 import argparse
@@ -102,7 +102,7 @@ print(json.dumps({"imports": imports, "build": first[0], "start": imports + firs
 
 
 class Stopwatch:
-    """Own time of nested parts: a part's calls are charged to the called part."""
+    """Measures the own time of nested parts. A part's calls are charged to the called part."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
@@ -110,7 +110,7 @@ class Stopwatch:
         self._inner = [0.0]
 
     def wrap(self, owner: type, name: str) -> Callable[[], None]:
-        """Time a method from now on; return a function that restores it."""
+        """Time a method from now on. Return a function that restores it."""
         original, key = getattr(owner, name), part_name(owner, name)
         self.seconds[key], self.calls[key] = 0.0, 0
 
@@ -129,12 +129,12 @@ class Stopwatch:
 
 
 def part_name(owner: type, name: str) -> str:
-    """The name of a part in the table."""
+    """Return the name of a part in the table."""
     return f"{owner.__name__}.{name}"
 
 
 def run(scenario: Scenario) -> tuple[float, float]:
-    """CPU seconds of building the loop, and of running it, with its result."""
+    """Return the CPU seconds of building the loop and of running it, with its result."""
     start = process_time()
     simulator = Simulator()
     simulator.reset(scenario, 0)
@@ -146,7 +146,7 @@ def run(scenario: Scenario) -> tuple[float, float]:
 
 
 def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
-    """One run with every part timed, and its total CPU seconds."""
+    """Run once with every part timed. Return the stopwatch and the total CPU seconds."""
     watch = Stopwatch()
     restore = [watch.wrap(owner, name) for owner, name in PARTS]
     start = process_time()
@@ -158,8 +158,9 @@ def run_in_parts(scenario: Scenario) -> tuple[Stopwatch, float]:
 
 
 def against(clone: Path, scenario: Path, rounds: int) -> bool:
-    """Print the times of start and loop in this version and in `clone`'s; return whether the goals are
-    reached.
+    """Print the times of start and loop in this version and in `clone`'s.
+
+    Return whether the goals are reached.
     """
     with tempfile.TemporaryDirectory() as place:
         versions = {"older": clone.resolve(), "this": ROOT}
@@ -200,7 +201,7 @@ def _fresh(root: Path, place: str, *words: str) -> str:
 
 
 def main() -> None:
-    """Measure and print; exit with 1 if the goal is missed."""
+    """Measure and print. Exit with 1 if the goal is missed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenario", nargs="?", type=Path, default=ROOT / "fault_library/scenarios/S1.yaml")
     parser.add_argument("--repeat", type=int, default=3, help="runs, of which the fastest counts")

@@ -217,7 +217,7 @@ def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
 
 
 def test_a_handler_that_fails(misbehave: Misbehave) -> None:
-    """In no engine is a failure at the end of a run that has reported a crash."""
+    """A failure at the end of a run that has already reported is not a crash, in any engine."""
     told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
