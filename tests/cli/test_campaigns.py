@@ -68,7 +68,10 @@ def experiment_with(run: Path, word: str) -> str:
 
 
 def test_plan_freezes_and_runs_nothing(cli: Cli, root: Path) -> None:
-    """`plan` writes the plan with its table, expected time and disk space, and the command that runs it."""
+    """`plan` writes the plan and prints its table.
+
+    It also prints the expected time and disk space and the command that runs the plan.
+    """
     answer = cli("plan", "toy", "--out", "p", "--only", 'fault_type == "distance"', "-n", "4")
     assert answer.code == 0
     for wanted in ("sensor/distance", "guided", "random", "total", "with 4 workers", "MB of disk"):

@@ -163,8 +163,9 @@ def test_a_damaged_series_of_one_experiment_is_told(cli: Cli, sealed: str) -> No
 
 
 def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
-    """Damage is reported even if every patch exists: the first of an experiment's two blocks does
-    not count.
+    """Damage is reported even if every patch exists.
+
+    Here the first of two equal blocks is damaged.
     """
     [patches] = Path("run/patches").iterdir()
     data = patches.read_bytes()

@@ -109,8 +109,9 @@ class Campaign:
 
 
 def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
-    """Killed 20 times with INT, TERM and KILL, as a whole or one worker, it gives the same results and leaves
-    nothing.
+    """Killed 20 times, as a whole or one worker, the campaign gives the same results.
+
+    The signals are INT, TERM and KILL. Nothing is left behind.
     """
     words = ["-m", "mutator", "run", "small", "-n", "2"]
     campaign = Campaign(copy_toycar(tmp_path), tmp_path, words, seed=5)

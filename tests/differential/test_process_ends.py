@@ -223,7 +223,7 @@ def test_a_handler_that_fails(misbehave: Misbehave) -> None:
 
 
 def test_a_kill_from_outside_at_the_end(misbehave: Misbehave) -> None:
-    """A run killed from outside after its report did not end well, because its files may be incomplete."""
+    """A run that is killed after its report counts as failed, because its files may be incomplete."""
     told = misbehave("import atexit, os\natexit.register(os.kill, os.getpid(), 9)")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.HARNESS_ERROR, "killed from outside by SIGKILL")}
@@ -273,15 +273,16 @@ SLOW_TO_FILL = "without end in folders"
     "how", [pytest.param(how, marks=pytest.mark.slow) if how == SLOW_TO_FILL else how for how in FULL]
 )
 def test_a_limit_of_space(misbehave: Misbehave, how: str) -> None:
-    """A run that exceeds its space in the output folder and TMPDIR is a timeout that names the limit, in each
-    engine.
+    """A run that exceeds its space in the output folder and TMPDIR is a timeout in each engine.
+
+    The message names the limit.
     """
     told = misbehave(FULL[how], limits=replace(LIMITS, disk_mb=3))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "disk limit of 3 MiB")}
 
 
 def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
-    """A run may write nearly up to its limit; existing files and holes do not count."""
+    """A run may write almost up to its limit. Existing files and holes do not count."""
     body = (
         "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"
     )

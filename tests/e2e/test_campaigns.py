@@ -74,8 +74,9 @@ def finished(finished_once: Finished, tmp_path: Path) -> Path:
 
 
 def test_bad_ends_are_results(toy: Workspace, tmp_path: Path) -> None:
-    """Loops, crashes, exits, exhausted memory and mutants that do not compile get a status; none is a harness
-    error.
+    """A mutant that ends badly has a status and is not a harness error.
+
+    The cases are loops, crashes, exits, exhausted memory and mutants that do not compile.
     """
     summary = run_campaign(toy, "hostile", tmp_path / "run")
     assert (summary.exit_code, summary.harness_errors, summary.problem) == (0, (), "")

@@ -1,4 +1,4 @@
-"""All readers of a run folder, and the part of their output that is compared."""
+"""The readers of a run folder, and the part of their output that is compared."""
 
 import io
 import json
@@ -60,7 +60,7 @@ Reader = Callable[[Place], Told]
 
 
 def cli(*words: object) -> tuple[int, str, str]:
-    """Exit code, output and errors of `mutator WORDS...`."""
+    """Return exit code, output and errors of `mutator WORDS...`."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
     with redirect_stdout(out), redirect_stderr(err):
         code = main([str(word) for word in words])
@@ -73,14 +73,14 @@ def _text(stream: io.TextIOWrapper) -> str:
 
 
 def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Told:
-    """A command's result, including its output and its files."""
+    """Return a command's result, including its output and its files."""
     code, out, err = cli(*words)
     written = [path.read_bytes() for path in files] if code == 0 else []
     return Told(code=code, said=out + err, result=[out if printed else "", *written])
 
 
 def run(place: Place) -> Told:
-    """`run` or `resume`: the same command."""
+    """Use `run` or `resume`, which are the same command."""
     code, out, err = cli("run", *place.campaign, "--out", place.run, "-n", "0", "--json")
     if code != 0:
         return Told(code=code, said=out + err)
@@ -90,13 +90,13 @@ def run(place: Place) -> Told:
 
 
 def repair(place: Place) -> Told:
-    """`verify --repair`, then `run`, which treats the repaired folder like any other."""
+    """Use `verify --repair`, then `run`, which treats the repaired folder like any other."""
     code, out, err = cli("verify", place.run, "--repair")
     return run(place) if code in (0, 1) else Told(code=code, said=out + err)
 
 
 def report(place: Place) -> Told:
-    """The report without its timings, which are not part of a result."""
+    """Use the report without its timings, because they are not part of a result."""
     words = ("report", place.run)
     told = _told(words, *(sorted((place.run / "report" / "tables").glob("*.csv"))), printed=True)
     if told.code != 0:
@@ -115,7 +115,7 @@ def show(place: Place) -> Told:
 
 
 def show_plot(place: Place) -> Told:
-    """The plot is drawn from a kept trace, or from one that is run again."""
+    """Draw the plot from a kept trace, or from one that is run again."""
     return _told(("show", place.experiment, "--run", place.run), printed=True)
 
 
@@ -164,19 +164,19 @@ def verify(place: Place) -> Told:
 
 
 def _table(path: Path, genuine: Path) -> str | bytes:
-    """A table's content; if the table is missing, the genuine one's."""
+    """Return a table's content. If the table is missing, return the genuine table's."""
     place = path if path.is_file() else genuine
     return pd.read_parquet(place).to_csv() if place.suffix == ".parquet" else place.read_bytes()
 
 
 def expect(place: Place, seal: str) -> Told:
-    """An audit by somebody who knows the seal."""
+    """Audit the folder as a user who knows the seal."""
     code, out, err = cli("verify", place.run, "--expect", seal)
     return Told(code=code, said=out + err)
 
 
 def api(place: Place) -> Told:
-    """Results, endings, seal, and an experiment with its patch, in Python."""
+    """Return results, endings, seal, and an experiment with its patch, in Python."""
     try:
         found = mutator.load_run(place.run)
         told = [found.results.to_csv(), found.endings, found.seal, found.experiment(place.experiment).patch]
@@ -186,9 +186,9 @@ def api(place: Place) -> Told:
 
 
 def rows(place: Place) -> Told:
-    """Rows of the results that the undamaged folder lacks: there must be none.
+    """Return rows of the results that the undamaged folder lacks. There must be none.
 
-    A killed run may have lost some, since the same command runs them again.
+    A killed run may have lost some, because the same command runs them again.
     """
     told = api(place)
     if told.code != 0:

@@ -34,7 +34,7 @@ def finished(home: Path, at: Path) -> World:
 
 
 def forged(home: Path, at: Path) -> World:
-    """A run of the toy, damaged by somebody who recomputes all digests."""
+    """A run of the toy in which a forger damaged files and recomputed all digests."""
     words = (*SMALL, "--engine", "fork")
     done("run", *words, "-n", "0", "--out", home / "run")
     shutil.rmtree(home / "run" / "report")
@@ -81,12 +81,12 @@ def done(*words: object) -> None:
 
 
 def hazardous(run: Path) -> str:
-    """The first experiment of a run that reached a hazard."""
+    """Return the first experiment of a run that reached a hazard."""
     return next(name for name, record in RunFolder.open(run).records().items() if record.hazards)
 
 
 def _killed(home: Path, at: Path, words: tuple[str, ...], records: int) -> World:
-    """A run that is killed as soon as that many experiments have a record."""
+    """Return a run that is killed as soon as that many experiments have a record."""
     out = home / "run"
     command = Command(_workspace(), out, "-m", "mutator", "run", *words, "-n", "2", "--out", str(out))
     command.wait_for_records(records)

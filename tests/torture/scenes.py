@@ -45,8 +45,9 @@ class Scene:
     takes_s: float = math.inf  # the command's shortest duration
 
     def cases(self, right: Told, seed: int) -> Sequence[Case]:
-        """Kill the command, repeat it, kill that, and so on, then let it complete; yield a case for each kill
-        that came in time.
+        """Kill the command, repeat it, kill it again and so on, then let it complete.
+
+        Yield a case for each kill that came in time.
         """
         chance = random.Random(seed)
         self._begin()
@@ -68,14 +69,15 @@ class Scene:
         ]
 
     def _is_done(self, command: Command) -> bool:
-        """Whether no other command is needed: a merge killed after its last write counts, since the next one
-        would not overwrite a run.
+        """Whether no other command is needed.
+
+        A merge killed after its last write counts as done, because the next one would not overwrite a run.
         """
         merged = self.name == "merge" and RunFolder.exists(self.at / "run")
         return command.process.returncode == 0 or merged
 
     def undisturbed(self) -> Told:
-        """The command's result when nobody kills it."""
+        """Return the command's result when it is not killed."""
         if self.home is None and not self.fresh_cache:  # the duration of later runs, with cached checks
             self._begin()
             self._command().end()
@@ -135,7 +137,7 @@ def scenes(workspace: Workspace, homes: Path, at: Path) -> Iterator[Scene]:
 
 
 def _damaged(home: Path) -> Path:
-    """The run in a folder, with a lost record line and a changed golden run and patch."""
+    """Return the run with a lost record line and a changed golden run and patch."""
     run = home / "run"
     records = next((run / "records").iterdir())
     records.write_bytes(records.read_bytes()[:-1] + b"x\n")
@@ -161,7 +163,7 @@ def struck(
 ) -> tuple[str, signal.Signals] | None:
     """Send a signal to one process of a command, or to all of them, at a random moment of its duration.
 
-    Return the receiver and the signal; None if no process was left.
+    Return the receiver and the signal, or None if no process was left.
     """
     number, victim = chance.choice(SIGNALS), chance.choice(victims)
     with suppress(subprocess.TimeoutExpired):

@@ -1,6 +1,7 @@
-"""Surroundings of a command: other locales and clocks, little disk, memory or file handles, closed streams.
+"""Surroundings of a command: other locales and clocks, few resources and closed streams.
 
-Each surrounding is a context manager that takes chance and the case's folder; the command starts within it.
+The resources are disk, memory and file handles. Each surrounding is a context manager that takes chance and
+the case's folder. The command starts within it.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""The outcomes of torture cases: a printed table, and the failures."""
+"""The outcomes of torture cases, as a printed table and a list of failures."""
 
 import traceback
 from collections import Counter
@@ -10,7 +10,7 @@ from mutator._common.tables import Table
 
 
 class End(StrEnum):
-    """Ways for a case to end."""
+    """The ways in which a case can end."""
 
     RIGHT = "right"  # with the undisturbed result
     REFUSED = "refused"  # with an error that names the file and the remedy
@@ -32,13 +32,13 @@ class Case:
 
 @dataclass(slots=True)
 class Tally:
-    """The cases of one torture test with their seeds; `--seed` repeats one case."""
+    """The cases of one torture test with their seeds. `--seed` repeats one case."""
 
     title: str
     cases: list[tuple[int, Case]] = field(default_factory=list)
 
     def drive(self, seeds: Iterable[int], cases_of: Callable[[int], Sequence[Case]]) -> None:
-        """Go through the seeds; an exception in a case is a failure."""
+        """Run the seeds. An exception in a case is a failure."""
         for seed in seeds:
             try:
                 found = cases_of(seed)
@@ -49,13 +49,13 @@ class Tally:
 
     @property
     def wrong(self) -> list[str]:
-        """A line for each failure, with the seed that repeats it."""
+        """Return a line for each failure, with the seed that repeats it."""
         return [
             f"--seed {seed}: {case.kind}: {case.story}" for seed, case in self.cases if case.end is End.WRONG
         ]
 
     def __str__(self) -> str:
-        """A table for each grouping of the cases, and the failures."""
+        """Return a table for each grouping of the cases, and the failures."""
         heads = [field.name for field in fields(Case)[:3]]
         tables = [self._table(head) for head in heads]
         return "\n\n".join([f"{self.title}: {len(self.cases)} cases", *tables, *self.wrong])

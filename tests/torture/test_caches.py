@@ -46,8 +46,9 @@ spacing_m: {SPACING}
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cache:
-    """A filled cache that stays unchanged, the place of its copy, and a command that uses the copy in a new
-    folder.
+    """A filled cache that stays unchanged, a place for its copy, and a command that uses the copy.
+
+    The command runs in a new folder.
     """
 
     home: Path
@@ -55,7 +56,10 @@ class Cache:
     use: Callable[[Path], Mapping[str, bytes | str]]
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Damage a file of the cache, then use it twice: the second use finds what the first leaves there."""
+        """Damage a file of the cache, then use the cache twice.
+
+        The second use finds what the first one left.
+        """
         chance = random.Random(seed)
         shutil.copytree(self.home, self.at)
         try:
@@ -89,7 +93,7 @@ class Cache:
 
 
 def contents_of(run: Path) -> dict[str, bytes]:
-    """The relevant content of a run folder, or of a run's output."""
+    """Return the relevant content of a run folder or of a run's output."""
     names = ("results.csv", "trace.npz", "record.json", "golden", "seal")
     found = [path for name in names for path in (run, *run.glob(name)) if path.name == name]
     files = [path for one in found for path in ([one] if one.is_file() else sorted(one.rglob("*.*")))]

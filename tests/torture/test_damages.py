@@ -1,5 +1,6 @@
-"""Every reader of a damaged run folder returns the right result, or an error that names the file and the
-remedy; never another result or a traceback.
+"""A reader of a damaged run folder never returns a wrong result or a traceback.
+
+It returns the right result, or an error that names the file and the remedy.
 """
 
 from collections.abc import Callable, Sequence

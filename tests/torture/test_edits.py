@@ -1,5 +1,6 @@
-"""After an edit between a killed run and its resume, the same command gives the right result or names the
-change; once that is undone, it gives the right result.
+"""After an edit between a killed run and its resume, the command gives no wrong result.
+
+It gives the right result or names the change. Once the change is undone, it gives the right result.
 """
 
 import os
@@ -38,9 +39,9 @@ CHOICES = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Edits:
-    """A command that is killed, and what changes before it is repeated.
+    """A command that is killed, and the changes made before it is repeated.
 
-    `root` holds library, templates and target, in a separate git clone.
+    `root` has the library, templates and target in a separate git clone.
     """
 
     workspace: Workspace
@@ -50,7 +51,7 @@ class Edits:
     right: Told
 
     def cases(self, seed: int) -> Sequence[Case]:
-        """Kill it, change something, repeat it, undo the change, repeat it."""
+        """Kill the command, change something, repeat it, undo the change, and repeat it."""
         chance = random.Random(seed)
         kind = chance.choice([*FILES] * 2 + ["choice"] * 10 + ["commit", "older folder"] * 2)
         shutil.rmtree(self.place.folder, ignore_errors=True)
@@ -76,7 +77,7 @@ class Edits:
         return [Case(kind=kind, damage=what.split(" of ")[0], reader="run", end=end, story=story)]
 
     def _kill(self, chance: Chance) -> None:
-        """Start it, and kill it at a random moment after it wrote its plan."""
+        """Start the command and kill it at a random moment after it wrote its plan."""
         run = self.place.run
         words = map(str, ("run", *WORDS, "-n", "2", "--out", run))
         command = Command(self.workspace, run, "-m", "mutator", *words)
@@ -88,8 +89,9 @@ class Edits:
 
     @contextmanager
     def _edited(self, kind: str, chance: Chance) -> Iterator[tuple[str, tuple[str, ...]]]:
-        """Apply an edit for the duration of the context; yield its name and additional words for
-        the command.
+        """Apply an edit for the duration of the context.
+
+        Yield its name and additional words for the command.
         """
         if kind == "choice":
             words = chance.choice(CHOICES)
@@ -149,8 +151,9 @@ def test_edits(
     print_tally: Callable[[Tally], None],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """After a kill and a change, the command gives the right result or refuses; without the change it
-    completes.
+    """After a kill and a change, the command gives the right result or refuses.
+
+    Without the change it completes.
     """
     monkeypatch.setenv("MUTATOR_ROOT", str(toy.library.parent))
     monkeypatch.chdir(tmp_path)

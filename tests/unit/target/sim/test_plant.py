@@ -48,7 +48,10 @@ def test_brake_and_grade():
 
 
 def test_creep():
-    """An idling car creeps: 1 m/s^2 at rest, falling to zero at 1.5 m/s, less the rolling resistance."""
+    """An idling car accelerates by 1 m/s^2 at rest and by nothing at 1.5 m/s.
+
+    The rolling resistance is subtracted.
+    """
     assert acceleration(0.0, 0.0, 0.0, 0.0) == pytest.approx(1.0 - 0.0981)
     assert acceleration(0.75, 0.0, 0.0, 0.0) == pytest.approx(0.5 - 0.0981, abs=1e-3)
     assert acceleration(1.5, 0.0, 0.0, 0.0) == pytest.approx(-0.0981, abs=1e-3)
@@ -65,8 +68,9 @@ def test_the_car_never_drives_backwards(plant):
 
 
 def test_way_along_the_road(plant):
-    """Only motion along the road counts: a car at an angle covers less distance, as does one on the outside
-    of a bend.
+    """Only motion along the road counts.
+
+    A car at an angle, or on the outside of a bend, covers less distance.
     """
     straight, askew, outside = plant(20.0), plant(20.0), plant(20.0)
     askew.lateral.heading = 0.5

@@ -60,7 +60,10 @@ def test_a_command_acts_in_the_next_step(s1):
 
 
 def test_what_the_controller_is_given(s1):
-    """Car frames come every step; radar frames and a view every fifth, from the same moment."""
+    """The controller gets car frames in every step.
+
+    In every fifth step it also gets radar frames and a view of the same time.
+    """
     script = Script()
     drive(s1, script, 20)
     assert [t for t, _, _ in script.steps] == [k / 100 for k in range(20)]
@@ -113,8 +116,9 @@ def test_free_road(s1):
 
 
 def test_hazards_and_alerts_in_the_record(s1):
-    """The record has the first hazards with their times; the first of each kind of counted alerts, and every
-    raising.
+    """The record has the first time of each hazard.
+
+    It also has the first of each kind of counted alert, and all alerts raised.
     """
     script = Script(lambda step: (0, 0, 1332))
     simulator = Simulator()
