@@ -1,4 +1,4 @@
-"""Comparing traces with references: made-up files with a known difference, lag and crossings; exit codes."""
+"""The comparison of traces with references, on synthetic files with known differences."""
 
 import json
 import os
@@ -25,7 +25,7 @@ TABLE = "schema: replay-tolerances/1\nchannels:\n  v_ego: {v_ego}\nfigures:\n  e
 
 @pytest.fixture
 def trace():
-    """A made-up trace of 10 s: a wavy speed, engaged from 1.3 s, set to 97 km/h."""
+    """Return a synthetic trace of 10 s with a wavy speed, engaged from 1.3 s and set to 97 km/h."""
     t = np.arange(STEPS) / 100
     channels = {name: np.zeros(STEPS) for name in CHANNELS}
     channels |= {"t": t, "v_ego": 20.0 + 3.0 * np.sin(t), "d_rel": 50.0 - 2.0 * t, "v_cruise": 97 * KPH_TO_MS}
@@ -41,14 +41,14 @@ def trace():
 
 @pytest.fixture
 def reference(trace, tmp_path):
-    """The trace as a reference, written and read back."""
+    """Return the trace as a reference, written and read back."""
     write_reference(tmp_path / "made" / "S1.csv", trace)
     return read_reference(tmp_path / "made" / "S1.csv")
 
 
 @pytest.fixture
 def finished(trace, tmp_path):
-    """Put a trace into the folder of a finished run of S1; return the folder of runs."""
+    """Put a trace into the folder of a finished run of S1 and return the folder of runs."""
 
     def put(**changes):
         folder = tmp_path / "runs" / "S1"
@@ -70,7 +70,7 @@ def replay(reference, runs, *arguments):
 
 
 def test_written_and_read_back(trace, reference):
-    """A reference is the trace's every fifth row, to six digits."""
+    """A reference has every fifth row of the trace, to six digits."""
     assert list(reference.steps) == list(range(0, STEPS, 5))
     for column in COLUMNS:
         if column.channel != "fcw":
@@ -80,7 +80,7 @@ def test_written_and_read_back(trace, reference):
 
 
 def test_rms_and_largest_difference(trace, reference):
-    """A hump of 0.6 m/s on a tenth of the rows has the hand-computed RMS, and the time of its peak."""
+    """A hump of 0.6 m/s on a tenth of the rows has the RMS computed by hand and the time of its peak."""
     trace["v_ego"] = trace["v_ego"].copy()
     trace["v_ego"][300:400] -= 0.5
     trace["v_ego"][350] -= 0.1
@@ -92,22 +92,23 @@ def test_rms_and_largest_difference(trace, reference):
 
 @pytest.mark.parametrize("late", [0, 3, 50, -20])
 def test_lag(trace, late):
-    """A wave that follows its reference by some steps has that lag; one that leads, a negative one."""
+    """A wave that follows its reference by some steps has that lag. If it leads, the lag is negative."""
     steps = np.arange(0, STEPS, 5)
     wave = 3.0 * np.sin((np.arange(STEPS) - late) / 100)
     assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
 
 
 def test_no_lag_to_be_seen():
-    """A constant has no lag, and a constant slope counts as being on time."""
+    """A constant has no lag. A constant slope counts as having no lag."""
     steps = np.arange(0, STEPS, 5)
     assert time_lag(steps, np.ones(len(steps)), np.ones(STEPS)) is None
     assert time_lag(steps, steps / 100, np.arange(STEPS) / 100) == 0.0
 
 
 def test_crossings():
-    """Each stretch beyond the band is a crossing, with its ends and its worst moment; the band is
-    inclusive.
+    """Each stretch outside the band is a crossing, with its ends and its worst moment.
+
+    A value at the limit is inside the band.
     """
     seconds = np.arange(8) / 20
     found = crossings(seconds, np.array([0.2, 0.5, 0.6, -0.9, 0.5, 0.0, 0.0, 0.7]), 0.5)
@@ -118,7 +119,7 @@ def test_crossings():
 
 
 def test_messages_may_be_a_cycle_late(trace, reference):
-    """The controller's messages may arrive a cycle later; the world's state may not."""
+    """The controller's messages may be one cycle late. The state of the world may not."""
     reference.channels["v_ego_est"] = np.concatenate(([0.0], trace["v_ego"][4::5][: STEPS // 5 - 1]))
     trace["v_ego_est"] = trace["v_ego"]
     reference.channels["v_ego"] = reference.channels["v_ego_est"]
@@ -130,7 +131,7 @@ def test_messages_may_be_a_cycle_late(trace, reference):
 
 
 def test_lead_compared_while_both_see_one(trace, reference):
-    """Estimates of a lead are compared only if both see one; whether it is seen is always compared."""
+    """Estimates of a lead are compared only if both see one. Whether a lead is seen is always compared."""
     trace["lead_status"] = np.where(np.arange(STEPS) < 500, 0, 1)
     trace["lead_d_rel"] = np.where(np.arange(STEPS) < 500, 99.0, 0.0)
     comparison = compare(reference, trace, NO_LIMITS)
@@ -139,13 +140,13 @@ def test_lead_compared_while_both_see_one(trace, reference):
 
 
 def test_no_number_is_beyond_any_limit(trace, reference):
-    """A channel that becomes NaN differs infinitely."""
+    """A channel that becomes NaN has an infinite difference."""
     trace["v_ego"] = np.where(np.arange(STEPS) == 500, np.nan, trace["v_ego"])
     assert channel(compare(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
 
 
 def test_free_road_has_no_lead_to_compare(trace, reference):
-    """On a free road the speed of the missing lead is left out."""
+    """On a free road, the speed of the missing lead is not compared."""
     with_lead = {result.column.channel for result in compare(reference, trace, NO_LIMITS).channels}
     without = {
         result.column.channel for result in compare(reference, trace, NO_LIMITS, free_road=True).channels
@@ -154,7 +155,7 @@ def test_free_road_has_no_lead_to_compare(trace, reference):
 
 
 def test_key_figures(trace):
-    """Engaging lies between two rows, set speeds keep their order, headway counts only while moving."""
+    """Engaging lies between two rows, set speeds keep their order, and headway counts only while moving."""
     rows = {name: values[::5] for name, values in trace.items()}
     rows["v_ego"] = np.where(np.arange(200) > 190, 0.0, rows["v_ego"])
     rows["v_cruise"] = np.where(np.arange(200) < 100, 97, 104) * KPH_TO_MS
@@ -182,14 +183,15 @@ def test_key_figures(trace):
     ],
 )
 def test_difference_of_figures(name, reference, ours, expected):
-    """Spans differ by the gap between them, lists by their worst pair; a figure of only one side differs
-    infinitely.
+    """Spans differ by the gap between them, and lists by their worst pair.
+
+    A figure that only one side has differs infinitely.
     """
     assert difference(name, reference, ours) == pytest.approx(expected)
 
 
 def test_within_tolerance(reference, finished, capsys):
-    """A run that is its own reference passes under the project's table, with exit code 0 and a summary."""
+    """A run compared with itself passes with the project's table. The exit code is 0, with a summary."""
     assert replay(reference, finished()) == 0
     out = capsys.readouterr().out
     assert "S1: within tolerance" in out
@@ -197,7 +199,10 @@ def test_within_tolerance(reference, finished, capsys):
 
 
 def test_beyond_tolerance(reference, finished, trace, capsys):
-    """Beyond the RMS the exit code is 1; the long report gives every crossing with its interval."""
+    """If the RMS is above its limit, the exit code is 1.
+
+    The long report gives the interval of each crossing.
+    """
     speed = trace["v_ego"].copy()
     speed[200:401] += 1.0
     assert replay(reference, finished(v_ego=speed), "--long") == 1
@@ -211,7 +216,7 @@ def test_beyond_tolerance(reference, finished, trace, capsys):
     ("limits", "code"), [("{max: 0.9}", 1), ("{max: 1.1}", 0), ("{lag_s: 0.2}", 0), ("{lag_s: 0.1}", 1)]
 )
 def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code):
-    """Largest difference and lag have separate limits."""
+    """The largest difference and the lag have separate limits."""
     late = np.interp(trace["t"] - 0.15, trace["t"], trace["v_ego"])
     changed = late if "lag" in limits else trace["v_ego"] + (np.arange(STEPS) == 500)
     table = tmp_path / "table.yaml"
@@ -220,13 +225,13 @@ def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code)
 
 
 def test_beyond_in_a_key_figure(reference, finished, trace, capsys):
-    """A different set speed alone is beyond tolerance."""
+    """A different set speed alone fails the comparison."""
     assert replay(reference, finished(v_cruise=np.full(STEPS, 96 * KPH_TO_MS))) == 1
     assert "difference 1.000, limit 0  <-- beyond" in capsys.readouterr().out
 
 
 def test_references_change_with_the_flag_only(reference, finished, trace, capsys):
-    """A comparison writes nothing; with the flag the run becomes the reference, and then passes."""
+    """A comparison writes nothing. With the flag, the run becomes the reference and then passes."""
     before = reference.path.read_bytes()
     runs = finished(v_ego=trace["v_ego"] + 1.0)
     assert replay(reference, runs) == 1
@@ -237,7 +242,7 @@ def test_references_change_with_the_flag_only(reference, finished, trace, capsys
 
 
 def test_drives_the_scenario_itself(tmp_path, scenarios):
-    """Without finished runs the scenario is simulated; its trace, stored as a reference, matches exactly."""
+    """Without finished runs, the scenario is simulated. Its trace, stored as a reference, matches exactly."""
     text = (scenarios / "S1.yaml").read_text().replace("duration_s: 30", "duration_s: 2")
     (tmp_path / "S1.yaml").write_text(text)
     given = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path)]
@@ -261,7 +266,7 @@ def test_drives_the_scenario_itself(tmp_path, scenarios):
     ],
 )
 def test_wrong_reference_file(reference, finished, capsys, line, old, new, expected):
-    """A mistake in a reference is reported with file and line, exit code 2."""
+    """For a mistake in a reference, the error gives file and line. The exit code is 2."""
     lines = reference.path.read_text().splitlines()
     assert old in lines[line - 1]
     lines[line - 1] = lines[line - 1].replace(old, new, 1)
@@ -310,14 +315,14 @@ def test_limited_channel_must_be_there(trace, reference):
     ],
 )
 def test_wrong_tolerance_table(reference, finished, tmp_path, capsys, text, expected):
-    """A mistake in the table is reported with file and line, exit code 2."""
+    """For a mistake in the table, the error gives file and line. The exit code is 2."""
     (tmp_path / "table.yaml").write_text(text.replace("{v_ego}", "{rms: 0.1}"))
     assert replay(reference, finished(), "--tolerances", str(tmp_path / "table.yaml")) == 2
     assert expected in capsys.readouterr().err
 
 
 def test_wrong_folders_and_names(reference, finished, tmp_path, capsys):
-    """Missing references, scenarios or runs, and a run of something else, end with exit code 2."""
+    """Missing references, scenarios or runs, and runs of another scenario, exit with code 2."""
     assert main(["--references", str(tmp_path / "nowhere")]) == 2
     assert main(["--references", str(reference.path.parent), "X9"]) == 2
     assert main(["--references", str(reference.path.parent), "--scenarios", str(tmp_path)]) == 2

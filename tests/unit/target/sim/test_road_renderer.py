@@ -1,4 +1,4 @@
-"""Rendered roads: lines at their true place, no flicker in the distance, equal bytes for equal seeds."""
+"""Rendered roads: lines at their true place, no flicker far away, equal bytes for equal seeds."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ BARE = Look(
 
 
 def finer(model, times):
-    """The same camera with that many times the pixels in each direction."""
+    """Return the same camera with that many times the pixels in each direction."""
     return replace(
         model,
         width=model.width * times,
@@ -42,14 +42,14 @@ def finer(model, times):
 
 @pytest.fixture(scope="module")
 def standard():
-    """The library's road with dashes, a short piece of it."""
+    """A short piece of the library's road with dashes."""
     return RoadRenderer(CALTECH, "dashed", 3, periods=2)
 
 
 @pytest.mark.parametrize("model", [CALTECH, UDACITY])
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.4, 0.01), (-0.6, -0.03)])
 def test_lines_are_where_the_truth_says(model, offset, heading):
-    """The middle of each line in each row equals the analytic one, to a fraction of a pixel."""
+    """In each row, the middle of each line matches the analytic one within a fraction of a pixel."""
     renderer = RoadRenderer(model, BARE, 0, periods=1)
     picture = renderer.grey(5.0, offset, heading).astype(float) - BARE.asphalt
     errors = []
@@ -68,7 +68,7 @@ def test_lines_are_where_the_truth_says(model, offset, heading):
 
 
 def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixel():
-    """A line's light in a row matches its width on the road, from a few metres to over a hundred."""
+    """A line's light in a row matches its width on the road, from a few metres to more than a hundred."""
     renderer = RoadRenderer(CALTECH, BARE, 0, periods=1)
     contrast = renderer.grey(0.0).astype(float) - BARE.asphalt
     a, b = CALTECH.line_in_picture(*renderer.truth()[0])
@@ -81,7 +81,7 @@ def test_a_line_is_as_wide_as_its_paint_down_to_where_it_is_a_fraction_of_a_pixe
 
 @pytest.mark.parametrize("heading", [0.0, 0.02])
 def test_the_far_field_is_anti_aliased(heading):
-    """An image equals the average of one with sixteen times the pixels, up to the horizon."""
+    """An image equals the average of an image with sixteen times the pixels, up to the horizon."""
     look = replace(BARE, right=replace(FRESH, dashed=True))
     coarse = RoadRenderer(CALTECH, look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
     fine = RoadRenderer(finer(CALTECH, 4), look, 0, periods=1).grey(5.0, 0.3, heading).astype(np.float32)
@@ -93,7 +93,7 @@ def test_the_far_field_is_anti_aliased(heading):
 
 
 def test_far_dashes_do_not_flicker():
-    """Beyond 150 m, where a row spans two dash periods, a line hardly changes from frame to frame."""
+    """Beyond 150 m, where a row covers two dash periods, a line hardly changes between frames."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     last = int(CALTECH.row(150.0))
     pictures = np.stack([renderer.grey(1.342 * k) for k in range(9)]).astype(int)
@@ -102,7 +102,7 @@ def test_far_dashes_do_not_flicker():
 
 
 def test_dashes_have_us_dimensions():
-    """A dashed line is painted for 3.05 m in every 12.2 m, beginning where the road does."""
+    """A dash is 3.05 m long and repeats every 12.2 m, starting where the road starts."""
     renderer = RoadRenderer(CALTECH, replace(BARE, right=replace(FRESH, dashed=True)), 0, periods=1)
     row = CALTECH.rows - 1
     x = CALTECH.distance(row)
@@ -114,7 +114,7 @@ def test_dashes_have_us_dimensions():
 
 
 def test_the_road_closes_on_itself():
-    """After the strip's length the same frame repeats."""
+    """After the length of the strip, the same frame repeats."""
     renderer = RoadRenderer(CALTECH, "dashed", 3, periods=2)
     assert np.array_equal(renderer.grey(4.0, 0.2, 0.01), renderer.grey(4.0 + 2 * DASH_PERIOD, 0.2, 0.01))
 
@@ -134,7 +134,7 @@ def test_another_seed_gives_another_road(standard):
 
 
 def test_the_standard_road_has_the_tones_of_a_road():
-    """Asphalt is mid grey, white paint bright, yellow paint between, as input for gains and biases."""
+    """Asphalt is mid grey, white paint is bright, and yellow paint lies between them."""
     picture = RoadRenderer(CALTECH, "solid", 1, periods=4).grey(0.0)
     left, right = (CALTECH.line_in_picture(y, 0.0) for y in (1.85, -1.85))
     row = 400
@@ -147,13 +147,13 @@ def test_the_standard_road_has_the_tones_of_a_road():
 
 
 def test_unknown_marks_are_refused():
-    """Marks are solid or dashed."""
+    """Marks other than solid and dashed are refused."""
     with pytest.raises(ValueError, match="dotted"):
         RoadRenderer(CALTECH, "dotted", 0)
 
 
 def test_every_part_of_a_look_shows():
-    """Each property that may vary between roads changes the image."""
+    """Each property of a road's look changes the image."""
     base = replace(BARE, far_left=FRESH, far_right=FRESH)
     plain = RoadRenderer(UDACITY, base, 1, periods=1).grey(0.0)
     changes = {
@@ -185,7 +185,10 @@ def test_every_part_of_a_look_shows():
 
 
 def test_colours_keep_the_grey_values(standard):
-    """The coloured image is as bright as the grey one; left line yellow, sky blue, verge green."""
+    """The coloured image is as bright as the grey one.
+
+    The left line is yellow, the sky blue, the verge green.
+    """
     grey, colour = standard.grey(3.0, 0.2, 0.01), standard.colour(3.0, 0.2, 0.01)
     assert np.abs(cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY).astype(int) - grey).mean() < 2.0
     blue, green, red = colour[20, 320].astype(int)
@@ -199,7 +202,7 @@ def test_colours_keep_the_grey_values(standard):
 
 @pytest.mark.parametrize(("offset", "heading"), [(0.0, 0.0), (0.5, 0.02)])
 def test_the_lead_stands_on_the_road_where_it_is(standard, offset, heading):
-    """The lead's wheels touch the road in the row of its distance, in the middle of the lane."""
+    """The lead's wheels touch the road in the row of its distance and in the middle of the lane."""
     lead = 20.0
     with_lead = standard.colour(3.0, offset, heading, lead=lead)
     changed = (with_lead != standard.colour(3.0, offset, heading)).any(axis=2)
@@ -211,14 +214,14 @@ def test_the_lead_stands_on_the_road_where_it_is(standard, offset, heading):
 
 
 def test_a_lead_that_cannot_be_seen_is_not_drawn(standard):
-    """A lead that is hit, or out of sight, leaves the image unchanged."""
+    """A lead that was hit or is out of sight leaves the image unchanged."""
     plain = standard.colour(3.0)
     assert np.array_equal(plain, standard.colour(3.0, lead=-3.0))
     assert np.array_equal(plain, standard.colour(3.0, lead=500.0))
 
 
 def test_a_turn_pans_what_is_far_away(standard):
-    """As the car turns left, the sky moves right as a whole, and does not change with the offset."""
+    """When the car turns left, the whole sky moves right. It does not change with the offset."""
     ahead, turned = standard.grey(0.0), standard.grey(0.0, 0.5, 0.05)
     shift = round(CALTECH.fx * np.tan(0.05) / np.cos(CALTECH.pitch))
     assert np.array_equal(turned[:150, shift:], ahead[:150, :-shift])

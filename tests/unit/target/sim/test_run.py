@@ -1,4 +1,4 @@
-"""One run from the command line: files, bytes, mistakes."""
+"""A run from the command line: its files, its bytes and the user's mistakes."""
 
 import errno
 import hashlib
@@ -12,7 +12,7 @@ from selfdrive.sim.run import main
 
 @pytest.fixture
 def run(scenarios, tmp_path):
-    """Run S1 for some steps; return the folder."""
+    """Run S1 for some steps and return the folder."""
 
     def go(name, *arguments, scenario="S1", steps=150):
         folder = tmp_path / name
@@ -29,7 +29,7 @@ def contents(folder):
 
 
 def test_what_is_written(run, scenarios):
-    """A run writes a trace with one row a step, and a record of its inputs with the trace's digest."""
+    """A run writes a trace with one row per step. Its record has the inputs and the trace's digest."""
     folder = run("a", "--seed", "5")
     trace = np.load(folder / "trace.npz")
     record = json.loads((folder / "record.json").read_text())
@@ -45,15 +45,16 @@ def test_what_is_written(run, scenarios):
 
 
 def test_same_bytes_whatever_ran_before(run):
-    """The same run twice in one process, with another scenario in between, gives the same bytes."""
+    """Two equal runs in one process, with another scenario in between, give the same bytes."""
     first = contents(run("a"))
     run("other", "--no-lead", scenario="S2")
     assert contents(run("b")) == first
 
 
 def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
-    """A record exists only for a whole run: if the disk fills up half way, neither the old nor a new one is
-    left.
+    """Only a complete run has a record.
+
+    If the disk fills up half way, neither an old nor a new record is left.
     """
     folder = run("a")
     opened = Path.open
@@ -75,14 +76,17 @@ def test_what_is_broken_off_has_no_record(run, scenarios, monkeypatch, capsys):
 
 
 def test_no_lead(run):
-    """Without the lead the road is free from the first step on, and the record says so."""
+    """Without the lead, the road is free from the first step on. The record says so."""
     folder = run("a", "--no-lead")
     assert set(np.load(folder / "trace.npz")["d_rel"]) == {200.0}
     assert json.loads((folder / "record.json").read_text())["no_lead"] is True
 
 
 def test_a_wrong_scenario_is_answered(tmp_path, capsys):
-    """A user's mistake is reported on stderr with place and remedy, exit code 2, and no files."""
+    """A user's mistake is reported on stderr with place and remedy.
+
+    The exit code is 2, and no file is written.
+    """
     bad = tmp_path / "bad.yaml"
     bad.write_text("schema: scenario/1\nnmae: x\n")
     assert main(["--scenario", str(bad), "--out", str(tmp_path / "out")]) == 2
@@ -94,7 +98,7 @@ def test_a_wrong_scenario_is_answered(tmp_path, capsys):
 
 
 def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
-    """An output path that is a file is reported by name."""
+    """If the output path is a file, the error names it."""
     (tmp_path / "file").write_text("")
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--max-steps", "1"]
     assert main([*arguments, "--out", str(tmp_path / "file" / "out")]) == 2
@@ -102,7 +106,7 @@ def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
 
 
 def test_frames_without_pictures(scenarios, tmp_path, capsys):
-    """Naming a folder of frames without requesting frames is an error."""
+    """A folder of frames without the option for frames is an error."""
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), "--max-steps", "1"]
     assert main([*arguments, "--frames", "mine"]) == 2
     assert "--frames mine, expected --pictures" in capsys.readouterr().err

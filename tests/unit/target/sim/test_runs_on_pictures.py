@@ -40,7 +40,7 @@ spacing_m: {SPACING}
 
 
 class LineReader:
-    """Reads only the lane's lines from the image, near where it last saw them."""
+    """A detector that reads only the lane's lines from the image, close to where it last saw them."""
 
     def __init__(self, model: CameraModel) -> None:
         self._model = model
@@ -102,8 +102,9 @@ def test_the_loop_closes_through_the_picture(
 
 @pytest.mark.parametrize("detector", [PAPER, ROBUST, AS_CODED])
 def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_path, detector):
-    """From fair weather into rain, trace and record are the same for any cache content, even damaged or
-    missing; a run with only known frames analyses none.
+    """Trace and record are the same for any content of the cache, even if it is damaged or missing.
+
+    The run goes from clear weather into rain. A run with only known frames analyses none.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     clean, look = PictureCamera.look, []
@@ -140,8 +141,9 @@ def test_memory_changes_no_byte_of_a_run(monkeypatch, scenarios, frames, tmp_pat
 
 
 def test_a_run_that_forgets_believes_nothing_kept(monkeypatch, scenarios, frames, tmp_path):
-    """With `--forget` a wrong memory changes no byte of a run, and without it the trace differs; such a run
-    stores nothing in the memory and mentions nothing in the record.
+    """With `--forget`, wrong entries in the memory change no byte. Without it, the trace differs.
+
+    A run with `--forget` stores nothing in the memory and does not mention it in the record.
     """
     monkeypatch.setattr(detection_memory, "BUCKETS", 512)
     cache = tmp_path / "cache"
@@ -203,7 +205,7 @@ def test_runs_without_pictures_load_nothing_for_them():
 @pytest.mark.slow
 @pytest.mark.parametrize("translation", [GROUND, SHIFT])
 def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, tmp_path_factory, translation):
-    """With lines read from frames, every scenario stays in the lane's middle without alerts."""
+    """With lines read from frames, the car stays in the lane's middle in every scenario, without alerts."""
     monkeypatch.setattr(vision, "_detector", lambda pictures, library: LineReader(library.model))
     pictures = Pictures(translation=translation, cache=tmp_path_factory.getbasetemp() / "pictures")
     for name in ("S1", "S2", "S3", "S4", "S5"):
@@ -219,7 +221,10 @@ def test_all_scenarios_are_driven_on_the_rendered_road(monkeypatch, scenarios, t
     [(STANDARD, GROUND, set(), 0.2), (REFERENCE, CODED, {"S2", "S4"}, 0.6)],
 )
 def test_fault_free_runs_seen_as_coded(scenarios, tmp_path_factory, plant, translation, alerting, aside):
-    """They end without a hazard on either plant; on the reference plant two raise *steer saturated*."""
+    """Fault-free runs end without a hazard on either plant.
+
+    On the reference plant, two raise *steer saturated*.
+    """
     cache = tmp_path_factory.getbasetemp() / "pictures"
     pictures = Pictures(detector=AS_CODED, translation=translation, cache=cache)
     found = set()

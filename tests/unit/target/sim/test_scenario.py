@@ -1,4 +1,4 @@
-"""Scenario files: their meaning, and errors for mistakes."""
+"""Scenario files: their meaning and the errors for mistakes."""
 
 import pytest
 from selfdrive.common.errors import ConfigError
@@ -35,7 +35,7 @@ def edit(old, new):
 
 
 def test_everything_arrives_in_si_units():
-    """Units are converted once, times become steps."""
+    """All values are in SI units, and times are in steps."""
     scenario = parse(GOOD)
     assert (scenario.name, scenario.title, scenario.digest, scenario.steps) == ("T1", "a try", "digest", 1250)
     assert scenario.speed == pytest.approx(26.8224)
@@ -52,13 +52,13 @@ def test_everything_arrives_in_si_units():
 
 
 def test_buttons_are_down_from_press_to_release():
-    """The button is down from the step of the press up to, but excluding, the step of the release."""
+    """The button is down from the step of the press until just before the step of the release."""
     scenario = parse(GOOD)
     assert [scenario.button(k) for k in (119, 120, 129, 130, 505)] == [0, 3, 3, 0, 2]
 
 
 def test_what_may_be_left_out():
-    """Lead, buttons, road and offset are optional; a single lead speed needs no times."""
+    """Lead, buttons, road and offset are optional. A single lead speed needs no times."""
     scenario = parse("schema: scenario/1\nname: a\ntitle: b\nduration_s: 1\nhost: {speed_mps: 5}\n")
     assert (scenario.lead, scenario.buttons, scenario.grade, scenario.curvature) == (None, (), None, None)
     assert (scenario.speed, scenario.lateral_offset) == (5.0, 0.0)
@@ -113,7 +113,7 @@ def test_what_may_be_left_out():
     ],
 )
 def test_mistakes(text, line, got, remedy):
-    """A mistake is reported with file and line, finding, expectation and remedy."""
+    """For a mistake, the error gives file and line, what was found and expected, and what to do."""
     with pytest.raises(ConfigError) as caught:
         parse(text)
     message = str(caught.value)
@@ -123,13 +123,13 @@ def test_mistakes(text, line, got, remedy):
 
 
 def test_a_number_is_what_it_looks_like():
-    """Sixty is read as sixty in any notation; YAML 1.1 would read a leading zero as octal."""
+    """A number has its usual meaning in any notation. YAML 1.1 would read a leading zero as octal."""
     for text in ("60", "060", "60.", "+6.0e1"):
         assert parse(edit("speed_mph: 60", f"speed_mph: {text}")).speed == pytest.approx(26.8224)
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    """A missing file, one that is no text, and one with endless nesting are reported by name."""
+    """For a missing file, a file that is not text, and endless nesting, the error names the file."""
     (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
     with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
         load_scenario(tmp_path / "deep.yaml")
@@ -142,7 +142,10 @@ def test_files_that_cannot_be_read(tmp_path):
 
 @pytest.mark.parametrize("name", ["S1", "S2", "S3", "S4", "S5"])
 def test_the_five_scenarios(scenarios, name):
-    """All five have 60 mph, 100 m to the lead at 40 mph, set pressed at 1.2 s for 0.1 s, and 30 s."""
+    """All five scenarios start at 60 mph, 100 m behind a lead at 40 mph, and last 30 s.
+
+    The set button is pressed at 1.2 s for 0.1 s.
+    """
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.speed) == (name, 3000, pytest.approx(26.8224))
     assert scenario.lead.gap == 100.0
@@ -151,7 +154,7 @@ def test_the_five_scenarios(scenarios, name):
 
 
 def test_digest_is_that_of_the_bytes(tmp_path):
-    """Any change of the file changes the digest, even a comment."""
+    """Any change of the file changes the digest, even one in a comment."""
     first, second = tmp_path / "a.yaml", tmp_path / "b.yaml"
     first.write_text(GOOD)
     second.write_text(GOOD + "# more\n")

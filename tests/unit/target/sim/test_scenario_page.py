@@ -71,8 +71,9 @@ def test_a_full_one_is_taken() -> None:
 
 @pytest.mark.parametrize("name", scenario_page.SECTIONS)
 def test_schema_and_parser_agree_on_keys_and_bounds(name: str) -> None:
-    """Both refuse a missing required key, an unknown key, text for a number, and a value beyond
-    each bound.
+    """The schema and the parser refuse the same mistakes.
+
+    These are a missing required key, an unknown key, text for a number, and a value beyond each bound.
     """
     _, types, needed = scenario_page.SECTIONS[name]
     breaks: list[tuple[str, Any]] = [(key, None) for key in needed] + [("unheard_of", 1)]

@@ -31,9 +31,10 @@ Drive = Callable[..., tuple[str, str]]
 
 @pytest.fixture
 def drive(tmp_path: Path) -> Drive:
-    """Run a mutant for a second, on three frames; return its record with the trace's digest, and its counts.
+    """Run a mutant for a second on three frames.
 
-    The fault is in `function` of a file, after the assignment of `name`, and acts from `time_s` on.
+    Return its record with the trace's digest, and its counts. The fault is in `function` of a file, after the
+    assignment of `name`, and acts from `time_s` on.
     """
     frames, work = tmp_path / "frames", tmp_path / "work"
     frames.mkdir()
@@ -80,8 +81,9 @@ def memory() -> Path:
 
 
 def test_the_manifest_names_every_file_that_sees() -> None:
-    """A mutant of a file in the memory's key runs from the disk; faults in visiond and in the camera, which
-    are not in the key, can be forked.
+    """A mutant of a file in the memory's key runs from the disk.
+
+    Faults in visiond and in the camera, which are not in the key, can be forked.
     """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     package = ROOT / "target" / "selfdrive"
@@ -99,8 +101,9 @@ def test_the_manifest_names_every_file_that_sees() -> None:
 
 
 def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
-    """A mutant of a file with compiled code runs from the disk, so that the compiled code is not found; the
-    code that chooses between the two accepts no faults.
+    """A mutant of a file with compiled code runs from the disk, so the compiled code is not found.
+
+    The code that chooses between the two accepts no faults.
     """
     manifest = Workspace.find(root=ROOT).manifest("openpilot")
     target = ROOT / "target"
@@ -117,8 +120,9 @@ def test_the_manifest_names_every_file_that_compiled_code_stands_for() -> None:
 
 
 def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
-    """A mutant's tree has everything that identifies a library: without a header, for example, slow Python
-    would run.
+    """A mutant's tree has everything that identifies a library.
+
+    If a header were missing, for example, the slow Python code would run.
     """
     manifest, target = Workspace.find(root=ROOT).manifest("openpilot"), ROOT / "target"
     base = prepare_base(manifest, tmp_path / "base")
@@ -131,8 +135,10 @@ def test_a_mutants_tree_finds_all_compiled_code(tmp_path: Path) -> None:
 
 
 def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> None:
-    """A fault in a detector gives the same trace and counts in a run without sharing, after itself, and after
-    the same fault at another time; none of its results is stored.
+    """A fault in a detector gives the same trace and counts, whatever ran before.
+
+    The cases are a run without sharing, a repeated run, and a run after the same fault at another time. No
+    result is stored.
     """
     place = ("selfdrive/visiond/paper_detector.py", "PaperDetector._marked", "score")
     early, late = (drive(place, time_s, independent=True) for time_s in (0.3, 0.7))

@@ -1,4 +1,4 @@
-"""What sensors and radar send on the bus."""
+"""The messages that sensors and radar send on the bus."""
 
 import cantools
 import pytest
@@ -21,7 +21,7 @@ def read(database, frames):
 
 
 def test_speed_and_angle_as_cantools_reads_them(truth):
-    """All speeds equal the truth in km/h, and the angle is in degrees."""
+    """All speeds equal the true speed in km/h. The angle is in degrees."""
     frames = CarSensors().measure(truth(v_ego=20.0, steer_angle=-0.1, steer_rate=0.2), 3, 0)
     values = read(CAR, frames)
     assert values["ENGINE_DATA"]["XMISSION_SPEED"] == pytest.approx(72.0)
@@ -58,19 +58,19 @@ def radar(truth, road=None, **values):
 
 
 def test_radar_cuts_off_towards_zero(truth):
-    """Distance and speed are truncated towards zero, like the original's."""
+    """Distance and speed are truncated towards zero, as in the original."""
     track = radar(truth, d_rel=97.681, v_ego=26.777, v_lead=17.8868)
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (97.625, -8.875)
 
 
 @pytest.mark.parametrize(("d_rel", "read_as"), [(255.99, 255.9375), (256.0, 0.0), (317.0, 61.0), (-5.0, 0.0)])
 def test_radar_distance_wraps(truth, d_rel, read_as):
-    """Twelve bits of 1/16 m wrap around at 256 m; a lead behind the bumper reads 0."""
+    """The twelve bits of 1/16 m wrap around at 256 m. A lead behind the bumper reads 0."""
     assert radar(truth, d_rel=d_rel)["LONG_DIST"] == read_as
 
 
 def test_radar_sees_the_lead_where_it_is(truth):
-    """The lead stays in its lane: it moves right (positive) in view when the car drifts or turns left."""
+    """The lead stays in its lane, so it moves right (positive) when the car drifts or turns left."""
     assert radar(truth, d_rel=50.0, lateral_offset=1.0)["LAT_DIST"] == 1.0
     assert radar(truth, d_rel=50.0, heading=0.1)["LAT_DIST"] == pytest.approx(4.99, abs=0.0625)
     left_bend = Road(None, ((0.0,), (0.002,)))
@@ -79,7 +79,7 @@ def test_radar_sees_the_lead_where_it_is(truth):
 
 
 def test_radar_of_a_broken_measurement():
-    """NaN reads 0 and raises nothing."""
+    """A NaN measurement reads 0 and raises nothing."""
     sensor = RadarSensor(Road(None, None))
     track = read(RADAR, sensor._pack(float("nan"), float("inf"), 0.0))["TRACK_15"]
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (0.0, 0.0)

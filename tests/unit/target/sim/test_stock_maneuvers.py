@@ -10,7 +10,7 @@ SET_EARLY = ((SET, 120, 130),)
 
 
 def resumed(times):
-    """Set at 1.2 s, then that many presses of RES, each 0.1 s, every 0.2 s."""
+    """Return presses of set at 1.2 s and then of RES, each 0.1 s long, every 0.2 s."""
     return (*SET_EARLY, *((RESUME, 140 + 20 * k, 150 + 20 * k) for k in range(times)))
 
 
@@ -43,7 +43,7 @@ GRADES = {"O03": ((0, 10, 11), (0, 0, 1.0)), "O04": ((0, 10, 11), (0, 0, -1.0))}
 
 @pytest.mark.parametrize("name", MANEUVERS)
 def test_it_is_the_stock_maneuver(scenarios, name):
-    """Speed, lead, grade, buttons and duration are the original's; the user chooses the plant."""
+    """Speed, lead, grade, buttons and duration match the original's. The user chooses the plant."""
     speed, gap, profile, buttons, duration = MANEUVERS[name]
     scenario = load_scenario(scenarios / f"{name}.yaml")
     assert (scenario.name, scenario.steps, scenario.plant) == (name, 100 * duration, "standard")

@@ -1,4 +1,4 @@
-"""The trace's file."""
+"""The trace file has the bytes that NumPy's `savez` writes."""
 
 import io
 
@@ -9,7 +9,7 @@ from selfdrive.sim.trace_file import pieces
 
 @pytest.mark.parametrize("rows", [0, 1, 3000])
 def test_the_bytes_are_those_of_savez(rows):
-    """Floats, integers, special values and table columns give the same file as numpy."""
+    """Floats, integers, special values and table columns give the same file as NumPy's."""
     values = np.random.default_rng(rows).normal(size=(rows, 3))
     values[1:2] = [np.nan, -0.0, np.inf]
     trace = {
@@ -24,7 +24,7 @@ def test_the_bytes_are_those_of_savez(rows):
 
 
 def test_a_trace_without_channels_is_an_empty_archive():
-    """No channels give the same file as numpy's."""
+    """A trace without channels gives the same file as NumPy's."""
     expected = io.BytesIO()
     np.savez(expected)
     assert b"".join(pieces({})) == expected.getvalue()

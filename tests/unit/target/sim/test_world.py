@@ -12,7 +12,7 @@ BEND = Road(None, ((0.0,), (0.002,)))
 
 
 def test_lead_follows_its_profile():
-    """The lead has its table's speed at each step's beginning, and moves with it."""
+    """At the start of each step, the lead has the speed of its table. It moves at that speed."""
     lead = LeadVehicle(100.0, (0.0, 1.0, 2.0), (10.0, 10.0, 20.0))
     speeds = []
     for frame in range(300):
@@ -25,7 +25,7 @@ def test_lead_follows_its_profile():
 
 
 def test_grade_and_curvature_tables():
-    """Grade is a table over time, curvature one over distance; a plain road has neither."""
+    """Grade is a table over time, and curvature is a table over distance. A plain road has neither."""
     road = Road(((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)), ((100.0, 200.0), (0.0, 0.002)))
     assert [road.grade(t) for t in (5.0, 10.5, 20.0)] == [0.0, 0.5, 1.0]
     assert [road.curvature(s) for s in (0.0, 150.0, 300.0)] == [0.0, 0.001, 0.002]
@@ -33,7 +33,7 @@ def test_grade_and_curvature_tables():
 
 
 def test_bend_is_a_parabola_for_constant_curvature():
-    """A road of constant curvature departs from its tangent by k x^2 / 2, to the side of the curvature."""
+    """A road of constant curvature leaves its tangent by k x^2 / 2, to the side of the curvature."""
     points = BEND.bend(0.0, 50)
     assert points == pytest.approx([0.001 * x * x for x in range(50)])
     assert BEND.sideways(0.0, 40.2) == points[40]
@@ -41,7 +41,7 @@ def test_bend_is_a_parabola_for_constant_curvature():
 
 
 def test_lane_in_view(truth):
-    """In mid-lane the lines are 1.85 m to either side; a car 0.4 m left sees them 0.4 m right."""
+    """In mid-lane the lines are 1.85 m to either side. A car 0.4 m left sees them 0.4 m right."""
     view = Camera(STRAIGHT).look(truth(d_rel=42.0))
     assert (view.left_lane_y, view.right_lane_y, view.path_y, view.lead_d_rel) == (1.85, -1.85, 0.0, 42.0)
     assert view.bend == (0.0,) * 50
@@ -50,7 +50,7 @@ def test_lane_in_view(truth):
 
 
 def test_heading_and_bend_in_view(truth):
-    """A car turned left sees the lane run to the right; in a left-hand bend it curves to the left."""
+    """A car turned left sees the lane run to the right. In a left-hand bend it curves to the left."""
     assert Camera(STRAIGHT).look(truth(heading=0.1)).bend[49] == pytest.approx(-49 * 0.100335, rel=1e-4)
     assert Camera(BEND).look(truth()).bend[49] == pytest.approx(0.001 * 49**2)
     both = Camera(BEND).look(truth(heading=0.1)).bend
