@@ -181,7 +181,7 @@ class CampaignModel(StrictModel, title="The file"):
     @model_validator(mode="after")
     def _check(self) -> "CampaignModel":
         if self.proportional and self.sample is None:
-            raise ValueError("proportional without sample: say how many")
+            raise ValueError("`proportional` without `sample`; set `sample` to the number of experiments")
         if self.proportional and any(one.operators for one in self.faults):
             raise ValueError("proportional with `operators`: they have a `sample` of their own")
         if (self.seed is None) == (self.seeds is None):

@@ -20,7 +20,7 @@ from mutator.store.stretches import Stretch, differences
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
-_REMEDY = "undo the change, or run into another folder"
+_REMEDY = "undo the change, or use another run folder"
 _OWN = Path(__file__).parents[1]  # the harness
 
 
@@ -41,7 +41,7 @@ def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> Non
         raise MutatorError(
             f"changed since this run was planned: {', '.join(changed)}",
             where=run,
-            expected="the same target, templates and scenarios during a whole run",
+            expected="the same target, templates and scenarios during the whole run",
             remedy=_REMEDY,
         )
 
@@ -56,7 +56,7 @@ def check_version(run: Path, schema: str, provenance: Mapping[str, Any]) -> None
             f"was planned by mutator {provenance['mutator']} ({schema})",
             where=run,
             expected=f"mutator {VERSION} ({SCHEMA})",
-            remedy="finish it with that version, or run into another folder; this one can still be read",
+            remedy="finish the run with that version, or use another folder; this run can still be read",
         )
 
 

@@ -87,7 +87,7 @@ def check(path: Path) -> list[Path]:
         raise MutatorError(
             f"holds what no run writes: {', '.join(names[:_SHOWN])}{more}",
             where=path,
-            expected="a run folder and nothing else",
+            expected="only files that a run writes",
             remedy="move that elsewhere, or delete the folder yourself",
         )
     return ours

@@ -129,7 +129,7 @@ class Ledger:
 def read(run: Path) -> Ledger:
     """Read the ledger of a run folder; MutatorError if it is missing or changed."""
     path = run / FILE
-    remedy = "take it from a copy of the run folder; without it nothing vouches for the results"
+    remedy = "restore it from a copy of the run folder; without it, changed results cannot be detected"
     if not path.is_file():
         raise MutatorError("missing", where=path, expected="the digests of all files", remedy=remedy)
     data = read_json(path, SCHEMA)

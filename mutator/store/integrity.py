@@ -218,7 +218,7 @@ def id_problems(
             yield MutatorError(
                 f"no record of {', '.join(missing[:_MANY])}{more}",
                 where=run / kind,
-                expected="one for each planned experiment, as the run is finished",
+                expected="a record of each planned experiment, because the run is finished",
                 remedy=_remedy(run, ""),
             )
 

@@ -202,7 +202,7 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
     _check_grid(structure, source)
     for name, link in structure.links.items():
         if name in structure.components:
-            raise source.error(("links", name), f"link '{name}'", expected="a name no component has")
+            raise source.error(("links", name), f"link '{name}'", expected="a name that no component has")
         _known(source, ("links", name, "from"), "component", link.from_, structure.components)
         _known(source, ("links", name, "to"), "component", link.to, structure.components)
     for name, action in structure.control_actions.items():

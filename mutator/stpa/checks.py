@@ -100,7 +100,7 @@ def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
             for name in sorted(set(names_in(row.condition)) - observed):
                 yield table.source.error(
                     ("contexts", row.id, "when"),
-                    f"context '{row.id}' asks for '{name}', which no process model has",
+                    f"context '{row.id}' uses '{name}', which is in no process model",
                     remedy=f"add it to a component of {analysis.structure_source.path.name}",
                 )
 

@@ -121,7 +121,7 @@ def read_channels(models: dict[str, ChannelModel], trace: TraceModel, source: So
         raise source.error(
             ("channels",),
             "no channel with `role: actuator`",
-            expected="what the controller commands: a fault manifests where it differs from golden",
+            expected="a channel that holds what the controller commands; verdicts depend on it",
             remedy="give a channel the role actuator",
         )
     return tuple(_channel(name, model, trace, source) for name, model in models.items())
@@ -135,7 +135,7 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
         raise source.error(
             keys,
             f"'{name}'",
-            expected=f"a name that formulas do not have already: {', '.join(RESERVED)}",
+            expected=f"a name other than these, which formulas already use: {', '.join(RESERVED)}",
             remedy=f"choose another name, with `from: {name}`",
         )
     in_topics = trace.file.endswith(".mcap")

@@ -24,7 +24,7 @@ def check_file(manifest: TargetManifest, named: str) -> None:
     if path in manifest.tree.overlaid:
         raise MutatorError(
             f"file '{path}' is in the overlay of target {manifest.name}",
-            expected="a file of the controller: glue is no place for a fault",
+            expected="a file of the controller, because no fault may be injected into glue",
             remedy="inject somewhere else",
         )
     if matches(path, manifest.forbid):

@@ -203,7 +203,7 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
                     raise source.error(
                         (key, name, field),
                         f"'{found[0]}', which is observed but not recorded",
-                        expected="what follows from the channels",
+                        expected="only values that follow from the channels",
                         remedy=f"have the run record it, as a channel `{found[0]}` with `role: truth`",
                     )
 

@@ -144,7 +144,7 @@ def _line(name: str, model: _LineModel, known: Collection[str], source: Source) 
     keys: Keys = ("scene", "lines", name)
     if (model.points_m is None) == (model.y is None):
         raise source.error(
-            keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="give one of them"
+            keys, f"line '{name}'", expected="either `points_m` or `y`", remedy="give exactly one of the two"
         )
     for i, point in enumerate(model.points_m or ()):
         if len(point) != 2 or not all(map(math.isfinite, point)):

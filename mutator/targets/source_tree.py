@@ -91,7 +91,7 @@ def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> 
             raise MutatorError(
                 f"'{path}' is in the overlay and in {root}",
                 where=overlay,
-                expected="files that the root has not",
+                expected="only files that the root does not have",
                 remedy="rename the overlay's file",
             )
     files |= laid_over
@@ -118,7 +118,7 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
                 f"a link to {path.readlink()}, where nothing is",
                 where=path,
                 expected="a file",
-                remedy="mend or remove it, or leave it out of `files`",
+                remedy="repair or remove the link, or leave it out of `files`",
             )
         if path.is_file():
             files[found[path]] = path.read_bytes()

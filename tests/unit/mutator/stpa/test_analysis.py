@@ -137,7 +137,7 @@ def test_what_does_not_fit_together_is_refused(
 @pytest.mark.parametrize(
     ("file", "old", "new", "said"),
     [
-        (STRUCTURE, "observed: rs", "observed: null", "context 'C1' asks for 'rs'"),
+        (STRUCTURE, "observed: rs", "observed: null", "context 'C1' uses 'rs'"),
         (STRUCTURE, "channel: gas", "channel: throttle", "channel 'throttle'"),
         (
             STRUCTURE,

@@ -80,7 +80,7 @@ def test_it_is_well_without_a_mistake(path: Path) -> None:
         ("file: trace.npz", "file: trace.mat", "'trace.mat'", ".npz"),
         ("record: record.json", "record: ../record.json", "'../record.json'", "bare file name"),
         ("role: actuator, tolerance: 0.5", "role: output", "'output'", "actuator"),
-        ("role: actuator, tolerance: 0.5", "role: truth", "no channel", "differs from golden"),
+        ("role: actuator, tolerance: 0.5", "role: truth", "no channel", "what the controller commands"),
         ("gap: {unit: m, role: truth}", "gap: {unit: m, tolerance: -1}", "-1", "greater than or equal to 0"),
         ("file: drive.py", "file: ../drive.py", "'../drive.py'", "in"),
         ("is: cart.gap", "is: cart.gap()", "'cart.gap()'", "attributes"),
