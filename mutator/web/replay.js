@@ -1,17 +1,17 @@
 "use strict";
-// The replay of an experiment: scene, instruments and plots at one time, which you play, drag or step.
+// The replay of an experiment: scene, instruments and plots at one time. The user plays, drags or steps the time.
 
 const Replay = (() => {
-  const BEFORE = 1; // s before activation, where the replay starts
-  const SPOKEN = 4; // channels in the description of a time
-  const SILENCE = 500; // ms that the time must rest before it is read out
+  const BEFORE = 1; // the replay starts this many s before activation
+  const SPOKEN = 4; // maximum of channels in the description of a time
+  const SILENCE = 500; // ms for which the time must rest before it is read out
 
   const SYMBOLS = {
     play: "M4 2l9 6-9 6z", pause: "M4 2h3v12H4zM9 2h3v12H9z", start: "M3 3h2v10H3zM13 3v10L6 8z", end: "M11 3h2v10h-2zM3 3v10l7-5z",
     back: "M11 3v10L4 8z", on: "M5 3v10l7-5z",
   };
 
-  /** A button's symbol, independent of fonts. */
+  /** The symbol of a button, which does not depend on fonts. */
   const symbol = (name) => Dom.svg("svg", { viewBox: "0 0 16 16", width: 14, height: 14, fill: "currentColor", "aria-hidden": "true" }, Dom.svg("path", { d: SYMBOLS[name] }));
 
   class Player {
@@ -28,7 +28,7 @@ const Replay = (() => {
       new ResizeObserver(() => this.clock.redraw()).observe(this.root);
     }
 
-    /** The scene, if the target has one whose formulas can be evaluated over this series. */
+    /** The scene, if the target has one and its formulas can be evaluated over this series. */
     #scene() {
       if (!this.facts.scene) return null;
       try {
@@ -56,7 +56,7 @@ const Replay = (() => {
         onkeydown: (event) => this.#key(event), onpointerdown: (event) => {
           if (!event.target.matches("canvas")) return;
           if (event.pointerType === "mouse") event.preventDefault(); // keep the focus off the page
-          this.bar.element.focus({ preventScroll: true }); // for the keys
+          this.bar.element.focus({ preventScroll: true }); // so that the bar gets the keys
         } },
         el("div.stage", {}, this.#view(), el("div.state", {}, this.time, this.states)), this.#controls(), this.bar.element, this.bar.jumps,
         this.missing ? el("p.quiet", {}, `The scene cannot be drawn: ${this.missing}.`) : null,
@@ -129,7 +129,7 @@ const Replay = (() => {
       return about ? `${label}: ${about}` : label;
     }
 
-    /** Draw everything for the time of the clock. */
+    /** Draw everything at the time of the clock. */
     draw() {
       if (!this.root.isConnected) return this.clock.pause();
       const { clock, series } = this, { t, isPlaying } = clock, now = performance.now(), colours = ReplayColours.now();
@@ -178,7 +178,7 @@ const Replay = (() => {
       if (!isPlaying) this.speaking = setTimeout(() => document.activeElement !== this.bar.element && this.#say(t), SILENCE);
     }
 
-    /** Read the state out when the time rests; the bar announces its own. */
+    /** Read the state out when the time rests. The bar announces its own changes. */
     #say(t) {
       const text = this.describe(t);
       if (this.root.contains(document.activeElement) && this.live.textContent !== text) this.live.textContent = text;

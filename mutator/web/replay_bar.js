@@ -1,5 +1,5 @@
 "use strict";
-// The time bar of a replay: draggable, with marks for events and a button below for each event.
+// The time bar of a replay, which the user can drag. It has marks for events and, below, a button for each event.
 
 class ReplayBar {
   /** `describe(t)` returns the state at a time as text. */
@@ -15,7 +15,7 @@ class ReplayBar {
     this.jumps = el("div.jumps", { role: "group", "aria-label": "Go to" }, series.marks.map((mark) => this.#jump(mark)));
   }
 
-  /** A time as a share of the bar, in CSS. */
+  /** A time as a share of the bar's width, in CSS. */
   #at = (t) => `${(100 * (t - this.series.start)) / (this.series.end - this.series.start || 1)}%`;
 
   #span(name, from, to, title) {
@@ -60,7 +60,7 @@ class ReplayBar {
     for (const name of ["pointerup", "pointercancel"]) this.element.addEventListener(name, () => over.abort(), { signal });
   }
 
-  /** Show the time. Describe it only at rest, or a screen reader would talk all the time. */
+  /** Show the time. Describe it only at rest, or a screen reader would talk without a pause. */
   show() {
     const { t, isPlaying } = this.clock, { start, end } = this.series, share = (t - start) / (end - start || 1);
     this.handle.style.left = `${100 * share}%`;
@@ -70,7 +70,7 @@ class ReplayBar {
     this.element.setAttribute("aria-valuetext", this.describe(t));
   }
 
-  /** Show which part of the time the plots cover; nothing if they cover all of it. */
+  /** Show which part of the time the plots cover, unless they cover all of it. */
   zoomed(from, to) {
     this.window.hidden = from <= this.series.start && to >= this.series.end;
     this.window.style.left = this.#at(from);

@@ -1,15 +1,15 @@
 "use strict";
-// The time of a replay: playing, stepping and the frame rate.
+// The clock of a replay: playing, stepping and the frame rate.
 
 class ReplayClock {
   static SPEEDS = [0.25, 0.5, 1, 2, 4, 8];
   static CALM = 500; // ms between frames with reduced motion
-  #frames = []; // times of the last frames, ms
+  #frames = []; // times of the latest frames, ms
   #last = null; // ms, time of the previous frame while playing
   #isDue = false; // a frame is requested
   #timer = null;
 
-  /** From `start` to `end` s; playing pauses at each of `stops`. `draw(clock)` is called after every change. */
+  /** A clock from `start` to `end` s, which pauses at each of `stops`. It calls `draw(clock)` after every change. */
   constructor({ start, end, stops, steps, at }, draw) {
     Object.assign(this, { start, end, stops, steps, draw, t: at, speed: 1, isPlaying: false, rate: 0 });
     this.calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -49,7 +49,7 @@ class ReplayClock {
     this.seek(this.steps[Math.min(this.steps.length - 1, Math.max(0, to))]);
   }
 
-  /** Redraw soon: the content changed, not the time. */
+  /** Redraw soon, because the content changed but not the time. */
   redraw() {
     this.#ask();
   }
@@ -68,7 +68,7 @@ class ReplayClock {
     if (this.isPlaying && !isCalm) this.#ask();
   }
 
-  /** Reduced motion: two frames a second, no gliding. */
+  /** Play with reduced motion: two frames a second, without gliding. */
   #goOnCalmly() {
     clearInterval(this.#timer); // left from a recent pause
     this.#timer = setInterval(() => {

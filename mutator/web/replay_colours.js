@@ -1,10 +1,10 @@
 "use strict";
-// The page's current colours for canvases, and canvases at screen resolution.
+// The current colours of the page for canvases, and canvases at screen resolution.
 
 const ReplayColours = (() => {
   const modes = ["(prefers-color-scheme: dark)", "print"].map((query) => matchMedia(query)), made = new Map();
 
-  /** Colours by name; the same object until colours change. */
+  /** The colours by name. It is the same object until the colours change. */
   function now() {
     const mode = modes.map(({ matches }) => matches).join();
     if (!made.has(mode)) made.set(mode, read());
@@ -19,7 +19,7 @@ const ReplayColours = (() => {
     return Object.assign(found, { ground: of("raised"), alert: of("sdc"), manifest: of("masked"), activation: of("ink"), goldenText: of("accent") });
   }
 
-  /** The cleared context of a canvas of this size in CSS pixels. */
+  /** Resize a canvas to this size in CSS pixels, and return its cleared context. */
   function fitted(canvas, width, height) {
     const ratio = devicePixelRatio || 1;
     canvas.width = Math.round(width * ratio);

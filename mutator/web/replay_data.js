@@ -1,8 +1,8 @@
 "use strict";
-// Values of a series (SeriesFile.load) for the replay: at a time, as text, on an axis.
+// The values of a series (SeriesFile.load) for the replay: at a time, as text, or on an axis.
 
 const ReplayData = (() => {
-  const BEYOND = 100; // the axis is cut at this multiple of a channel's usual size
+  const BEYOND = 100; // an axis is cut at this multiple of the channel's usual size
   const TINY = 1e-9; // s
 
   /** The index of the last of `times` that is not after `t`; 0 before the first. */
@@ -24,7 +24,7 @@ const ReplayData = (() => {
   /** The times at which a replay can change: those of the channel with the most samples. */
   const steps = (series) => series.channels.reduce((most, { t }) => (t.length > most.length ? t : most), []);
 
-  /** The end of the drive, s. */
+  /** The time (s) of the end of the drive. */
   const until = (series) => series.tEnd ?? series.end;
 
   /** The largest difference of golden and faulty up to the end of the drive: {by, t}; `by` is 0 if they are equal. */
@@ -63,7 +63,7 @@ const ReplayData = (() => {
       cut = [low, high];
       [low, high] = [Math.max(low, -2 * usual), Math.min(high, 2 * usual)];
     }
-    // a narrower range would magnify rounding errors
+    // because a narrower range would magnify rounding errors
     const margin = Math.max((high - low) * 0.06, 1e-6, Math.abs(high) * 1e-3);
     return { low: low - margin, high: high + margin, cut, isWhole };
   }

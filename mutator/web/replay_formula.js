@@ -1,5 +1,5 @@
 "use strict";
-// Evaluates a manifest's formulas and conditions over the steps of a run, as triggers/over_time.py does. Input is
+// Evaluates a manifest's formulas and conditions over the steps of a run, as triggers/over_time.py does. The input is
 // trees (triggers/trees.py): numbers, names, and lists of an operator and its operands.
 
 const Formula = (() => {
@@ -11,7 +11,7 @@ const Formula = (() => {
     and: (...all) => all.every(Boolean), or: (...all) => all.some(Boolean), not: (a) => !a, if: (c, a, b) => (c ? a : b),
   };
 
-  /** The value of `tree` at each step; `values` has an array for each name, all as long as `values.t`. */
+  /** The value of `tree` at each step. `values` has an array for each name; all are as long as `values.t`. */
   function evaluate(tree, values) {
     const count = values.t.length;
     if (!Array.isArray(tree)) {
@@ -34,7 +34,7 @@ const Formula = (() => {
     return holds.map((now) => (found = found || now));
   }
 
-  /** The rate of change per second since the previous step; NaN in the first. */
+  /** The rate of change per second since the previous step; NaN in the first step. */
   const rate = (values, t) => Array.from(values, (value, i) => (i ? (value - values[i - 1]) / (t[i] - t[i - 1]) : NaN));
 
   return { evaluate };

@@ -1,9 +1,9 @@
 "use strict";
-// Instruments: each channel's faulty and golden value with a bar. Pressing an instrument shows or hides its plot.
+// The instruments, which show the faulty and golden value of each channel. Pressing one shows or hides its plot.
 
 class ReplayGauges {
-  static FEW = 8; // instruments that a narrow screen shows at first
-  static TEXTS = 100; // ms between text updates while playing; faster is not readable
+  static FEW = 8; // number of instruments that a narrow screen shows at first
+  static TEXTS = 100; // ms between text updates while playing, so that texts stay readable
 
   /** `isPlotted(name)` returns whether a channel is plotted; `toggle(name)` changes it. */
   constructor(channels, axes, { isPlotted, toggle }) {
@@ -28,7 +28,7 @@ class ReplayGauges {
     return { channel, axis, share, places: ReplayData.digits(axis), button, faulty, golden, fill, needle };
   }
 
-  /** Show the values at a time; `now`, in ms, limits text updates. */
+  /** Show the values at a time. `now` (ms) limits the rate of text updates. */
   show(t, now, isPlaying) {
     const isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
     if (isWritten) this.written = now;

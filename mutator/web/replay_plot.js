@@ -1,9 +1,9 @@
 "use strict";
-// One channel over time on a canvas: golden as a broad line, faulty as a narrow line above it, grey after the drive.
+// Plots a channel over time: golden as a broad line, faulty as a narrow line above it, grey after the drive.
 
 class ReplayPlot {
   static HEIGHT = 84; // px
-  static LEFT = 58; // px for axis labels
+  static LEFT = 58; // px for the labels of the axis
   static RIGHT = 8;
 
   constructor(channel, axis, series) {
@@ -96,7 +96,7 @@ class ReplayPlot {
     context.fillRect(x(this.series.tEnd), 0, width, HEIGHT);
   }
 
-  /** How long a value holds: until the next one, or the end. */
+  /** The time until which a value holds: that of the next value, or the end. */
   #holds = (i) => this.channel.t[i + 1] ?? this.series.end;
 
   /** The area between both runs during the drive, from activation. */
@@ -124,7 +124,7 @@ class ReplayPlot {
     context.globalAlpha = 1;
   }
 
-  /** A line between two times; each value holds until the next. */
+  /** Draw a line between two times. Each value holds until the next. */
   #line(context, x, y, values, from, to) {
     const { t } = this.channel;
     let isDown = false;
@@ -138,7 +138,7 @@ class ReplayPlot {
     context.stroke();
   }
 
-  /** A signed difference with enough digits to not be 0. */
+  /** A signed difference, with enough digits that it does not show as 0. */
   #difference(by) {
     if (!Number.isFinite(by)) return "differs";
     const text = this.#text(by);

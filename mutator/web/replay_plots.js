@@ -1,11 +1,11 @@
 "use strict";
-// The plots below a replay: the chosen channels on one time axis that zooms and moves.
+// The plots below a replay: the chosen channels on one time axis, which the user can zoom and move.
 
 class ReplayPlots {
-  static NARROWEST = 0.2; // s, narrowest view
-  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // initial plots, at most
-  static SEEN = 0.002; // smallest visible difference, as a share of the axis
-  static FACTOR = 1.6; // of a zoom step
+  static NARROWEST = 0.2; // duration (s) of the narrowest view
+  static CHOSEN = { actuator: 2, truth: 3, internal: 1 }; // maximum of initial plots by role
+  static SEEN = 0.002; // the smallest visible difference, as a share of the axis
+  static FACTOR = 1.6; // ratio of a zoom step
 
   constructor(channels, axes, series, clock, zoomed) {
     const { el } = Dom;
@@ -48,7 +48,7 @@ class ReplayPlots {
     const shown = this.plots.filter(({ channel }) => this.chosen.has(channel.name));
     this.list.replaceChildren(...shown.map(({ element }) => element), shown.length ? this.axis : Dom.el("p.quiet", {}, "No channel is chosen. Press one above."));
     this.shown = shown;
-    this.width = 0; // new plots are not drawn yet
+    this.width = 0; // so that the new plots are drawn
   }
 
   isPlotted = (name) => this.chosen.has(name);
@@ -78,7 +78,7 @@ class ReplayPlots {
     for (const tick of ReplayData.ticks(from, to, Math.max(2, width / 110))) context.fillText(`${tick} s`, Math.min(width - 16, plot.x(tick, this.view)), 14);
   }
 
-  /** Show the time of the clock, or under the pointer; `now` in ms. */
+  /** Show the time under the pointer, or else that of the clock. `now` is in ms. */
   show(now, isPlaying) {
     if (isPlaying) this.#keepInView(this.clock.t);
     const t = this.hovered ?? this.clock.t, isWritten = !isPlaying || now - this.written > ReplayGauges.TEXTS;
@@ -93,7 +93,7 @@ class ReplayPlots {
     this.#set(t, t + to - from);
   }
 
-  /** Preview a time without moving the clock; null: no preview. */
+  /** Preview a time without moving the clock; null ends the preview. */
   #look(t) {
     this.hovered = t;
     this.clock.redraw();
@@ -130,7 +130,7 @@ class ReplayPlots {
     for (const name of ["pointerup", "pointercancel"]) addEventListener(name, () => over.abort(), { signal });
   }
 
-  /** The wheel zooms with Ctrl or two fingers, moves sideways or with Shift, and otherwise scrolls the page. */
+  /** The wheel zooms with Ctrl or a pinch. Sideways, or with Shift, it moves the plots. Otherwise it scrolls the page. */
   #wheel(event) {
     const aside = event.deltaX || (event.shiftKey ? event.deltaY : 0);
     if (event.ctrlKey) this.zoom(event.deltaY < 0 ? 0.5 : -0.5, this.#timeAt(event) ?? undefined);

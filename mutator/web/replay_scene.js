@@ -3,10 +3,10 @@
 
 class ReplayScene {
   static SYMBOLS = { activation: "▲", manifest: "◆", alert: "!", hazard: "✕" };
-  static DASH = [3, 9]; // m, dash and gap of a line
-  static POST = 20; // m between roadside posts, which make motion visible
+  static DASH = [3, 9]; // length (m) of dash and gap of a line
+  static POST = 20; // distance (m) of the posts that make motion visible
   static AT = 0.24; // position of the followed actor, as a share of the width
-  static ZOOM = [3, 17]; // pixels per metre, least and most
+  static ZOOM = [3, 17]; // minimum and maximum of pixels per metre
 
   constructor(tracks, series) {
     Object.assign(this, { tracks, series, end: ReplayData.until(series) });
@@ -34,14 +34,14 @@ class ReplayScene {
     if (this.impact && t >= this.series.tEnd - ReplayData.TINY) this.#burst(this.impact);
   }
 
-  /** A view of everything in the run. */
+  /** A fixed view of everything in the run. */
   #whole() {
     const [left, right, low, high] = this.fixed;
     const scale = Math.min(this.width / ((right - left) * 1.08 || 1), this.height / ((high - low) * 1.2 || 1));
     return { scale, x: (left + right) / 2 - this.width / 2 / scale, y: (low + high) / 2 };
   }
 
-  /** A view that follows an actor and reaches as far ahead as there is something to see. */
+  /** A view that follows an actor. It reaches as far ahead as there are other actors to see. */
   #following() {
     const own = this.tracks.followed("faulty", this.t), [least, most] = ReplayScene.ZOOM;
     const scale = Math.min(most, Math.max(least, ((1 - ReplayScene.AT) * this.width) / (this.tracks.reachAt(this.t) + 9)));
@@ -84,7 +84,7 @@ class ReplayScene {
     context.setLineDash([]);
   }
 
-  /** A band on the ground covered with the fault active. */
+  /** Draw a band on the ground that was covered while the fault was active. */
   #active() {
     const { active } = this.series;
     if (!active || this.t < active[0] || !this.pins.length) return;
@@ -97,7 +97,7 @@ class ReplayScene {
   /** A mark at the followed actor's position during an event: a line across, and its name at the bottom. */
   #pin({ kind, x, label }, i) {
     const { context, colours, height } = this, at = this.#x(x);
-    if (at < 0 || at > this.width) return; // drop its name, too: it would be cut
+    if (at < 0 || at > this.width) return; // without the name, because it would be cut
     context.strokeStyle = colours[kind] ?? colours.ink;
     context.lineWidth = 1.4;
     context.setLineDash(kind === "hazard" ? [] : [4, 3]);
@@ -181,7 +181,7 @@ class ReplayScene {
     }
     const own = golden.find(({ actor }) => actor.name === this.tracks.scene.follow), here = faulty.find(({ actor }) => actor === own?.actor);
     if (!own || !here) return;
-    const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 46; // below the cars and their names
+    const x = this.#x(own.x), by = Math.abs(own.x - here.x).toFixed(0), y = this.#y(own.y) + 46; // below the actors and their names
     if (x > width) this.#label(`golden ${by} m ahead ▶`, width - 8, y, colours.goldenText, "right");
     else if (x < 0) this.#label(`◀ golden ${by} m behind`, 8, y, colours.goldenText);
   }
@@ -193,7 +193,7 @@ class ReplayScene {
     else this.#label(name, this.#x(pose.x), y, colours.belief, "center");
   }
 
-  /** A star at the end of the drive. */
+  /** Draw a star at the end of the drive. */
   #burst({ x, y }) {
     const { context, colours } = this, size = Math.min(28, Math.max(14, this.view.scale * 1.6));
     context.beginPath();

@@ -2,7 +2,7 @@
 // The positions of a scene's actors in both runs of a series, from the manifest's formulas over its channels.
 
 class ReplayTracks {
-  static REACH = { least: 25, most: 150, spread: 1.5 }; // m shown ahead, least and most; s over which that changes
+  static REACH = { least: 25, most: 150, spread: 1.5 }; // minimum and maximum distance (m) shown ahead; time (s) over which it changes
 
   /** `scene` comes from the manifest (report/scenes.py); throws an Error if the series lacks one of its channels. */
   constructor(scene, series) {
@@ -14,7 +14,7 @@ class ReplayTracks {
     if (this.follow >= 0) this.reach = this.#reach();
   }
 
-  /** A run's channels on one time axis. */
+  /** The channels of a run on one time axis. */
   #values(run, series) {
     const values = { t: this.t };
     for (const channel of series.channels) values[channel.name] = channel.t === this.t ? channel[run] : this.#spread(channel, run);
@@ -39,7 +39,7 @@ class ReplayTracks {
     return { ground, actors };
   }
 
-  /** The origin's distance: the integrated speed; missing values count as standstill. */
+  /** The distance of the origin, which is the integrated speed. A missing value counts as standstill. */
   #ground(speed) {
     let sum = 0;
     return Array.from(speed, (v, i) => {
@@ -84,7 +84,7 @@ class ReplayTracks {
     });
   }
 
-  /** The followed actor's position; an actor that disappeared keeps its last one. */
+  /** The position of the followed actor. An actor that has disappeared keeps its last position. */
   followed(run, t) {
     const { x, y } = this.runs[run].actors[this.follow];
     let near = this.#around(t);

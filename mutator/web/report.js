@@ -1,8 +1,8 @@
 "use strict";
-// The report's interactive part: creates its components, ties them to the state and handles keys.
+// The interactive part of the report. Creates the components, ties them to the state and handles keys.
 
 const Report = (() => {
-  const WIDE = "(min-width: 1000px)"; // room for list and experiment, as in report.css
+  const WIDE = "(min-width: 1000px)"; // wide enough for list and experiment, as in report.css
   const find = (id) => document.getElementById(id);
 
   /** The run folder as commands name it; the page's location if it was opened from disk. */
@@ -44,7 +44,7 @@ const Report = (() => {
     search.parentElement.append(Dom.copyButton(() => location.href, "Copy link to this view"));
   }
 
-  /** The number of experiments that a state leaves, and the requests that it cannot meet. */
+  /** A text with the number of experiments that match a state, and with what the state asks for in vain. */
   function foundText(table, state, count) {
     const all = table.count.toLocaleString("en");
     const found = state.isFiltered ? `${count.toLocaleString("en")} of ${all} experiments` : `${all} experiment${table.count === 1 ? "" : "s"}`;
@@ -58,7 +58,7 @@ const Report = (() => {
     return [`Experiment ${experiment} is not listed here. Run mutator show ${experiment} --run ${runFolder()}`];
   }
 
-  /** The function that shows the state in all components. */
+  /** Make the function that shows the state in all components. */
   function viewOf({ table, state, search, heat, filters, grid, columns, experiment }) {
     let drawn = null;
     let scrolled = 0; // scroll position before an experiment was opened
@@ -134,7 +134,7 @@ const Report = (() => {
       const { target, key } = event;
       const isTyping = target.matches("input[type=search], select, textarea");
       const isRow = target.matches("#grid tr") || target === find("grid");
-      const isPanel = target.closest("#experiment") && !target.closest("button, a, summary, pre, code, video, .scroll"); // these need the arrows
+      const isPanel = target.closest("#experiment") && !target.closest("button, a, summary, pre, code, video, .scroll"); // these use the arrow keys
       if (key === "Escape" && isTyping) target.blur();
       else if (key === "Escape" && experiment.isOpen) close();
       else if (!isTyping && keys[key]) keys[key]();

@@ -19,7 +19,7 @@ const Review = (() => {
       };
       this.cards = new Map(data.groups.map((g) => [g.id, new Card(g, data, actions)]));
       this.stacks = new Stacks(this.cards, { ...actions, mark: (ids, kind) => this.#ask(ids, kind) });
-      this.conflicts = new Map(); // group id -> mark that was not saved
+      this.conflicts = new Map(); // group id -> mark that could not be saved
       this.#read();
       this.#draw();
       this.#controls();
@@ -127,7 +127,7 @@ const Review = (() => {
       this.#apply({ isKept: true });
     }
 
-    /** Mark groups; false: a name is missing. Repeating a single group's decision takes it back. */
+    /** Mark groups. Returns false if the name of the reviewer is missing. Repeating the decision on a single group takes it back. */
     mark(all, kind, text = "") {
       const outbox = this.data.served && this.marks;
       if (!outbox) return this.marks.mark(all, kind);
@@ -188,7 +188,7 @@ const Review = (() => {
       Question.ask(`${verb} ${plural(ids.length, "group")}?`, about, `${verb} ${ids.length}`, () => this.mark(ids, kind));
     }
 
-    /** Hide groups that do not match; `isKept`: shown groups stay even if they no longer match. */
+    /** Hide groups that do not match. With `isKept`, shown groups stay even if they no longer match. */
     #apply({ isKept = false } = {}) {
       const wanted = this.query.toLowerCase().split(/\s+/).filter(Boolean);
       const fits = (g) => (!this.states.size || this.states.has(g.state)) && (!this.isFlagged || g.flag)
@@ -250,7 +250,7 @@ const Review = (() => {
       if (event.ctrlKey || event.metaKey || event.altKey || find("help").open || find("ask").open) return;
       if (/^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) {
         if (event.key === "Escape") {
-          event.preventDefault(); // a browser would clear the search field
+          event.preventDefault(); // because a browser would clear the search field
           this.#leave(event.target);
         }
         return;

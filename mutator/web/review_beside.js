@@ -1,22 +1,22 @@
 "use strict";
-// The server's data on a group, fetched when it scrolls into view: images, a typical experiment, changes.
+// Fetches the server's data on a group when it scrolls into view: images, a typical experiment, and changes.
 
 const Beside = (() => {
   const { el } = Dom;
   const LEVELS = { least: "least", middle: "middle", most: "most severe" };
 
-  /** An address with the page's query and more parameters. */
+  /** An address with the query of the page and more parameters. */
   const query = (served, more = {}) => {
     const all = new URLSearchParams(served.query);
     for (const [name, value] of Object.entries(more)) all.set(name, value);
     return String(all) && `?${all}`;
   };
 
-  /** A server error as text. */
+  /** An error of the server as text. */
   const words = ({ got, where, expected, remedy }) =>
     [where ? `${where}: ${got}` : got, expected && `expected ${expected}`, remedy].filter(Boolean).join("; ");
 
-  /** The server's answer; null: not found. */
+  /** The answer of the server; null if nothing was found. */
   async function get(address) {
     const response = await fetch(address, { headers: { accept: "application/json" } });
     if (response.ok) return response.json();
@@ -64,7 +64,7 @@ const Beside = (() => {
     return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
   }
 
-  /** Report each of `elements` once, when it comes near the screen. */
+  /** Report each of `elements` once, when it comes near the visible part. */
   function nearby(seen, elements) {
     const observer = new IntersectionObserver((entries) => {
       for (const { isIntersecting, target } of entries) {

@@ -1,5 +1,5 @@
 "use strict";
-// A group as a card: its place, decision, diff, values and remarks.
+// The card of a group, with place, decision, diff, values and remarks.
 
 class Card {
   static VERBS = { approve: ["Approve", "a"], reject: ["Reject", "r"] };
@@ -77,7 +77,7 @@ class Card {
     return el("form.remark", { onsubmit: kept }, field, el("button", {}, "Save remark"));
   }
 
-  /** Show the group's current state; `pending`: the kinds of marks being sent. */
+  /** Show the current state of the group. `pending` has the kinds of marks that are being sent. */
   update(pending = new Set()) {
     const { group } = this, header = this.#part("head");
     const state = header.querySelector(".state");
@@ -93,7 +93,7 @@ class Card {
     this.#remarks();
   }
 
-  /** Whether a button is pressed: by a mark being sent, else by a valid decision. */
+  /** Whether a button shows as pressed: because of a mark that is being sent, or else of a valid decision. */
   isMarked(kind, pending) {
     const { state, flag } = this.group;
     if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
@@ -101,7 +101,7 @@ class Card {
     return this.isServed && state === { approve: "approved", reject: "rejected" }[kind];
   }
 
-  /** The fate of the last mark: `saving`, `saved 15:20`. */
+  /** The state of the last mark, such as `saving` or `saved 15:20`. */
   say(text, isBad = false) {
     const kept = this.#part("head").querySelector(".kept");
     kept.textContent = text;
@@ -134,7 +134,7 @@ class Card {
       changed.length ? `changed since: ${changed.join(", ")}` : ""].filter(Boolean).join("; ");
   }
 
-  /** A time in the user's format and zone. */
+  /** A time in the format and time zone of the user. */
   static moment(text) {
     const at = new Date(text);
     if (!text || Number.isNaN(at.getTime())) return text || "";
@@ -167,7 +167,7 @@ class Card {
     renderDiff(this.#part("diffs"), this.group.diff, { mode });
   }
 
-  /** The text that a group is found by. */
+  /** The text in which the search looks for words. */
   get words() {
     const g = this.group;
     return [g.id, g.state, Card.told(g.decision), ...g.injections, ...g.specs, g.trigger, g.hold, ...g.remarks.map((r) => `${r.by} ${r.text}`)]
@@ -184,7 +184,7 @@ class Card {
     return Dom.el(`details${name}`, {}, Dom.el("summary", {}, title), content);
   }
 
-  /** The range of each numeric hole: `: by - 245.0 to - 12.0`; without seeds. */
+  /** The range of each numeric hole, without seeds, such as `: by - 245.0 to - 12.0`. */
   static #spans(g) {
     const told = g.heads.slice(2).flatMap((head, i) => {
       const cells = g.rows.map((row) => [Number(row[i + 2].replaceAll(" ", "") || NaN), row[i + 2]]);

@@ -17,7 +17,7 @@ const Changes = (() => {
     });
   }
 
-  /** A coloured line. A leading sign is that of the inner diff; `-- ` is a heading. */
+  /** A coloured line. A leading sign is that of the inner diff. `-- ` marks a heading. */
   function inner(text) {
     const sign = /^[-+](?!-{1,2} |\+{2} )/.exec(text);
     return sign ? [el(`span.inner.${KINDS[sign[0]]}`, {}, sign[0]), ...Diff.coloured(text.slice(1))] : Diff.coloured(text);

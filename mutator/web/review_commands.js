@@ -1,8 +1,8 @@
 "use strict";
-// Marks on a page without a server: turns them into commands that record the decisions.
+// Turns the marks on a page without a server into commands that record the decisions.
 
 class Commands {
-  /** `changed(ids)` is called for groups with changed marks. */
+  /** `changed(ids)` is called with the groups that have changed marks. */
   constructor(data, changed) {
     Object.assign(this, { data, changed });
     this.marks = new Map(); // group id -> "approve" or "reject", in the order of marking
@@ -13,7 +13,7 @@ class Commands {
     return new Set(this.marks.has(id) ? [this.marks.get(id)] : []);
   }
 
-  /** Mark groups; marking a single group again removes its mark. */
+  /** Mark groups. Marking a single group again removes its mark. */
   mark(ids, kind) {
     if (!["approve", "reject"].includes(kind)) return false;
     const isOff = ids.length === 1 && this.marks.get(ids[0]) === kind;

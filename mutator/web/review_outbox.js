@@ -1,6 +1,6 @@
 "use strict";
 // Sends each mark on a served page at once. Unconfirmed marks survive reloads and server restarts and are sent again.
-// Polls every few seconds for other reviewers' marks.
+// Every few seconds, asks the server for marks of other reviewers.
 
 class Outbox {
   static EVERY_MS = 5000;
@@ -14,7 +14,7 @@ class Outbox {
     this.key = `mutator-review ${this.address}`;
     this.queue = Outbox.#stored(this.key).filter((item) => groups.has(item.group));
     this.sending = null; // promise of the pending request
-    this.isSingle = false; // one change per request, after a batch was refused
+    this.isSingle = false; // one change per request, because a batch was refused
     setInterval(() => this.poll(), Outbox.EVERY_MS);
     document.addEventListener("visibilitychange", () => document.hidden || this.poll());
     this.poll();
@@ -33,7 +33,7 @@ class Outbox {
     return new Set(this.queue.filter((item) => item.group === id).map((item) => item.kind));
   }
 
-  /** Queue a reviewer's changes [{group, kind, text}] and send them. */
+  /** Queue the changes of a reviewer, [{group, kind, text}], and send them. */
   add(changes, by) {
     for (const change of changes) {
       const waiting = this.queue.find((item) => item.group === change.group);
@@ -50,11 +50,11 @@ class Outbox {
       if (this.queue.length) sessionStorage.setItem(this.key, JSON.stringify(this.queue));
       else sessionStorage.removeItem(this.key);
     } catch {
-      // storage is full: the marks are only in this page
+      // the storage is full, so only this page has the marks
     }
   }
 
-  /** Fetch others' changes and resend what is waiting. */
+  /** Fetch the changes of others, and resend what is waiting. */
   async poll() {
     if (document.hidden && !this.queue.length) return;
     if (this.sending) return;
@@ -64,7 +64,7 @@ class Outbox {
       return;
     }
     this.events.offline("");
-    if (!this.sending) this.#receive(answer.data.groups); // else outdated by the pending answer
+    if (!this.sending) this.#receive(answer.data.groups); // else the pending answer is newer
     this.#flush();
   }
 
@@ -90,13 +90,13 @@ class Outbox {
     });
   }
 
-  /** Send waiting marks, one reviewer's at a time, until none are left or the server is unreachable. */
+  /** Send the waiting marks, by reviewer, until none are left or the server is unreachable. */
   async #send() {
     while (this.queue.length) {
       const by = this.queue[0].by;
       const batch = this.queue.filter((item) => item.by === by).slice(0, this.isSingle ? 1 : Outbox.MOST);
       const changes = batch.map(({ group, kind, text }) => ({ group, kind, text }));
-      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // the first mark's counts
+      const seen = Object.fromEntries(batch.map((item) => [item.group, item.seen]).reverse()); // the first mark of a group counts
       const digests = Object.fromEntries(batch.map((item) => [item.group, item.digest]).reverse()); // of the shown diffs
       const answer = await this.#ask(this.address, { changes, by, seen, digests });
       if (!this.#answered(answer, batch)) {
@@ -107,7 +107,7 @@ class Outbox {
     this.isSingle = false;
   }
 
-  /** Process an answer; false: there was none. */
+  /** Process an answer. Returns false if there was none. */
   #answered({ status, data }, batch) {
     if (status === 200 && data?.groups) this.#saved(batch, data.groups);
     else if (status === 409 && data?.groups) this.#conflicted(batch, data);
@@ -136,7 +136,7 @@ class Outbox {
     const stale = batch.filter((item) => groups[item.group] && (isOther(item) || groups[item.group].revision !== item.seen));
     const others = stale.filter(isOther), told = stale.length ? stale.filter((item) => !isOther(item)) : batch;
     const kept = told.filter((item) => groups[item.group] && Outbox.#isThere(item, groups[item.group]));
-    const again = told.filter((item) => !kept.includes(item) && item.kind === "remark" && groups[item.group]); // adds, and overwrites nothing
+    const again = told.filter((item) => !kept.includes(item) && item.kind === "remark" && groups[item.group]); // a remark overwrites nothing
     for (const item of again) item.seen = groups[item.group].revision;
     const lost = told.filter((item) => !kept.includes(item) && !again.includes(item));
     this.#drop([...kept, ...lost, ...others]);
@@ -154,7 +154,7 @@ class Outbox {
     return Boolean(flag) === (kind === "flag");
   }
 
-  /** A batch was refused: send each mark alone, so that the others are saved. */
+  /** After a refused batch, send each mark alone, so that valid marks are saved. */
   #refused(batch, error) {
     if (batch.length > 1) {
       this.isSingle = true;
@@ -164,7 +164,7 @@ class Outbox {
     this.events.refused(batch[0].group, error);
   }
 
-  /** Take over the groups' state; always report `mine` as changed. */
+  /** Take over the state of the groups. Always report `mine` as changed. */
   #receive(groups, mine = []) {
     const changed = new Set(mine);
     for (const [id, now] of Object.entries(groups)) {

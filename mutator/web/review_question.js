@@ -4,7 +4,7 @@
 const Question = (() => {
   const find = (id) => document.getElementById(id);
 
-  /** Ask; `yes` is the button's label, and `done()` is called when it is pressed. */
+  /** Ask a question. `yes` is the label of the button, and `done()` is called when the user presses it. */
   function ask(title, about, yes, done) {
     const dialog = find("ask");
     find("ask-title").textContent = title;

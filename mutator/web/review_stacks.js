@@ -1,5 +1,5 @@
 "use strict";
-// Stacks groups of one template in one function under the first, until opened.
+// Stacks the groups of one template in one function under the first of them, until the user opens the stack.
 
 class Stacks {
   static LISTED = 6; // members named in a closed stack
@@ -11,7 +11,7 @@ class Stacks {
     this.members = new Map(); // first id -> ids of the others
   }
 
-  /** Stack the shown groups (ids, in order) under the first of their kind; returns the visible ones. */
+  /** Stack the shown groups (ids, in order) under the first of their kind. Returns the groups that stay visible. */
   fold(shown) {
     this.members.clear();
     let first = null;
@@ -32,7 +32,7 @@ class Stacks {
     return this.open.has(this.cards.get(id).group.like);
   }
 
-  /** The first group of a group's stack, and the others. */
+  /** The first group of the stack that has this group, and the other groups. */
   of(id) {
     for (const [first, others] of this.members) if (first === id || others.includes(id)) return [first, ...others];
     return [id];
@@ -67,7 +67,7 @@ class Stacks {
     return others.length > lines.length ? [...lines, el("li.quiet", {}, `and ${others.length - lines.length} more`)] : lines;
   }
 
-  /** The distinguishing part of each text: without the words that all begin and end with. */
+  /** The part that distinguishes each text, without the words with which all begin and end. */
   static differences(texts) {
     const all = texts.map((text) => text.split(" ")), [first] = all;
     const shortest = Math.min(...all.map((words) => words.length));

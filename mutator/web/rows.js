@@ -1,8 +1,8 @@
 "use strict";
-// The results as columns. Search, counts and sorting handle 100,000 experiments between two keystrokes.
+// The results as columns. Search, counts and sorting take less than the time between two keystrokes for 100,000 experiments.
 
 const Rows = (() => {
-  /** The filters: column, title, and for cells with several values their separator. */
+  /** The filters: column, title and, for cells with several values, the separator. */
   const FACETS = [
     { name: "kind", title: "Fault type" },
     { name: "module", title: "Module" },
@@ -50,16 +50,16 @@ const Rows = (() => {
   class Table {
     constructor(data) {
       this.count = data.count;
-      this.checked = data.checked; // hazards checked for
-      this.labels = data.labels; // of components
-      this.of = data.of || data.count; // experiments of the run; a large run lists only the worst
+      this.checked = data.checked; // the hazards that were checked
+      this.labels = data.labels; // labels of components
+      this.of = data.of || data.count; // number of experiments of the run; for a large run the page lists only the worst
       this.map = data.map || null; // of all experiments, if not all are listed (report/whole_map.py)
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
       this.byId = null;
       const status = this.columns.get("status");
       const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
-      // Experiments without a valid result are not counted.
+      // Counts leave out experiments without a valid result.
       this.usable = (row) => !status || !unusable[status.codes[row]];
     }
 
@@ -68,7 +68,7 @@ const Rows = (() => {
       return found ? found.text(row) : "";
     }
 
-    /** The display name of a column's text: components have labels. */
+    /** The text that shows a value of a column. Components have labels. */
     called(name, text) {
       return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
     }
@@ -78,7 +78,7 @@ const Rows = (() => {
       return found ? found.number(row) : NaN;
     }
 
-    /** The row of an experiment by id or unique prefix; -1: none. */
+    /** The row of an experiment, by its id or a unique prefix; -1 if there is none. */
     find(id) {
       const ids = this.columns.get("experiment_id");
       this.byId ??= new Map(Array.from({ length: this.count }, (_, row) => [ids.text(row), row]));
@@ -87,7 +87,7 @@ const Rows = (() => {
       return begun.length === 1 ? this.byId.get(begun[0]) : -1;
     }
 
-    /** A function of the row: does a searched column contain `token`? */
+    /** A function of the row: whether a searched column contains `token`. */
     #has(name, token) {
       const found = this.columns.get(name);
       if (!found) return null;

@@ -4,13 +4,13 @@
 
 const SeriesFile = (() => {
   const FOLDER = "../series/", CHUNKS = 6; // CHUNKS: chunks kept in memory
-  const waiting = new Map(); // file name -> what to do with its text
+  const waiting = new Map(); // file name -> function that gets its text
   const chunks = new Map(); // name -> promise of its bytes, most recently used last
   const goldens = new Map(); // entry -> promise of a golden run
-  let index = null; // promise of it
+  let index = null; // promise of the index
   const SIGN = 0x7fffffff, NONE = 0x7fc00000; // NONE: the bits of a missing value
 
-  /** The function that each file calls with its name. */
+  /** The function that each file calls, with its name. */
   function loaded(name, text) {
     waiting.get(name)?.(text);
   }
@@ -41,7 +41,7 @@ const SeriesFile = (() => {
 
   async function inflated(bytes) {
     const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
-    return new Response(stream).arrayBuffer(); // also verifies the checksum
+    return new Response(stream).arrayBuffer(); // this also verifies the checksum
   }
 
   /** The entries' owners and positions; null: nothing was packed. */
@@ -50,7 +50,7 @@ const SeriesFile = (() => {
     if (!bytes) return null;
     const data = JSON.parse(new TextDecoder().decode(await inflated(bytes)));
     if (data.schema !== "series/1") throw new Error(`unknown series schema ${data.schema}`);
-    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // numeric names would come first
+    const places = [], of = new Map(), keys = Object.keys(data.goldens).sort(); // sorted, because numeric names would come first
     for (const [name, count] of data.chunks) {
       for (let at = 0, i = 0; i < count; i++) {
         const size = data.sizes[places.length];
@@ -163,7 +163,7 @@ const SeriesFile = (() => {
   }
 
   async function found(id, isNew) {
-    const there = JSON.parse(document.getElementById("facts").textContent).series; // do not request missing files
+    const there = JSON.parse(document.getElementById("facts").textContent).series; // so that no missing files are requested
     if (isNew || there.kept.includes(id)) { // from a rerun, perhaps because the packed series is damaged
       const own = await readKept(id);
       if (own) return own;

@@ -29,7 +29,7 @@ class State {
       try {
         given.set(name, value.split(",").map(decodeURIComponent));
       } catch {
-        // a truncated link: use the readable part
+        // the link was cut, so use the readable part
       }
     }
     const one = (name, otherwise) => (given.get(name) || [otherwise])[0];
@@ -37,13 +37,13 @@ class State {
     this.query = one("q", "");
     this.sort = one("sort", "");
     this.heat = one("heat", "");
-    this.columns = (given.get("cols") || []).filter(Boolean); // of the list; none: the defaults
+    this.columns = (given.get("cols") || []).filter(Boolean); // columns of the list; none stands for the defaults
     this.chosen = new Map();
     for (const { name, none } of Rows.FACETS) {
       if (given.has(name)) this.chosen.set(name, new Set(given.get(name).map((value) => (value === "none" && none) || value)));
     }
     const known = ["e", "q", "sort", "heat", "cols", ...Rows.FACETS.map(({ name }) => name)];
-    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // not known to this page
+    this.unknown = [...given.keys()].filter((name) => name && !known.includes(name)); // filters that this page does not have
   }
 
   /** The fragment of this state; with `experiment`, that experiment is open. */
@@ -68,7 +68,7 @@ class State {
     this.#write(replace);
   }
 
-  /** Choose exactly these values of a facet; none: all. */
+  /** Choose exactly these values of a facet. No values stands for all. */
   choose(facets, { replace = false } = {}) {
     for (const [name, values] of Object.entries(facets)) {
       if (values.length) this.chosen.set(name, new Set(values));
@@ -90,7 +90,7 @@ class State {
     this.#write(false);
   }
 
-  /** The list's sort order: worst first, unless a column was chosen. */
+  /** The sort order of the list: worst first, unless the user chose a column. */
   get order() {
     return this.sort || "rank";
   }

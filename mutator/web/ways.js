@@ -1,5 +1,5 @@
 "use strict";
-// Updates the report's control structure to the chosen fault type (report/path_drawing.py draws it).
+// Shows the counts of the chosen fault type in the control structure, which report/path_drawing.py draws.
 
 const Ways = (() => {
   const ALL = "all fault types", THIN = 1.8, WIDEST = 7;
