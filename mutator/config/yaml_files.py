@@ -235,7 +235,7 @@ def read(
             (),
             f"{shown(source.data)}",
             expected="a mapping of keys to values",
-            remedy="see docs",
+            remedy="write `key: value` lines",
         )
     given = source.data.get("schema")
     if older and isinstance(given, str) and given in older:

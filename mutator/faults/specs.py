@@ -282,7 +282,9 @@ def _injections(model: _ReadingModel, source: Source, keys: Keys) -> tuple[Injec
 
 def _draw(default_key: str, models: dict[str, _DrawModel], source: Source, keys: Keys) -> Draw:
     if len(models) != 1:
-        raise source.error(keys, f"{len(models)} draws", expected="one", remedy="let the injections share it")
+        raise source.error(
+            keys, f"{len(models)} draws", expected="one", remedy="use one draw for all injections"
+        )
     key, model = next(iter(models.items()))
     name, unit = units.split(key)
     _check_name(name, source, (*keys, key))

@@ -148,9 +148,9 @@ def asks_for(tag: str, injection: Injection) -> str:
 
 
 def changed_value(asked: str, changed: str) -> str:
-    """The source to put before an expression.
+    """The source to put before an expression so that its value becomes `changed`.
 
-    It makes the value `changed` if the probe, `asked`, says so.
+    `asked` is the source of the question to the probe, which decides whether to change the value.
     """
     return f"({changed} if {asked} else "
 

@@ -105,9 +105,9 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
 def value_change(
     file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
 ) -> ValueEdit:
-    """The edit that gives `expression` the value `changed` (source on one line) if the probe says so.
+    """The edit that gives `expression` the value `changed` (source on one line) when the probe says so.
 
-    `asked` is the source of the question to the probe.
+    `asked` is the source of the question to the probe; by default, whether the injection `tag` is active.
     """
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(

@@ -62,7 +62,7 @@ def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterato
         yield _rule(Operator.BRANCH, "operator_prefix", to="not")
         if not any(
             isinstance(inner, ast.NamedExpr) for inner in ast.walk(node)
-        ):  # or its name would be missing
+        ):  # without `:=`, its name would be missing
             yield _rule(Operator.BRANCH, "operator_constant", to=True)
             yield _rule(Operator.BRANCH, "operator_constant", to=False)
     if expression.answers(AnchorKind.RETURN_VALUE, "", None):
