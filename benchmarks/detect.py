@@ -89,7 +89,7 @@ def measure(model: CameraModel, picture: np.ndarray, repeat: int) -> list[float]
 
 
 def main() -> int:
-    """Print the table; return 1 if a detection exceeds its goal."""
+    """Print the table. Return 1 if a detection exceeds its goal."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--repeat", type=int, default=300, help="detections for each median")
     repeat = parser.parse_args().repeat

@@ -86,7 +86,7 @@ def figure(traces: Mapping[str, Trace], path: Path) -> None:
 
 
 def main() -> int:
-    """Print the table; plot on request."""
+    """Print the table. Plot on request."""
     parser = argparse.ArgumentParser(description="Measure the lateral behaviour of the controlled car.")
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the runs into this SVG file")
     options = parser.parse_args()

@@ -194,7 +194,7 @@ def opened(browser: Any, page_file: Path, repeat: int, steps: Mapping[str, str] 
 
 
 def launched(playwright: Any) -> Any:
-    """The system's Chromium, headless; SystemExit if there is none."""
+    """Return the system's Chromium, headless. Raise SystemExit if there is none."""
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         raise SystemExit("no Chromium on the PATH")

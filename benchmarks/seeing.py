@@ -97,7 +97,7 @@ class Row(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A run; `effect` "" is the fault-free one."""
+    """A run. If `effect` is "", it is the fault-free run."""
 
     row: Row
     scenario: str

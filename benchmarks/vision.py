@@ -40,7 +40,7 @@ def times(work: Callable[[int], object], repeat: int) -> list[float]:
 
 
 def show(name: str, spent: list[float], goal: float | None = None) -> bool:
-    """Print a line of the table; return whether the goal was met."""
+    """Print a line of the table and return whether the goal was met."""
     median = statistics.median(spent)
     against = "" if goal is None else f"  {median / goal:.2f} of the goal of {goal:g} ms"
     print(f"  {name:34} median {median:8.3f} ms  fastest {min(spent):8.3f} ms{against}")
@@ -110,7 +110,7 @@ def spent_in(work: Callable[[], object]) -> float:
 
 
 def main() -> None:
-    """Measure and print; exit with 1 if a goal is missed."""
+    """Measure and print. Exit with 1 if a goal is missed."""
     parts = {"render": render, "view": view, "library": library, "runs": runs}
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(

@@ -57,7 +57,7 @@ def unfold(page: Any) -> None:
 
 
 def test_groups_are_found_and_the_view_is_in_the_address(open_page: Callable[..., Any]) -> None:
-    """Text and states narrow the list; the address restores the view."""
+    """Text and states narrow the list. The address restores the view."""
     page = open_page()
     unfold(page)
     assert (shown(page), page.inner_text("#found")) == (5, "5 groups")

@@ -224,7 +224,7 @@ def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: 
 
 
 def test_walking_needs_a_terminal(cli: Cli, root: Path) -> None:
-    """Without a terminal nothing is asked, and the error names the commands that need none."""
+    """Without a terminal, the command asks nothing. The error names the commands that need no terminal."""
     answer = cli("review", "walk", *JANE)
     assert answer.code == 2
     assert "no terminal to ask in" in answer.err

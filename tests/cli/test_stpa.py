@@ -51,7 +51,7 @@ def library(tmp_path: Path) -> Path:
 
 
 def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> None:
-    """A spec that no causal factor needs is reported with its file; exit code 1."""
+    """A spec that no causal factor needs is reported with its file. The exit code is 1."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace(", vision_weather/lens_mud", ""))
     answer = cli("--root", CLONE, "--library", library, "stpa")
@@ -62,7 +62,7 @@ def test_a_problem_fails_the_check(cli: Cli, library: Path, nowhere: Path) -> No
 
 
 def test_a_dangling_name_is_wrong_input(cli: Cli, library: Path, nowhere: Path) -> None:
-    """An unreadable analysis is refused with file and line; exit code 2."""
+    """An unreadable analysis is refused with file and line. The exit code is 2."""
     factors = library / "stpa" / "causal_factors.yaml"
     factors.write_text(factors.read_text().replace("[UCA2,", "[UCA22,", 1))
     answer = cli("--root", CLONE, "--library", library, "stpa")

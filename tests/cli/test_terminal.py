@@ -136,7 +136,7 @@ COMMAND = "`mutator review approve 3b5103806ae0 a9281388d042 --campaign paper_sm
     ],
 )
 def test_lines_are_folded(text: str, width: int, lines: list[str]) -> None:
-    """Lines break between words, continue indented, and lose no text; commands and long words stay whole."""
+    """Lines break between words, continue indented and lose no text. Commands and long words stay whole."""
     assert folded(text, width).split("\n") == lines
 
 

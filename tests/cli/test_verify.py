@@ -177,7 +177,7 @@ def test_damaged_blocks_of_patches_are_told(cli: Cli, sealed: str) -> None:
 
 
 def test_many_differences_are_a_page(cli: Cli, sealed: str, root: Path) -> None:
-    """The page lists some differences and counts the rest; JSON has all."""
+    """The page lists some differences and counts the rest. JSON has all."""
     table = Path("run/results.csv")
     table.write_text("\n" * 60)
     found = cli("verify", "run")

@@ -191,8 +191,9 @@ def fault_at(place: FaultLocation, model: str, params: dict[str, Value]) -> Faul
 
 
 def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
-    """Check that status, messages, probe report and files equal the reference engine's; return the fork
-    engine's execution.
+    """Check that status, messages, probe report and files equal the reference engine's.
+
+    Return the fork engine's execution.
     """
     expected, files = three.run("reference", job)
     for name in ("warm", "fork"):

@@ -87,8 +87,9 @@ class Campaign:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results
 
     def finish(self, out: Path, kills: list[Kill]) -> str:
-        """Repeat the command until it completes, killing it with the remaining `kills`; return the digest of
-        the results.
+        """Repeat the command until it completes, killing it with the remaining `kills`.
+
+        Return the digest of the results.
         """
         done = False
         while not done:

@@ -42,8 +42,9 @@ def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: 
 
 @pytest.fixture
 def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
-    """Run a mutant that executes the code `trouble` in its output folder, in each engine; return the result
-    and the files. `head` is more code of the target, run when it is loaded.
+    """Run a mutant that executes the code `trouble` in its output folder, in each engine.
+
+    Return the result and the files. `head` is more code of the target, run when it is loaded.
     """
     made: list[Engines] = []
 

@@ -40,7 +40,7 @@ def rows(quickstart: Path) -> list[Row]:
 def test_every_run_ends_well_and_every_outcome_is_seen(rows: list[Row]) -> None:
     """All 60 runs are ok.
 
-    They show hazards of all three kinds, silent corruption, masked and unactivated faults.
+    They show hazards of all three kinds, silent corruption, and faults that are masked or never activated.
     """
     assert Counter(row["status"] for row in rows) == {"ok": 60}
     assert {row["outcome"] for row in rows} == {"hazard", "sdc", "masked", "not_activated"}

@@ -26,7 +26,7 @@ class Spot:
 
 
 def spots(tree: ast.Module) -> Iterator[Spot]:
-    """Every anchor; statements of one kind and name are numbered as `nth` numbers them."""
+    """Return every anchor. Statements of one kind and name are numbered as `nth` numbers them."""
     functions: dict[str, list[_Function]] = {}
     for name, function in _functions(tree, ""):
         functions.setdefault(name, []).append(function)

@@ -269,7 +269,7 @@ class ModuleWriter(StatementWriter):
         return lines
 
     def _variables(self, level: int) -> list[str]:
-        """Variable names; inner functions use different ones, except for private names."""
+        """Return variable names. Inner functions use different ones, except for private names."""
         names = self.rng.sample(_VARIABLES, 4)
         return [name if level == 1 or name[0] == "_" else f"{name}{level}" for name in names]
 

@@ -46,7 +46,7 @@ class Scope:
 
 
 class StatementWriter:
-    """Writes expressions and simple statements; the seed determines what it draws."""
+    """Writes expressions and simple statements. The seed determines what it draws."""
 
     def __init__(self, seed: int) -> None:
         self.rng = random.Random(seed)

@@ -38,8 +38,9 @@ class Beside:
 
 
 def take_out(node: ast.AST, injected: Container[int], found: dict[str, Beside]) -> None:
-    """Remove injected statements from a tree and record each one's neighbours; a guard leaves its
-    statement.
+    """Remove injected statements from a tree and record each one's neighbours.
+
+    A guard leaves its statement.
     """
     for _, body in ast.iter_fields(node):
         if not isinstance(body, list) or not body or not isinstance(body[0], ast.AST):

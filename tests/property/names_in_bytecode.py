@@ -27,7 +27,10 @@ def is_carried_out(source: bytes, function: str, name: str) -> bool:
 
 
 def _homes(code: types.CodeType, lines: Lines) -> Iterator[tuple[tuple[str, int, int], dict[str, str]]]:
-    """The names of each function that is not injected; functions are identified by name, line and number."""
+    """Return the names of each function that is not injected.
+
+    Functions are identified by name, line and number.
+    """
     stack, counts = [code], Counter[tuple[str, int]]()
     while stack:
         one = stack.pop()

@@ -80,7 +80,7 @@ class _Placed:
 
 
 def prove(data: bytes, figures: Figures, run: Run | None = None, variables: int = 3) -> None:
-    """Splice at every anchor of a source; raise Wrong if a mutant violates a property.
+    """Splice at every anchor of a source. Raise Wrong if a mutant violates a property.
 
     At `variables` of the anchors, drawn from the source itself, variables are set, too.
     """
@@ -240,8 +240,9 @@ def _check_tree(original: str, mutant: bytes, group: Sequence[_Placed]) -> None:
 
 
 def _with_variable_set(file: ParsedFile, spot: Spot, figures: Figures) -> bytes:
-    """The mutant in which a variable is set at an anchor, with unchanged scopes of its names; empty if
-    refused.
+    """Return the mutant in which a variable is set at an anchor, with unchanged scopes of its names.
+
+    Return empty bytes if the splicer refuses.
     """
     chosen = random.Random(f"{spot.location}")
     known = sorted(

@@ -126,7 +126,7 @@ def check(file: ParsedFile, cases: Sequence[tuple[FixedValue, FaultLocation]], *
 
 
 def checked(names: Sequence[str], count: int, *, run: bool) -> int:
-    """Check that many cases drawn from the modules with these names; return their number."""
+    """Check many cases drawn from the modules with these names, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in locations(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))
@@ -146,6 +146,6 @@ def test_what_the_probe_sets_is_put_back() -> None:
 
 @pytest.mark.slow
 def test_what_the_probe_sets_is_put_back_at_large() -> None:
-    """The same holds for thousands of values; modules with side effects at import are not run."""
+    """The same holds for thousands of values. Modules with side effects at import are not run."""
     assert checked(FEW, 2000, run=True) > 250
     assert checked((*MANY, *MORE), 3000, run=False) == 3000

@@ -77,7 +77,7 @@ def varied(draw: st.DrawFn) -> Fault:
 
 @st.composite
 def others(draw: st.DrawFn) -> Fault:
-    """A fault of any model of the templates at a location in the library; optional fields may be missing."""
+    """Return a fault of any model at a location in the library. Optional fields may be missing."""
     manifest, models = paper()
     model = models.get(draw(st.sampled_from(sorted(models.models))))
     fault = draw(st.sampled_from(faults()))

@@ -33,7 +33,7 @@ def _quiet() -> Iterator[None]:
 
 
 def proved(sources: Iterable[tuple[object, bytes]], run: Run | None, variables: int = 3) -> Figures:
-    """What was tried with these sources; failures are named."""
+    """Return what was tried with these sources. Failures are named."""
     figures = Figures()
     for name, data in sources:
         try:

@@ -28,7 +28,7 @@ EXCUSES = (
 
 
 class _Inactive(ast.NodeTransformer):
-    """Removes the probe's conditions; the body of `else:` stays."""
+    """Removes the probe's conditions. The body of `else:` stays."""
 
     def visit_If(self, node: ast.If) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)

@@ -56,7 +56,7 @@ def models() -> FaultModels:
 
 @cache
 def module(name: str) -> ParsedFile | None:
-    """A standard-library module as a file of a target; None if this Python does not have it."""
+    """Return a standard-library module as a file of a target, or None if this Python does not have it."""
     try:
         found = importlib.util.find_spec(name)
     except ModuleNotFoundError:
@@ -84,7 +84,7 @@ def active(node: ast.expr) -> bool:
 
 
 class Inactive(ast.NodeTransformer):
-    """What a module does while no fault is active; `kept` are the expressions with changed values."""
+    """What a module does while no fault is active. `kept` are the expressions with changed values."""
 
     def __init__(self) -> None:
         self.kept: list[str] = []
@@ -152,7 +152,7 @@ def check_edits(file: ParsedFile, edits: Sequence[Edit | ValueEdit], cases: obje
 
 
 def checked(names: Sequence[str], count: int) -> int:
-    """Check that many cases drawn from the modules with these names; return their number."""
+    """Check many cases drawn from the modules with these names, and return their number."""
     files = [file for name in names if (file := module(name))]
     cases = [(file, pair) for file in files for pair in anchors(file)]
     chosen = random.Random(1).sample(cases, min(count, len(cases)))
@@ -185,7 +185,7 @@ def mutations(file: ParsedFile) -> Iterator[Mutation]:
 
 
 def checked_mutations(names: Sequence[str], count: int) -> int:
-    """Check that many operators' mutants drawn from the modules with these names; return their number."""
+    """Check many mutants of operators drawn from the modules with these names, and return their number."""
     files = [file for name in names if (file := module(name))]
     drawn = [(file, mutation) for file in files for mutation in mutations(file)]
     chosen = random.Random(2).sample(drawn, min(count, len(drawn)))

@@ -134,7 +134,7 @@ def test_single_signals(reader, bench, name, signals, field):
 
 
 def test_brake_switch_needs_two_frames(reader, bench):
-    """A brake switch that flickers for one frame is ignored; two frames in a row count."""
+    """A brake switch that flickers for one frame is ignored. Two frames in a row count."""
     read(reader, bench)
     assert not reader.update([pack("POWERTRAIN_DATA", 1, BRAKE_SWITCH=1)], 0.01).brake_pressed
     assert reader.update([pack("POWERTRAIN_DATA", 2, BRAKE_SWITCH=1)], 0.02).brake_pressed

@@ -31,7 +31,7 @@ def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
 
 
 def test_higher_priority_is_shown_and_all_are_listed() -> None:
-    """The most urgent alert is shown; the list has all, most urgent first."""
+    """The most urgent alert is shown. The list has all alerts, the most urgent first."""
     alerts = AlertManager()
     alerts.add("steer_saturated", 1.0)
     alerts.add("fcw", 1.0)

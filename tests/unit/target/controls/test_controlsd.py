@@ -111,7 +111,7 @@ def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
 
 
 def test_not_engaged_nothing_is_asked_of_the_car(drive: Drive) -> None:
-    """Without engaging, all actuators are zero and the set speed is the "none" value."""
+    """While not engaged, all actuators are zero and the set speed is the "none" value."""
     actuators = drive.asked.actuators
     assert (actuators.gas, actuators.brake, actuators.steer) == (0.0, 0.0, 0.0)
     assert not drive.asked.enabled and drive.asked.cancel_cruise
@@ -147,7 +147,7 @@ def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
 
 
 def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
-    """The release that engages keeps the set speed; later ones change it."""
+    """The release that engages keeps the set speed. Later releases change it."""
     drive.engage()
     assert drive.state.v_cruise == pytest.approx(72 * KPH_TO_MS)
     drive.run(1, buttons=(ButtonEvent("accel", True),)).run(1, ENGAGE, buttons=(ButtonEvent("accel", False),))
@@ -202,7 +202,7 @@ def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
 
 
 def test_warnings_and_permanent_alerts(drive: Drive) -> None:
-    """A warning shows only while engaged; a permanent fault shows also while disengaged."""
+    """A warning shows only while engaged. A permanent fault shows also while disengaged."""
     drive.run(1, BUSY)
     assert "steer_temp_unavailable" not in drive.state.alerts
     drive.run(1, BROKEN)

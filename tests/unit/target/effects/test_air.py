@@ -23,7 +23,7 @@ def test_way_of_light_is_the_distance_to_the_road(model):
 
 @pytest.mark.parametrize("visibility", [20.0, 40.0])
 def test_contrast_at_visibility_is_5_percent(visibility, camera, moment):
-    """At the visibility, 5 % of a mark's contrast is left; at half of it, the root of 5 %."""
+    """At the visibility, 5 % of a mark's contrast is left. At half of it, the root of 5 % is left."""
     dark = np.full((camera.rows, camera.width), 50, np.uint8)
     dark[:170] = 200
     bright = dark.copy()

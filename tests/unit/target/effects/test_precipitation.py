@@ -119,7 +119,7 @@ def test_particles_show_the_sky(camera, moment):
 
 
 def test_standing_car_sees_longer_lived_drops(camera, moment, road):
-    """At rest, snow hardly moves between frames; at speed it does."""
+    """At rest, snow hardly moves between frames. At speed it moves."""
     snow = Snow(4.0, 0, camera)
 
     def change(speed):

@@ -33,7 +33,7 @@ def test_contrast_and_psnr_follow_the_levels(gauge, road):
 
 
 def test_false_edges_count_what_lies_between_the_lines(gauge, road, camera):
-    """Bright columns inside the lane are false edges; outside the lane they are not counted."""
+    """Bright columns inside the lane are false edges. Bright columns outside are not counted."""
     inside, outside = road.copy(), road.copy()
     inside[:, 310:330:8] = 215
     outside[:, :40:8] = 215

@@ -107,7 +107,7 @@ def test_brake_at_rest(recorded, driven, name):
 
 @pytest.mark.parametrize(("name", "rows"), [("S1", 3), ("S2", 4), ("S3", 4), ("S4", 4), ("S5", 3)])
 def test_contexts(driven, name, rows):
-    """As many rows of the context table are reached as on the original; S1 narrowly misses its fourth."""
+    """As many rows of the context table are reached as on the original, except that S1 misses its fourth."""
     result = driven(name)
     trace = result.trace
     armed = trace["t"] >= 1.5
