@@ -62,7 +62,7 @@ class SelectionModel(StrictModel, title="A selection"):
         if self.operators is not None and (self.in_ is None or self.values is not None):
             raise ValueError("`operators` with `in`, and without `values`")
         if self.operators is None and any((self.in_, self.sample, self.when)):
-            raise ValueError("`in`, `sample` and `when` with `operators` alone")
+            raise ValueError("`in`, `sample` and `when` only together with `operators`")
         return self
 
 
@@ -149,8 +149,8 @@ class CampaignModel(StrictModel, title="The file"):
     )
     proportional: bool = Field(
         False,
-        description="Take each fault type in each scenario in proportion to its number of experiments, and "
-        "guided and random experiments in pairs.",
+        description="Sample each fault type in each scenario in proportion to its number of experiments. "
+        "Draw guided and random experiments in pairs.",
     )
     seed: int | None = Field(
         None,

@@ -51,7 +51,9 @@ def compare(
     run_b: Annotated[
         Path,
         typer.Argument(
-            metavar="RUN_B", help="The second run folder, e.g. after it.", autocompletion=completion.runs
+            metavar="RUN_B",
+            help="The second run folder, e.g. after the change.",
+            autocompletion=completion.runs,
         ),
     ],
     out: Annotated[

@@ -152,7 +152,7 @@ def _check_complete(folder: RunFolder) -> None:
             f"unfinished: {done} of {folder.planned} experiments done",
             where=folder.path,
             expected="a finished shard",
-            remedy="run it to its end with the command it was begun with",
+            remedy="resume it with the command that started it",
         )
     equivalence.judge(folder, records)
     if left := len(equivalence.left(folder)):
@@ -160,7 +160,7 @@ def _check_complete(folder: RunFolder) -> None:
             f"unfinished: of its proof {counted(left, 'experiment')} left to run",
             where=folder.path,
             expected="a finished shard",
-            remedy="run it to its end with the command it was begun with",
+            remedy="resume it with the command that started it",
         )
 
 

@@ -1,4 +1,4 @@
-"""A session: one command in a run folder that it owns, from the plan to the table of results.
+"""A session: one command holds the lock of a run folder and takes it from the plan to the results.
 
 `distribution` decides how the work goes to processes.
 """
@@ -63,7 +63,9 @@ class Summary:
     results: Path | None  #: path of results.csv; None if the disk was full
     proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
     seal: str | None  #: the seal; None if the run is not finished
-    not_forked: str  #: why nothing was forked; empty if some was, or the reference engine was requested
+    not_forked: (
+        str  #: why no experiment was forked; empty if any was, or if the reference engine was requested
+    )
     elapsed_s: float  #: duration of the session (s)
 
     @property
@@ -83,7 +85,7 @@ class Summary:
 
 
 class Session:
-    """One command in a run folder that it owns."""
+    """One command's work on a run folder, which it has locked."""
 
     def __init__(
         self,
@@ -118,7 +120,7 @@ class Session:
     def prepare(self) -> None:
         """Find the work to do. If there is any, run the checks, create the pristine tree and begin a stretch.
 
-        Raises MutatorError for other versions that are not accepted.
+        Raises MutatorError if versions of Python or packages have changed and this is not accepted.
         """
         self._known = ended_before(self.folder)
         if self._known and are_there(self.folder):
@@ -148,7 +150,7 @@ class Session:
         self._records = None if left else records
 
     def note_machine(self, machine: Mapping[str, Any]) -> None:
-        """Add a machine that takes part to the stretch of work in run.json."""
+        """In run.json, add a participating machine to the current stretch of work."""
         add_machine(self.folder, machine)
 
     def worker_name(self, name: str) -> str:
@@ -246,8 +248,8 @@ class Session:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Enter the files that this session's workers wrote. If a worker is still ending, the next session
-        does it.
+        """Record the digests of the files that this session's workers wrote. If a worker is still shutting
+        down, the next session does it.
         """
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
@@ -275,7 +277,10 @@ def open_session(
     accept_versions: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
-    """Own the run folder `out` with a frozen plan in it. Scratch folders are deleted before and after."""
+    """Lock the run folder `out`, freeze the plan there unless it is, and yield the session.
+
+    Scratch folders are deleted before and after.
+    """
     is_new = not out.exists()
     make_run_folder(out)
     with terminable(), owned(out):

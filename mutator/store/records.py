@@ -65,7 +65,7 @@ class Ending(NamedTuple):
         return self.status != Status.HARNESS_ERROR.value
 
 
-# this pattern is canonical JSON; within a text its quotation marks would be escaped
+# Lines are canonical JSON. Quotation marks inside a string are escaped, so no pattern matches there.
 _NAME, _OUTCOME = b'"experiment_id":"', b'"outcome":'
 _END = re.compile(rb'"outcome":(?:null|"([a-z_]+)"),"patch":"([0-9a-f]*)","status":"([a-z_]+)"')
 _ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
@@ -134,7 +134,7 @@ def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> M
             f"a second record of experiment {experiment_id}",
             where=path,
             line=line,
-            expected="one of each",
+            expected="one record per experiment",
             remedy="delete the file if it is a copy of another one",
         )
     return CheckFailed(

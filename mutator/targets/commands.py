@@ -57,8 +57,8 @@ class FilmModel(StrictModel, title="Films"):
     still: list[str] = Field(description="Extra arguments for a still.")
     pictures: list[str] = Field(
         default_factory=list,
-        description="Changes with which the controller uses the camera's images. After a run, stills are "
-        "made automatically for the worst experiments that have one of these changes.",
+        description="The entry's changes that make the controller use camera images. After a run, stills "
+        "are made automatically for the worst experiments with one of these changes.",
     )
 
 

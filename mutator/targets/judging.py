@@ -114,7 +114,7 @@ class MetricModel(StrictModel, title="A metric"):
     """
 
     min: str | None = Field(None, description="The minimum of this formula over channels.")
-    max: str | None = Field(None, description="Its maximum.")
+    max: str | None = Field(None, description="The maximum of this formula over channels.")
     mean: str | None = Field(None, description="The mean over the steps.")
     last: str | None = Field(None, description="The value in the last step.")
     integral: str | None = Field(None, description="The integral over time.")

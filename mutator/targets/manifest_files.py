@@ -75,7 +75,7 @@ class ManifestModel(StrictModel, title="The file"):
         description="Installed packages that the target needs, in pip's syntax: `gymnasium>=1.0`. `check`, "
         "`doctor` and `run` report missing packages and wrong versions.",
     )
-    step_s: float = Field(ge=1e-6, allow_inf_nan=False, description="The length of a step of simulation.")
+    step_s: float = Field(ge=1e-6, allow_inf_nan=False, description="The length of a simulation step, in s.")
     armed_after_s: float = Field(
         0.0,
         ge=0.0,

@@ -35,8 +35,8 @@ class Where(Protocol):
     """A usable cluster. `open` returns an asynchronous Dask client and needs a running event loop.
 
     On exit, `open` ends what it started; an existing scheduler keeps running. Raises MutatorError if the
-    cluster does not exist or the extra is not installed. Unless `insecure`, it also raises it if others on
-    the network can reach the cluster.
+    cluster does not exist or the extra is not installed. Unless `insecure` is set, it also raises
+    this error if others on the network can reach the cluster.
     """
 
     def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
@@ -78,7 +78,7 @@ def _scheduler_file(path: Path) -> "Scheduler":
         ) from None
     except (ValueError, TypeError, KeyError, RecursionError):
         raise MutatorError(
-            "no scheduler file", where=path, expected="JSON with an address", remedy=remedy
+            "not a scheduler file", where=path, expected="JSON with an address", remedy=remedy
         ) from None
     return Scheduler(address=checked_address(str(address), where=path), file=path)
 

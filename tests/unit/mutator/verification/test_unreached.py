@@ -16,7 +16,7 @@ from mutator.verification.unreached import read_observed, remarks, write_observe
 from mutator.workspace import Workspace
 
 MakeExperiment = Callable[..., Experiment]
-# of the toy: t, d_rel, v_ego, v_lead; the headway time is 2 s, then 1 s
+# observations of the toy: t, d_rel, v_ego, v_lead; the headway time is 2 s, 1 s, 2 s
 SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0)]
 
 
@@ -34,8 +34,8 @@ SEEN = [(0.0, 40.0, 20.0, 18.0), (1.0, 20.0, 20.0, 18.0), (2.0, 40.0, 20.0, 18.0
 def test_what_never_holds_is_told(
     toycar: Workspace, experiment: MakeExperiment, trigger: Trigger, said: list[str]
 ) -> None:
-    """A time after the last observation is reported, and so is a condition that never holds while it is
-    armed. Both have the number of affected experiments."""
+    """A remark names each trigger whose time comes after the last observation, or whose condition never
+    holds while it is armed, with the number of affected experiments."""
     waiting = [("S1", replace(experiment(value), trigger=trigger)) for value in (1.0, 2.0)]
     told = remarks(
         toycar,

@@ -101,7 +101,7 @@ def test_iterations_converge_to_the_optimum(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_equal_input_gives_equal_bytes(case):
-    """A problem gives the same bytes after other problems, even impossible ones, and in a second build."""
+    """The solver returns the same bytes after other problems, even infeasible ones, and in a second build."""
     ocp, start, param, control = CASES[case]
     guess = first_guess(ocp, start, control)
     solver = build_solver(ocp)

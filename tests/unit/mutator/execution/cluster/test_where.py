@@ -82,7 +82,7 @@ def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
         parse(str(file))
     file.write_text(text, encoding="latin-1")
-    with pytest.raises(MutatorError, match=r"scheduler.json: (no scheduler file|address ')"):
+    with pytest.raises(MutatorError, match=r"scheduler.json: (not a scheduler file|address ')"):
         parse(str(file))
 
 
