@@ -27,6 +27,11 @@ from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 
 _EXACT = 2.0**53  # up to it every integer is a double
+_EXPECTED = {  # of some types of parameters
+    "variable": "the name of a variable",
+    "import": "a dotted name to import",
+    "integer": "an integer",
+}
 _ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast.unparse` writes it
 
 
@@ -207,7 +212,9 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
     fits = assignable if param.type == "variable" else dotted_name
     is_name = isinstance(value, str) and fits(value)
     if is_name != (param.type in NAMES) or (isinstance(value, str) and not is_name):
-        raise MutatorError(f"{value!r} for '{param.name}'", expected=f"a {param.type}")
+        raise MutatorError(
+            f"{value!r} for '{param.name}'", expected=_EXPECTED.get(param.type, f"a {param.type}")
+        )
     return value
 
 

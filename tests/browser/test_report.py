@@ -1,12 +1,10 @@
 """The report page in the browser."""
 
 import csv
-import re
 import shutil
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
@@ -365,123 +363,6 @@ def test_text_of_a_run_is_never_markup(page: "Page", rows: list[dict[str, str]])
     crashed = next(row["experiment_id"] for row in rows if row["status"] == "crashed")
     page.open(f"e={crashed}")
     assert page.page.inner_text("#experiment .detail") == "<b>the disk</b> is gone"
-
-
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_telephone_shows_it_without_scrolling_sideways(browser: Any, run: Path, scheme: str) -> None:
-    """At 400 pixels only tables are wider than the screen. An experiment fills the screen."""
-    context = browser.new_context(viewport={"width": 400, "height": 800}, color_scheme=scheme)
-    page = context.new_page()
-    page.goto((run / "report" / "index.html").as_uri())
-    page.wait_for_selector("html[data-ready]")
-    width = "document.documentElement.scrollWidth"
-    assert page.evaluate(width) == 400
-    assert page.evaluate("document.querySelector('#grid td').clientWidth") > 150  # room for its text
-    page.eval_on_selector_all(
-        "#heat .cell", "all => all.forEach((c) => (c.textContent = '123456789/987654321'))"
-    )
-    assert (
-        page.evaluate("document.querySelector('#heat th[scope=row]').clientWidth") > 70
-    )  # and the map's rows
-    assert page.evaluate(width) == 400
-    page.click("#grid tr[data-at] >> nth=0")
-    page.wait_for_selector("#experiment .diff")
-    assert page.evaluate("document.querySelector('#experiment').clientWidth") == 400
-    assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
-    page.eval_on_selector("#experiment .events td:last-child", "td => (td.textContent = 'alert'.repeat(20))")
-    assert page.evaluate("document.querySelector('#experiment').scrollWidth") == 400
-    context.close()
-
-
-TITLES = """[...document.querySelectorAll("h1")].filter((h) => h.checkVisibility() && !h.closest("[inert]"))
-    .map((h) => h.textContent)"""
-
-
-@pytest.mark.parametrize("width", [1440, 400])
-def test_axe_finds_no_serious_fault(
-    page: "Page", serious_faults: "Callable[[Any], list[str]]", width: int
-) -> None:
-    """axe finds no serious fault wide and narrow, light and dark, with the list alone and with an open
-    experiment.
-    """
-    page.page.set_viewport_size({"width": width, "height": 900})
-    for scheme in ("light", "dark"):
-        page.page.emulate_media(color_scheme=scheme, reduced_motion="reduce")
-        assert serious_faults(page.page) == []
-        page.page.evaluate("document.querySelector('#grid tr[data-at]').click()")
-        page.page.wait_for_selector("#experiment .diff")
-        assert serious_faults(page.page) == []
-        assert page.page.evaluate(TITLES) == ["Experiment of toy"]
-        page.page.keyboard.press("Escape")
-        assert page.page.evaluate(TITLES) == ["toy"]
-
-
-def test_heads_are_whole_and_a_short_table_has_a_low_window(page: "Page") -> None:
-    """No column title is cut off. Below the last row of a short table there is almost no space."""
-    cut = "all => all.filter((b) => b.scrollWidth > b.clientWidth).map((b) => b.textContent)"
-    assert page.page.eval_on_selector_all("#grid thead button", cut) == []
-    page.page.evaluate("document.querySelector('#grid').style.setProperty('--rows', 3)")
-    assert page.page.evaluate("document.querySelector('#grid').clientHeight") < 32 + 5 * 30
-
-
-# A low window, scrolled to the middle; paper gets five rows.
-SCROLLED = """() => {
-    const grid = document.querySelector('#grid');
-    Grid.PRINTED = 5;
-    grid.style.setProperty('--rows', 1);
-    grid.scrollTop = 300;
-}"""
-FIRST_ROW = "Number(document.querySelector('#grid tr[data-at]').dataset.at)"
-
-
-@pytest.fixture
-def scrolled(page: "Page") -> Iterator["Page"]:
-    """The table, scrolled until its first rows are not in the page."""
-    page.page.evaluate(SCROLLED)
-    page.page.wait_for_function(f"{FIRST_ROW} === 2")
-    yield page
-
-
-def test_paper_gets_the_rows_that_fit_the_filters(page: "Page") -> None:
-    """Paper gets every matching row, up to a stated limit, and nothing that is only for screens."""
-    page.page.emulate_media(media="print")
-    page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert len(page.column("experiment_id")) == COUNT
-    assert not page.page.is_visible("#facets")
-    page.page.evaluate("dispatchEvent(new Event('afterprint'))")
-    page.page.evaluate("Grid.PRINTED = 10")
-    page.page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert page.texts("#grid tbody tr")[10:] == ["and 14 more (not printed)"]
-
-
-@pytest.mark.parametrize("due", ["grid.scrollTop = 310", "grid.style.height = '200px'"])
-def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due: str) -> None:
-    """If the window is scrolled or resized right before printing, paper still gets the first rows."""
-    printing = f"""async () => {{
-        const frame = () => new Promise(requestAnimationFrame), grid = document.querySelector('#grid');
-        {due};
-        dispatchEvent(new Event('beforeprint'));
-        for (let k = 0; k < 4; k++) await frame();
-        return [...grid.querySelectorAll('tr[data-at]')].map((tr) => Number(tr.dataset.at));
-    }}"""
-    assert scrolled.page.evaluate(printing) == list(range(5))
-
-
-def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
-    """After a scroll, the printed page has five rows, and the window keeps its position."""
-    page = scrolled.page
-    page.evaluate("document.querySelector('#grid').hidden = true")
-    others = rows_of(page.pdf(tagged=True))
-    page.evaluate("document.querySelector('#grid').hidden = false")
-    page.evaluate("document.querySelector('#grid').scrollTop = 310")
-    assert rows_of(page.pdf(tagged=True)) - others == 7  # with the head, and the note on omitted rows
-    assert page.evaluate(FIRST_ROW) == 2
-    assert page.evaluate("document.querySelector('#grid').scrollTop") == 310
-
-
-def rows_of(pdf: bytes) -> int:
-    """Return the number of rows in the tables of a tagged PDF."""
-    return len(re.findall(rb"/S\s*/TR\b", pdf))
 
 
 def test_a_target_without_alerts_has_no_column_for_them(

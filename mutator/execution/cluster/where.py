@@ -68,14 +68,12 @@ def _counted(workers: int) -> int:
 
 
 def _scheduler_file(path: Path) -> "Scheduler":
-    remedy = "give the file that `dask scheduler --scheduler-file FILE` has written"
+    remedy = "start `dask scheduler --scheduler-file FILE` first, then give FILE"
     try:
         content = json.loads(no_pipe(path).read_bytes())
         address = content["address"]
     except OSError as error:
-        raise MutatorError(
-            f"cannot be read ({error.strerror})", where=path, remedy=f"{remedy}, once it has started"
-        ) from None
+        raise MutatorError(f"cannot be read ({error.strerror})", where=path, remedy=remedy) from None
     except (ValueError, TypeError, KeyError, RecursionError):
         raise MutatorError(
             "not a scheduler file", where=path, expected="JSON with an address", remedy=remedy
