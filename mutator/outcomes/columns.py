@@ -32,23 +32,28 @@ _TO_MANIFEST = (
         "",
         "the experiment; a content hash: the same input has the same id everywhere",
     ),
-    Column("fault_id", "text", "", "its fault, a content hash as well"),
+    Column("fault_id", "text", "", "the fault; also a content hash"),
     Column("module", "text", "", "the module of the fault spec"),
     Column("fault_type", "text", "", "the fault type of the spec"),
     Column("reading", "text", "", "the [reading](../explanation/concepts.md#readings) of the fault"),
     Column("value", "number", "as `unit` says", "the value drawn; empty for a fault without one"),
     Column("unit", "text", "", "the unit of `value` as the spec states it, `-` for a plain number"),
-    Column("scenario", "text", "", "the scenario driven"),
+    Column("scenario", "text", "", "the scenario"),
     Column("method", "text", "", "`guided` (a context or a listed trigger) or `random` (a random time)"),
-    Column("trigger", "text", "", "its name, or `random/` and the name of the guided partner's"),
-    Column("seed", "count", "", "the seed of all that is drawn"),
+    Column(
+        "trigger",
+        "text",
+        "",
+        "the trigger's name; for a random time, `random/` and the name of the guided partner's trigger",
+    ),
+    Column("seed", "count", "", "the seed of all draws"),
     Column("status", "text", "", "whether the experiment itself worked"),
     Column("outcome", "text", "", "what the fault did; empty unless the status is `ok`"),
     Column("activated", "flag", "", "whether an injected statement ran while the trigger held"),
-    Column("t_activation", "number", "s", "when first"),
-    Column("activations", "count", "", "how often in the whole run"),
-    Column("manifested", "flag", "", "whether an actuator output then differed from golden"),
-    Column("t_manifest", "number", "s", "when first"),
+    Column("t_activation", "number", "s", "time of the first activation"),
+    Column("activations", "count", "", "number of activations in the whole run"),
+    Column("manifested", "flag", "", "whether an actuator output differed from golden after the activation"),
+    Column("t_manifest", "number", "s", "time of the first such difference"),
 )
 _TO_REACTION = (
     Column("alerts", "text", "", "names of the alerts in the order of their times, joined by `;`"),
@@ -65,7 +70,7 @@ SINCE = (
         "manifest_to_hazard",
         "number",
         "s",
-        "first hazard minus manifestation; empty where the hazard came first",
+        "first hazard minus manifestation; empty if the hazard came first",
     ),
 )
 OF_PATHS = (
@@ -74,7 +79,7 @@ OF_PATHS = (
         "stopped_at",
         "text",
         "",
-        "the components that held a fault which changed no actuator, joined by `;`",
+        "the components that stopped a masked fault, joined by `;`",
     ),
 )
 EXTRA = (
@@ -155,8 +160,8 @@ def hazard_columns(hazard: str) -> tuple[Column, Column]:
     """The columns of a hazard, flag and time: `near` and `t_near` for NEAR."""
     name = hazard.lower()
     return (
-        Column(name, "flag", "", f"whether hazard {hazard} came"),
-        Column(f"t_{name}", "number", "s", "when first"),
+        Column(name, "flag", "", f"whether hazard {hazard} occurred"),
+        Column(f"t_{name}", "number", "s", "time of its first occurrence"),
     )
 
 

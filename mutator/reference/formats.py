@@ -128,7 +128,7 @@ def _readings() -> Iterator[str]:
         "variants have injections.\n`fault_library/readings.yaml` declares them; a library without it has "
         f"{' and '.join(f'`{name}`' for name in UNDECLARED.names)}. "
         "The first is the\ndefault: every variant must have it, and it "
-        "is used in place of readings that a variant does not have. The first key of the file is\n"
+        "replaces readings that a variant does not have. The first key of the file is\n"
         f"`schema: {READINGS_SCHEMA}`.\n"
     )
     yield from sections("fault-spec.md", ReadingsModel, below=2)
@@ -139,7 +139,7 @@ def _units() -> Iterator[str]:
     yield Table(heads=("suffix", "unit", "quantity"), rows=rows).as_markdown(escape=False)
     yield ""
     yield (
-        "The longest suffix counts: `by_per_m` is `by` in 1/m. Numbers are converted between units of the "
+        "The longest suffix applies: `by_per_m` is `by` in 1/m. Numbers are converted between units of the "
         "same quantity by a\nfactor. degC and K also differ by an offset, so they count as two quantities: "
         "use the variable's unit.\n"
     )
