@@ -82,6 +82,7 @@ def test_a_still_without_a_file_is_in_the_report(cli: Cli, name: str) -> None:
     assert base64.b64decode(picture.partition(",")[2]) == kept.read_bytes()
 
 
+@pytest.mark.slow
 def test_a_run_takes_stills_of_its_worst(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run takes stills of its worst experiments with visible changes, at activation and hazard.
 

@@ -161,6 +161,7 @@ def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbe
     assert results(out) == undisturbed
 
 
+@pytest.mark.slow
 def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """A command killed before its first experiment starts again and gives the same bytes."""
     out = tmp_path / "run"
@@ -172,6 +173,7 @@ def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed
     assert results(out) == undisturbed
 
 
+@pytest.mark.slow
 def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
     """A killed worker loses its chunk, the rest is run and the exit code is 3.
 

@@ -66,6 +66,7 @@ def test_pytest_without_a_campaign_is_untouched(toy: Workspace) -> None:
     assert "experiments" not in answer.stdout
 
 
+@pytest.mark.slow
 def test_pytest_in_one_process(toy: Workspace, tmp_path: Path) -> None:
     """Without xdist, the same items run in the command's process.
 

@@ -77,14 +77,6 @@ def undisturbed(toy: Workspace, tmp_path: Path) -> tuple[str | None, bytes]:
     return found, (out / "results.csv").read_bytes()
 
 
-def test_kills_between_two_writes(
-    toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]
-) -> None:
-    """Kills during planning, while checks are installed and while the run is finished do no harm."""
-    for after in (5, 8, 12):
-        assert check_kill(toy, tmp_path / str(after), after, undisturbed)
-
-
 @pytest.mark.slow
 def test_every_kill_between_two_writes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[str | None, bytes]

@@ -112,6 +112,7 @@ def test_another_python_is_refused(cli: Cli, half: Path) -> None:
     assert contents(half) == before
 
 
+@pytest.mark.slow
 def test_another_python_is_accepted_and_noted(
     cli: Cli, toy: Workspace, driven: list[str], half: Path, tmp_path: Path
 ) -> None:
