@@ -1,2 +1,2 @@
-"""Compares two runs of the same faults, experiment by experiment. It runs no experiments and does not write
-to run folders."""
+"""Compares two runs of the same faults, experiment by experiment. Runs nothing and writes nothing to run
+folders."""

@@ -53,8 +53,8 @@ class Gate(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """An experiment on which a gate fails, and the problem. The id is that of the second run if the
-    experiment is in both runs."""
+    """An experiment on which a gate fails, and why. For an experiment in both runs, the id is that of the
+    second."""
 
     gate: Gate
     experiment_id: str
@@ -63,8 +63,7 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Two matched runs. `alerts_notes` name the alerts that each run's fault-free runs raise; '' if there are
-    none."""
+    """Two matched runs. `alerts_notes` name the alerts that each run's fault-free runs raise, if any."""
 
     a: Side
     b: Side
@@ -109,7 +108,6 @@ class Comparison:
 
     @cached_property
     def parts_remark(self) -> str:
-        """A remark that the runs are different parts of a campaign; empty if they are not."""
         return parts_remark(self.a, self.b)
 
     @cached_property

@@ -11,7 +11,7 @@ from mutator.store.stretches import package_versions
 from mutator.store.stretches import told as ran_with
 from mutator.verification.seal import not_verifiable
 
-_SHORT = 12  # digits that are shown of a digest
+_SHORT = 12  # shown digits of a digest
 _HEAD = ("campaign", "target", "seed", "reading")
 _PARTS = ("limit", "shard", "only", "exclude")  # choices that select some of the experiments
 
@@ -39,7 +39,7 @@ class Files:
 
 
 def facts(a: Side, b: Side) -> tuple[Fact, ...]:
-    """The inputs of both runs: everything that results depend on, then the packages that differ."""
+    """Everything that the runs' results depend on, then the packages that differ."""
     heads = [_facts(side) for side in (a, b)]
     names = dict.fromkeys(name for head in heads for name in head)
     if not all("stretches" in side.folder.head for side in (a, b)):  # older runs list all installed packages
@@ -81,7 +81,7 @@ def _files(head: Mapping[str, Any]) -> dict[str, str] | None:
 
 
 def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
-    """Remarks on runs that cannot be verified, and on pairs that have the same key but differ, with their
+    """Remarks on runs that cannot be verified, and on pairs with the same key that differ, with their
     number."""
     told: tuple[tuple[str, Callable[[Pair], bool]], ...] = (
         ("inject something else, or elsewhere", lambda p: p.a.fault.injections != p.b.fault.injections),
@@ -103,8 +103,7 @@ def remarks(a: Side, b: Side, matching: Matching) -> tuple[str, ...]:
 
 
 def parts_remark(a: Side, b: Side) -> str:
-    """A remark that the runs are different parts of a campaign. The tables then cover only their overlap.
-    Empty if both runs are the same part."""
+    """A remark that the runs are different parts of a campaign; empty if they are the same part."""
     of_a, of_b = (
         {name: value for name in _PARTS if (value := side.folder.head["choices"].get(name)) is not None}
         for side in (a, b)
@@ -119,7 +118,6 @@ def parts_remark(a: Side, b: Side) -> str:
 
 
 def severity_remarks(a: Side, b: Side) -> tuple[str, ...]:
-    """Remarks on severity classes. Both runs are classified by the second run's scale."""
     scales = [side.folder.scale for side in (a, b)]
     if None in scales:
         (without,) = [s for s, scale in zip((a, b), scales, strict=True) if not scale][:1]

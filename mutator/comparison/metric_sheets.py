@@ -18,8 +18,8 @@ NO_CONTACT = "no contact"
 
 
 def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
-    """A table for each metric that both runs have: medians, their difference and Wilcoxon's test, for all
-    pairs and by fault type. Only pairs with a value in both runs count."""
+    """Medians of each metric that both runs have, their difference and Wilcoxon's test, for all pairs and by
+    fault type. Pairs need a value in both runs."""
     whole: list[tuple[Cell, ...]] = []
     parts: list[tuple[Cell, ...]] = []
     units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
@@ -37,7 +37,7 @@ def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tup
         "Wilcoxon's signed-rank test (none if no pair differs)"
     )
     heads = ("unit", "worse", "pairs", names.a, names.b, "difference", "difference, low", "difference, high")
-    return whole_and_parts("metrics", "How bad it was", note, ("metric", (*heads, "p")), tuple(whole), parts)
+    return whole_and_parts("metrics", "Metrics", note, ("metric", (*heads, "p")), tuple(whole), parts)
 
 
 def _values(pairs: Sequence[Pair], a: Side, b: Side, name: str) -> pd.DataFrame:
@@ -59,14 +59,14 @@ def _medians(frame: pd.DataFrame) -> tuple[Cell, ...]:
 
 
 def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """Pairs by severity class in the first run (lines) and the second (columns). Without contacts, the table
-    is empty."""
+    """Pairs by severity class in the first run (lines) and the second (columns). Without contacts, it has no
+    lines."""
     order = [*CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.usable)
     seen = [name for name in order if any(name in pair for pair in counts)]
     return Sheet(
         name="severity",
-        title="How severe they were",
+        title="Severity",
         note=f"Lines: severity class in {names.a}. Columns: severity class in {names.b}.",
         heads=(f"{names.a} / {names.b}", *(name or NO_CONTACT for name in seen)),
         lines=tuple((one or NO_CONTACT, *(counts[one, other] for other in seen)) for one in seen)

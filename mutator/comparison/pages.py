@@ -1,4 +1,4 @@
-"""Writes a comparison as Markdown, one self-contained HTML page, and CSV files of pairs and tables."""
+"""Writes a comparison as Markdown, one self-contained HTML page, and CSV files."""
 
 import csv
 import io
@@ -24,8 +24,6 @@ _BAD = frozenset(gate.value for gate in Gate)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Written:
-    """The files of a comparison."""
-
     markdown: Path
     page: Path
     pairs: Path
@@ -46,18 +44,15 @@ def write(comparison: Comparison, out: Path) -> Written:
 
 
 def pairs_csv(comparison: Comparison) -> bytes:
-    """The table of all pairs."""
     return _table(pair_line(p) for p in comparison.pairs)
 
 
 def unmatched_csv(comparison: Comparison) -> bytes:
-    """The experiments that could not be compared, with reasons."""
     unmatched = ({"why": why, "experiment": e.id, "words": e.label} for why, e in comparison.unmatched)
     return _table(unmatched, heads=("why", "experiment", "words"))
 
 
 def summary(comparison: Comparison) -> str:
-    """The comparison in a few sentences."""
     c = comparison
     counts = Counter(change for pair in c.pairs for change in pair.changes)
     text = f"In both runs: {counted(len(c.pairs), 'experiment')}. "
@@ -75,12 +70,10 @@ def summary(comparison: Comparison) -> str:
 
 
 def reasons(comparison: Comparison) -> list[tuple[str, int]]:
-    """The reasons why experiments could not be compared, with counts."""
     return list(Counter(why for why, _ in comparison.unmatched).items())
 
 
 def files_text(comparison: Comparison) -> str:
-    """The target's files that differ, as text."""
     found = comparison.files
     if found is None:
         return "It is not known which target files differ: one run is too old to list them."
@@ -94,7 +87,6 @@ def files_text(comparison: Comparison) -> str:
 
 
 def markdown(comparison: Comparison) -> str:
-    """The comparison as Markdown."""
     c = comparison
     parts = [f"# {c.names.a} against {c.names.b}", summary(c), *c.remarks, "## What differs between the runs"]
     differing = _facts(c, [fact for fact in c.facts if fact.differs])
@@ -159,12 +151,10 @@ def page(comparison: Comparison) -> str:
 
 
 def style() -> str:
-    """The page's CSS."""
     return asset("base.css") + _own("page.css").replace("LIMIT", str(SHOWN + 1))
 
 
 def script() -> str:
-    """The page's JavaScript."""
     return _own("page.js")
 
 
@@ -173,7 +163,6 @@ def _own(name: str) -> str:
 
 
 def _changed(comparison: Comparison) -> Table:
-    """The changed experiments as the page lists them; its script filters the rows by change."""
     a, b = comparison.names.a, comparison.names.b
     heads = ("experiment", "what changed", a, b, f"hazard, {a} [s]", f"hazard, {b} [s]", "ids")
     return Table(heads=heads, rows=list(map(_changed_row, comparison.changed)), right=(4, 5))
@@ -195,7 +184,6 @@ def _changed_row(pair: Pair) -> tuple[str, ...]:
 
 
 def _ending(row: Row) -> str:
-    """A run's outcome as a badge, then its hazards, alerts and message."""
     from markupsafe import Markup
 
     details = [name for name, _ in row.hazards] + [f"alert {name}" for name in row.alerts]

@@ -57,7 +57,7 @@ class Pair:
 
 @dataclass(frozen=True, kw_only=True)
 class Matching:
-    """The comparable and incomparable experiments of two runs, in plan order."""
+    """The experiments of two runs, in plan order."""
 
     pairs: tuple[Pair, ...]
     only_a: tuple[Experiment, ...]  # not in the other run's plan
@@ -68,10 +68,7 @@ class Matching:
 
 
 def match(a: Side, b: Side) -> Matching:
-    """Match experiments by id, then the remaining ones by key.
-
-    If several remaining experiments of a run share a key, none of them is matched.
-    """
+    """Match experiments by id, then the remaining ones by key, unless several of a run share it."""
     by_id = {e.id: e for e in b.experiments}
     same = {e.id for e in a.experiments if e.id in by_id}
     rest_a = [e for e in a.experiments if e.id not in same]

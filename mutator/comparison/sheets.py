@@ -57,7 +57,7 @@ def _span(start: float | None, end: float | None) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """The names of the two runs in tables."""
+    """The display names of the two runs."""
 
     a: str
     b: str
@@ -73,14 +73,13 @@ def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
     note = (
         f"Pairs with a result on both sides. Difference: the rate of {names.b} minus that of {names.a} "
         "(of 1), with an interval resampled by fault (variant and value; none if all faults agree). "
-        "p: McNemar's exact test of the pairs "
-        "that differ"
+        "p: McNemar's exact test of the pairs that differ"
     )
     heads = (
         *("pairs", names.a, names.b, f"only {names.a}", f"only {names.b}"),
         *("difference", "difference, low", "difference, high", "p"),
     )
-    return whole_and_parts("rates", "What came in how many runs", note, ("what", heads), whole, parts)
+    return whole_and_parts("rates", "Rates of events", note, ("what", heads), whole, parts)
 
 
 def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
@@ -107,7 +106,7 @@ def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
     )
     heads = ("pairs", names.a, names.b, "difference", "difference, low", "difference, high", "p")
     return whole_and_parts(
-        "times", "How long it took, where it came in both runs", note, ("time", heads), whole, parts
+        "times", "Times between events that occur in both runs", note, ("time", heads), whole, parts
     )
 
 
@@ -133,8 +132,8 @@ def whole_and_parts(
     whole: tuple[tuple[Cell, ...], ...],
     parts: Sequence[tuple[Cell, ...]],
 ) -> tuple[Sheet, Sheet]:
-    """A table of all pairs and one by fault type. `heads` has the heading of the first column, then those of
-    the others."""
+    """A table of all pairs and one by fault type. `heads` has the heading of the first column, then the
+    others."""
     what, numbers = heads
     return (
         Sheet(name=name, title=title, note=f"{note}.", heads=(what, *numbers), lines=whole),

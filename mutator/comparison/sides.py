@@ -1,4 +1,4 @@
-"""One side of a comparison: a run's experiments and their results."""
+"""A run's experiments and results, as one side of a comparison."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -16,10 +16,8 @@ from mutator.verification import equivalence
 
 
 class Key(NamedTuple):
-    """Identifies an experiment across runs, independently of target, reading, setting and seed.
-
-    Ids are unsuitable because they depend on drawn times, reading, setting and the scenario's text.
-    """
+    """Identifies an experiment across runs, independently of target, reading, setting and seed. Ids depend on
+    drawn times, reading, setting and the scenario's text."""
 
     spec: str  # with the variant: sensor/bias/distance
     value: Value
@@ -30,10 +28,8 @@ class Key(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Side:
-    """One run: its folder, its planned experiments, and their rows.
-
-    `rows` and `metrics` are by experiment id. Metrics without a value are left out.
-    """
+    """One run: its folder, its planned experiments, and their rows and metrics by id. Metrics without a value
+    are left out."""
 
     folder: RunFolder
     experiments: tuple[Experiment, ...]
@@ -58,8 +54,7 @@ class Side:
 def read_side(run: Path, only: str | None = None) -> Side:
     """Read the run folder `run` and its experiments that match `only`, a filter over plan columns.
 
-    The function uses plan and records, and writes nothing. Raise MutatorError if `run` is not a run folder,
-    and CheckFailed if its equivalence check failed.
+    Raise MutatorError if `run` is not a run folder, and CheckFailed if its equivalence check failed.
     """
     folder = RunFolder.open(run)
     records = folder.records()
@@ -81,6 +76,5 @@ def _metrics(record: Record) -> dict[str, float]:
 
 
 def key_of(experiment: Experiment) -> Key:
-    """The key by which an experiment is matched."""
     fault = experiment.fault
     return Key(fault.spec, fault.value, experiment.scenario, experiment.method.value, experiment.trigger.name)

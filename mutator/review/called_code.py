@@ -1,8 +1,8 @@
 """Finds the target code that injected lines call, by name, so that reviewers see it.
 
-Names are resolved through imports to functions, classes and constants of the tree, and on to the names in
-their sources. Classes count as a whole, with their bases; for `self`, only the named method counts. Calls
-that depend on values (a method of an argument, say) are not followed. Annotations are ignored.
+Names are resolved through imports, transitively, to functions, classes and constants of the tree. Classes are
+included whole, with their bases; for `self`, only the named method is. Calls that depend on values (a method
+of an argument, say) are not followed. Annotations are ignored.
 """
 
 import ast
@@ -23,8 +23,8 @@ _FURTHEST = 20  # most imports to follow for a name
 
 @dataclass(frozen=True, slots=True, order=True)
 class _Place:
-    """A piece of the tree with source: `name` in the file at `path`, or the whole file (no name). For a
-    method, `me` is the class of its object; methods of this class override those of its bases."""
+    """A piece of the tree: `name` in the file at `path`, or the whole file (no name). For a method, `me` is
+    the class of its object, whose methods override those of its bases."""
 
     path: str
     name: str
@@ -38,11 +38,8 @@ class CalledCode:
         self._tree = tree
 
     def of_lines(self, path: str, data: bytes) -> dict[str, str]:
-        """The code that injected lines call in `data`, the mutated file at `path`.
-
-        Returns the source of each place, such as `car/weather.py Rain`. For a file that is not Python, this
-        is the whole file.
-        """
+        """The code that injected lines call in `data`, the mutated file at `path`: the source of each place,
+        such as `car/weather.py Rain`. For a file that is not Python, this is the whole file."""
         module = source_names.read_module(path, data, Path())
         return self._closure(path, uses_in(module.tree, wanted=_injected(data)))
 
@@ -104,8 +101,6 @@ class CalledCode:
                 yield from self._named(path, use.words, 0)
 
     def _named(self, path: str, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
-        """The places that a name of the module at `path` refers to; `words` are the name and its
-        attributes."""
         module = self._module(path)
         if depth > _FURTHEST or not words:
             return
@@ -118,7 +113,6 @@ class CalledCode:
                 yield from self._named(target, words, depth + 1)
 
     def _imported(self, path: str, one: Import, words: tuple[str, ...], depth: int) -> Iterator[_Place]:
-        """The places that an import and the attributes after it refer to."""
         name = one.absolute(path)
         if one.name is not None:
             target, name = self._path(name), ".".join(filter(None, (name, one.name)))
@@ -137,8 +131,7 @@ class CalledCode:
                 yield _Place(target, "")
 
     def _of_self(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The method that `self.name` refers to in an object of `me`: that of the class, else of its
-        bases."""
+        """The method that `self.name` refers to in an object of `me`."""
         path, inside = owner
         if self._module(path).nodes_of(f"{inside}.{name}"):
             yield _Place(path, f"{inside}.{name}", me)
@@ -146,7 +139,7 @@ class CalledCode:
             yield from self._of_bases(owner, name, me, depth)
 
     def _of_bases(self, owner: _Class, name: str, me: _Class, depth: int) -> Iterator[_Place]:
-        """The method that `super().name` refers to in an object of `me`: that of the bases."""
+        """The method that `super().name` refers to in an object of `me`."""
         path, inside = owner
         for words in self._module(path).bases_of(inside) if depth < _FURTHEST else ():
             for base in self._named(path, words, 0):
@@ -156,7 +149,6 @@ class CalledCode:
         return self._tree.derived(path, source_names.read_module)
 
     def _path(self, module: str) -> str | None:
-        """The file of a module of the tree."""
         stem = module.replace(".", "/")
         return next(
             (path for path in (f"{stem}.py", f"{stem}/__init__.py") if path in self._tree.files), None

@@ -1,6 +1,6 @@
 """The groups to review: the mutants of a library or campaign by location and template.
 
-A group does not depend on which of its mutants are selected, or on triggers. Its id follows from its subject;
+A group does not depend on which of its mutants are selected, or on triggers. Its id follows from its label;
 decisions are bound to its diff with holes, the target's code and the templates (`Material`).
 """
 
@@ -35,14 +35,14 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class Group:
-    """Mutants that differ only in values and triggers, or an operator's mutants of a function. `what` is one
-    line: location and template.
+    """Mutants that differ only in values and triggers, or an operator's mutants of a function. `what` is the
+    label: location and template.
 
     `shapes` are its diffs with holes, several if a template writes different lines for different numbers.
     Their members are `faults`, by id. `runs` is the number of its experiments in a campaign; None if no
     campaign is given. `trigger` and `hold` list the kinds, joined by `or`. `values` is the range of each
-    parameter in the specs. `seen` is the text that a decision is bound to. `made_from` are the spec files and
-    templates, with their YAML.
+    parameter in the specs. `seen` is the text that a decision is bound to. `made_from` are the files of specs
+    and templates.
     """
 
     id: str
@@ -64,12 +64,11 @@ class Group:
 
     @property
     def diff(self) -> str:
-        """Its diffs with holes, for display."""
+        """The diffs with holes, for display."""
         return "".join(shape.diff for shape in self.shapes)
 
     @property
     def specs(self) -> tuple[str, ...]:
-        """The specs and variants of its faults."""
         return tuple(dict.fromkeys(fault.spec for fault in self.faults))
 
 
@@ -119,7 +118,6 @@ def of_library(
 
 
 def _specs(workspace: Workspace, wanted: Sequence[str]) -> Iterator[FaultSpec]:
-    """The wanted specs: all, given files, or those whose names match a glob."""
     library = workspace.specs()
     if not wanted:
         yield from library
@@ -198,7 +196,7 @@ class _Catalogue:
         return (*specs, *(path for one in found for path in (one.template_path, one.source.path)))
 
     def _material(self, faults: Sequence[Fault], patches: Sequence[str]) -> Material:
-        """The texts that a decision about mutants is bound to: a fault and its patch for each shape."""
+        """The texts that a decision about mutants is bound to; `faults` has one fault for each shape."""
         calls: dict[str, str] = {}
         for fault in faults:
             mutant = build(self.manifest, self.models, fault, always())

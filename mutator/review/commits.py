@@ -21,13 +21,11 @@ class _Commit:
     others: tuple[str, ...] = ()
 
     def is_by(self, reviewer: str) -> bool:
-        """Whether this reviewer is an author of the commit: `Jane Doe`, `jane@x.org` or `Jane Doe
-        <jane@x.org>`."""
+        """Whether `reviewer` is an author: `Jane Doe`, `jane@x.org` or `Jane Doe <jane@x.org>`."""
         return any(_names(reviewer) & _names(one) for one in (self.author, *self.others))
 
 
 def _names(person: str) -> set[str]:
-    """The ways to write a person: name, address, or both."""
     name, _, rest = person.partition("<")
     return {" ".join(text.split()).casefold() for text in (person, name, rest.rstrip("> "))} - {""}
 
@@ -45,7 +43,7 @@ def library_commit(workspace: Workspace) -> str | None:
 
 
 def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
-    """MutatorError if a reviewer approves a group that they changed last, or if its last author is
+    """Raise MutatorError if a reviewer approves a group that they changed last, or if its last author is
     unknown."""
     known: dict[tuple[Path, ...], dict[Path, _Commit]] = {}
     for group, by in approvals:
@@ -62,7 +60,7 @@ def check_four_eyes(approvals: Sequence[tuple[Group, str]]) -> None:
 
 
 def _last_changes(group: Group) -> dict[Path, _Commit]:
-    """The last commit in each clone that changed the group's sources."""
+    """The last commit that changed the group's sources, for each clone."""
     clones: dict[Path, list[Path]] = {}
     for path in group.made_from:
         top = git(path.parent, "rev-parse", "--show-toplevel")

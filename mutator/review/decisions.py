@@ -1,4 +1,4 @@
-"""Decisions, remarks and flags on groups of mutants: their validity and storage.
+"""Decisions, remarks and flags on groups of mutants: when they are valid, and how they are stored.
 
 A decision is bound to what the reviewer saw: the group's diff, the target's functions, the templates, the
 code that injected lines call, and the range of each value. If one of these changes, the group is `changed`
@@ -57,7 +57,7 @@ class Change:
 
 
 class Conflict(CheckFailed):
-    """Somebody else has changed the review of these groups since the caller read it. Nothing was written.
+    """Somebody else changed the review of these groups after the caller read it. Nothing was written.
 
     `groups` are their ids, `review` is the current review.
     """
@@ -79,7 +79,6 @@ class Review:
     four_eyes: bool = False
 
     def decision(self, group: str) -> Decision | None:
-        """The decision about a group, by id; None if there is none."""
         entry = self.entries.get(group)
         return entry.decision if entry else None
 
@@ -89,7 +88,6 @@ class Review:
         return entry.remarks if entry else ()
 
     def flag(self, group: str) -> Flag | None:
-        """The group's flag, if any."""
         entry = self.entries.get(group)
         return entry.flag if entry else None
 
@@ -99,22 +97,19 @@ class Review:
         return entry.revision if entry else ""
 
     def changed(self, group: Group) -> list[str]:
-        """The parts of a group that changed since the decision, as text; empty if it is valid or missing."""
+        """The parts of a group that changed since the decision, as text."""
         decision = self.decision(group.id)
         return decision.changed(group.bound, group.values) if decision else []
 
     def state(self, group: Group) -> State:
-        """The state of the group's review."""
         decision = self.decision(group.id)
         if decision is None:
             return State.NEW
         return State.CHANGED if self.changed(group) else State(decision.verdict.value)
 
     def changes(self, group: Group) -> str:
-        """A unified diff from what the reviewer saw to the current state.
-
-        Empty if the decision is valid, or if the text that the reviewer saw was not stored.
-        """
+        """A unified diff from what the reviewer saw to the current state; empty if the decision is valid, or
+        if what the reviewer saw was not stored."""
         decision = self.decision(group.id)
         if decision is None or not self.changed(group):
             return ""
@@ -130,7 +125,7 @@ class Review:
         return sorted(groups, key=lambda group: order.index(self.state(group)))
 
     def describe(self, group: Group) -> str:
-        """The reviewer who decided about the group, and the changes since then; empty without a decision."""
+        """The decision about the group and what changed since, as text; empty without a decision."""
         decision = self.decision(group.id)
         if decision is None:
             return ""
@@ -158,10 +153,9 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
     """Apply all changes or none, and return the stored review.
 
     `seen` are the revisions of the groups that the caller saw (`Review.revision`; missing groups had no
-    review). A lock serializes callers across processes.
-    Conflict if somebody else has changed the review of one of the groups since; MutatorError for an unusable
-    name or text, for an approval that `four_eyes` forbids, and for the library shipped with mutator, which is
-    read-only.
+    review). A lock serializes callers across processes. Conflict if somebody else has changed the review of
+    one of the groups since; MutatorError for an unusable name or text, for an approval that `four_eyes`
+    forbids, and for the library shipped with mutator, which is read-only.
     """
     made = [replace(change, by=_line(change.by, "by"), text=_line(change.text, "text")) for change in changes]
     for change in made:
@@ -178,12 +172,11 @@ def record(workspace: Workspace, target: str, changes: Sequence[Change], seen: M
 
 
 def _text_of(kind: Kind) -> str:
-    """The name of the API argument that holds the text of a change."""
+    """The API argument that holds the text of a change."""
     return "text" if kind is Kind.REMARK else "remark"
 
 
 def _check(change: Change) -> None:
-    """MutatorError if the change lacks a name or its text."""
     if not change.by:
         raise MutatorError("no name", argument="by", expected="the reviewer's name", remedy="give a name")
     if change.kind is Kind.REMARK and not change.text:
@@ -240,7 +233,6 @@ def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) ->
 
 
 def _applied(entry: Entry, change: Change, at: str, commit: str | None) -> Entry:
-    """An entry with a change applied."""
     group, kind = change.group, change.kind
     if change.text:
         entry = replace(entry, remarks=(*entry.remarks, Remark(by=change.by, at=at, text=change.text)))

@@ -26,7 +26,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Bound:
-    """Digests of a decision's subject. If one changes, the decision is no longer valid."""
+    """Digests of what a decision is about. If one changes, the decision is no longer valid."""
 
     diff: str  # digest of the hunks with injected lines, without values and line numbers
     function: str  # digest of the changed target functions, without injected lines
@@ -34,7 +34,6 @@ class Bound:
     calls: str | None = None  # digest of the target code that the injected lines call; None: not stored
 
     def changed(self, now: "Bound") -> list[str]:
-        """The changed parts, as text."""
         differs = {name: getattr(self, name) != getattr(now, name) for name in _WORDS}
         differs["calls"] &= self.calls is not None
         return [word for name, word in _WORDS.items() if differs[name]]
@@ -45,7 +44,7 @@ class Decision:
     """The decision of `by` about a group, and the group's state at that time.
 
     `at` is the time (UTC, ISO 8601), `commit` the library's, `tool` the version of mutator. In decisions from
-    older files, `at`, `commit`, `tool`, `values` and the digest of called code are None.
+    older files, `at`, `commit`, `tool`, `values` and `bound.calls` are None.
     """
 
     group: str
@@ -59,19 +58,19 @@ class Decision:
     values: Values | None = None
 
     def changed(self, bound: Bound, values: Values) -> list[str]:
-        """The parts of the group that changed since, as text; empty: the decision is valid."""
+        """The parts of the group that changed since, as text; empty if the decision is valid."""
         beyond = _beyond(self.values, values) if self.values is not None else ""
         return self.bound.changed(bound) + ([f"values ({beyond})"] if beyond else [])
 
     @property
     def words(self) -> str:
-        """`approved by Jane Doe on 2026-11-24`."""
+        """Text such as `approved by Jane Doe on 2026-11-24`."""
         return f"{self.verdict} by {self.by}" + (f" on {self.at[:10]}" if self.at else "")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Remark:
-    """A line of text about a group; `at` is the time, as in a decision."""
+    """A line of text about a group."""
 
     by: str
     at: str | None
@@ -98,12 +97,10 @@ class Entry:
 
     @property
     def says_nothing(self) -> bool:
-        """Whether the entry is empty."""
         return not (self.decision or self.remarks or self.flag)
 
     @property
     def revision(self) -> str:
-        """Digest of the entry; it changes with every change of the review."""
         return content_id(asdict(self))
 
 
@@ -113,7 +110,7 @@ def values_in_words(values: Values) -> str:
 
 
 def _beyond(approved: Values, now: Values) -> str:
-    """The values outside the approved ranges, as text; empty if there are none."""
+    """The values outside the approved ranges, as text."""
     wider = [name for name in now if not _within(now[name], approved.get(name, ()))]
     told = (f"{name}: {_range(now[name])}; approved {_range(approved.get(name, ()))}" for name in wider)
     return "; ".join(told)

@@ -23,7 +23,7 @@ _MOST_IDS = 10  # most ids in one printed command
 def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
     """The decisions that allow the plan to run (canary and probe included), for `write_approvals`.
 
-    CheckFailed unless every group has a valid approval; the error lists the others and how to review them.
+    CheckFailed unless every group has a valid approval.
     """
     manifest = workspace.manifest(plan.campaign.target)
     groups = of_plan(workspace, plan)
@@ -36,12 +36,11 @@ def approvals(workspace: Workspace, plan: Plan) -> dict[str, Any]:
 
 
 def write_approvals(run: Path, approvals: dict[str, Any]) -> None:
-    """Write the approvals to the run folder: reviewers and the digests of what they saw."""
     digests.rewrite(run, FILE, json_bytes(approvals))
 
 
 def approval_summary(run: Path) -> str:
-    """Who approved a run's mutants, as text; empty for a run without `--require-reviewed`."""
+    """Who approved a run's mutants, as text; empty without `--require-reviewed`."""
     if not (run / FILE).exists():
         return ""
     groups = read_json(run / FILE, SCHEMA)["groups"]
@@ -87,13 +86,12 @@ def reason(review: Review, group: Group) -> str:
 
 
 def share(group: Group) -> str:
-    """A group's part of a campaign: a number of experiments, or only the canary."""
+    """The group's share of a campaign as text: a number of experiments, or only the canary."""
     return counted(group.runs, "experiment") if group.runs else "the canary"
 
 
 def _campaign(workspace: Workspace, plan: Plan) -> str:
-    """The campaign as commands name it: its name if the library's file of that name has the same text, else
-    its file."""
+    """The campaign's name if the library's file of that name has the same text, else its file."""
     name = plan.campaign.name
     known = name in workspace.campaigns
     same = known and workspace.campaign(name).read_bytes() == plan.campaign.source

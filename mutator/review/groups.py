@@ -1,8 +1,8 @@
 """Groups patches that differ only in values: a diff with holes, and a table of the values in them.
 
-Mutants of one shape differ only in numbers, truth values and ids of their injected lines and, in the probe,
-in its ids and the lines that define the trigger. Removing these values from patches of one shape leaves equal
-text. Values that are equal in all members are put back; the others remain holes.
+The members of a shape differ only in numbers, truth values and ids of their injected lines and, in the probe,
+in its ids and the lines that define the trigger. Values that are equal in all members are text; the others
+are holes.
 """
 
 import re
@@ -34,8 +34,7 @@ class Shape:
     """Patches that differ only in values. A member's patch is `parts` with its values in between.
 
     Hole `places[i]` is between `parts[i]` and `parts[i + 1]`; a hole may be in several places. `values[m][h]`
-    fills hole `h` in the patch of `members[m]`. `id` depends only on `name` and the text without values, not
-    on the members.
+    fills hole `h` in the patch of `members[m]`. `id` depends only on `name` and the text without values.
     """
 
     id: str
@@ -48,11 +47,10 @@ class Shape:
 
     @cached_property
     def diff(self) -> str:
-        """The patch for display, with holes like `⟨by⟩`."""
+        """The patch with holes like `⟨by⟩`, for display."""
         return self._with([f"⟨{name}⟩" for name in self.holes])
 
     def patch(self, member: int) -> str:
-        """The original patch of a member."""
         return self._with(self.values[member])
 
     def _with(self, values: Iterable[str]) -> str:
@@ -61,10 +59,8 @@ class Shape:
         return "".join(a + b for a, b in zip(self.parts, [*between, ""], strict=True))
 
     def with_named_holes(self, parameters: Iterable[Mapping[str, Value]]) -> "Shape":
-        """The shape with each numbered hole named after the parameter that it holds in every member.
-
-        `parameters` has those of each member, in member order.
-        """
+        """The shape with each numbered hole named after the parameter that fills it in every member;
+        `parameters` are in member order."""
         each = list(parameters)
         names: list[str] = []
         for hole, name in enumerate(self.holes):
@@ -79,8 +75,7 @@ class Shape:
 def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
     """The shapes of patches given as (key, name, patch), in the order of their first members.
 
-    Keys are the members' names. Patches with different `name`s never share a shape: the name states what else
-    the members have in common (see `group_label`), or is empty.
+    Keys are the members' names. Patches with different `name`s never share a shape (see `group_label`).
     """
     found: dict[tuple[str, str], _ShapeBuilder] = {}
     for key, name, patch in patches:
@@ -112,7 +107,6 @@ def group_label(fault: Fault) -> str:
 
 
 def location_label(location: FaultLocation) -> str:
-    """A location as text."""
     anchor = location.anchor
     number = f"#{anchor.nth}" if anchor.nth is not None else ""
     which = f"which {anchor.which}" if anchor.which else ""
@@ -132,20 +126,19 @@ def injection_label(injection: Injection) -> str:
 
 
 def _instance(injection: Injection) -> str:
-    """The limits on instances and executions, without numbers."""
     where = f" where {re.sub(_NUMBER, '#', injection.where)}" if injection.where else ""
     return where + "".join(f", {name}" for name in ("call", "every") if getattr(injection, name) is not None)
 
 
 def trigger_kind(trigger: Trigger) -> str:
-    """`always`, `time` (the condition uses only the time) or `state` (anything else, such as a context)."""
+    """`always`, `time` (the condition uses only the time) or `state` (any other condition)."""
     if trigger.condition == "True":
         return "always"
     return "time" if names_in(trigger.condition) == (TIME,) else "state"
 
 
 def hold_of(fault: Fault, trigger: Trigger) -> Hold:
-    """How long the fault stays active: its own `hold` overrides the trigger's."""
+    """The fault's own hold, else the trigger's."""
     return fault.hold or trigger.hold
 
 
@@ -205,7 +198,6 @@ def _unused_name(label: str, taken: list[str]) -> str:
 
 
 def _spans(patch: str) -> Iterator[Span]:
-    """The positions of values, from top to bottom."""
     if HOLE in patch:  # no holes, because it is not Python source
         return
     begin = 0

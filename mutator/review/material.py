@@ -29,7 +29,6 @@ class Material:
 
     @property
     def bound(self) -> Bound:
-        """Their digests."""
         return Bound(
             diff=content_id(self.diff),
             function=content_id(self.functions),
@@ -56,7 +55,6 @@ def diffs_of(patches: Iterable[str]) -> list[str]:
 
 
 def functions_of(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[str, str]:
-    """The source of the target's functions at these locations."""
     return {
         f"{place.path} {place.function}": _function(tree.files[place.path], place.function).decode(
             "utf-8", "surrogateescape"
@@ -66,7 +64,7 @@ def functions_of(tree: SourceTree, locations: Iterable[FaultLocation]) -> dict[s
 
 
 def fault_hunks(patch: str) -> str:
-    """The hunks with lines of a fault, without those that every mutant has."""
+    """The hunks with lines of a fault."""
     kept = []
     for section in file_patches(patch):
         if not adds_file(section):
@@ -77,7 +75,6 @@ def fault_hunks(patch: str) -> str:
 
 
 def _named(texts: Mapping[str, str | Sequence[str]]) -> str:
-    """The texts, one after another, each under its name."""
     each = ((name, text if isinstance(text, str) else "\n".join(text)) for name, text in texts.items())
     return "\n".join(f"-- {name}\n{text.rstrip()}\n" for name, text in each)
 

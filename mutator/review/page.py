@@ -1,7 +1,4 @@
-"""The review page: every group with state, diff and values in one self-contained file.
-
-A server shows the same page and saves reviewers' actions at once (`served`).
-"""
+"""The review page: every group with state, diff and values, in one self-contained file or served."""
 
 import shlex
 from collections.abc import Mapping, Sequence
@@ -53,8 +50,8 @@ def page_html(
     options: Sequence[str],
     served: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page of `groups`. `served` has the data that a served page needs (target, reviewer, address for
-    decisions, runs); None for a file."""
+    """The page of `groups`. `served` has what a served page needs: target, reviewer, address for decisions,
+    runs."""
     data = {
         "target": review.target,
         "states": [state.value for state in State],
@@ -82,10 +79,8 @@ def render_page(data: dict[str, Any]) -> str:
 
 
 def state_of(review: Review, group: Group) -> dict[str, Any]:
-    """The review of a group, as shown on the page and sent by a server.
-
-    `digest` identifies the mutants: a page with other mutants must not decide about these.
-    """
+    """The review of a group, as the page shows it. `digest` identifies the mutants, so that a page with other
+    mutants cannot decide about these."""
     decision, flag = review.decision(group.id), review.flag(group.id)
     return {
         "state": review.state(group).value,
@@ -107,8 +102,8 @@ def state_of(review: Review, group: Group) -> dict[str, Any]:
 
 
 def _in_stacks(review: Review, groups: Sequence[Group]) -> list[tuple[Group, int]]:
-    """The groups with stack numbers, in stack order. A stack has the groups of one state, template and
-    function that call the same code."""
+    """The groups with stack numbers, in stack order. The groups of a stack share state, template, function
+    and called code."""
     kinds: dict[tuple[object, ...], int] = {}
     numbered = []
     for group in groups:

@@ -1,8 +1,7 @@
 """Shows what an image effect does: an image before it, and after it at up to three levels.
 
-Runs the target up to the place of the injected lines and executes these lines there on its current image,
-with the values of several mutants. So the images show what a run would see, without support in the manifest.
-Results are cached by all their inputs.
+Runs the target up to the injected lines and executes them there on its current image, with the values of
+several mutants. This needs no support in the manifest. Results are cached by all their inputs.
 """
 
 import base64
@@ -60,14 +59,13 @@ class Level:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pictures:
-    """A group's images as JPEG files. With one distinct value there is only the level `most`, with two
-    `least` and `most`."""
+    """A group's images as JPEG files. One distinct value gives only the level `most`; two give `least` and
+    `most`."""
 
     before: bytes
     levels: tuple[Level, ...]
 
     def level(self, name: str) -> Level | None:
-        """The level of that name; None if there is none."""
         return next((level for level in self.levels if level.name == name), None)
 
 
@@ -79,7 +77,7 @@ def has_pictures(group: Group) -> bool:
 def of_group(
     workspace: Workspace, manifest: TargetManifest, group: Group, level: str
 ) -> tuple[bytes, bytes] | None:
-    """The image before and after the effect at one of LEVELS, as JPEG files; None if there are none."""
+    """The image before and after the effect at one of LEVELS, as JPEG files."""
     found = of_groups(workspace, manifest, [group]).get(group.id)
     wanted = found.level(level) if found else None
     return (found.before, wanted.after) if found and wanted else None
@@ -105,7 +103,7 @@ def of_groups(workspace: Workspace, manifest: TargetManifest, groups: Iterable[G
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Wanted:
-    """The faults of a group to draw, each with its injected lines."""
+    """The faults of a group to draw, with their injected lines."""
 
     key: str
     place: tuple[FaultLocation, str]
@@ -146,8 +144,7 @@ def _effects(fault: Fault) -> tuple[Injection, ...]:
 
 
 def _place(fault: Fault) -> tuple[FaultLocation, str] | None:
-    """The place of a fault's image effects, and the variable with the image; None if there are several
-    places."""
+    """The place of a fault's image effects, and the variable with the image; None for several places."""
     places = {(one.location, str(dict(one.params)["target"])) for one in _effects(fault)}
     return places.pop() if len(places) == 1 else None
 
@@ -186,7 +183,7 @@ def _chosen(faults: Sequence[Fault]) -> tuple[Fault, ...]:
 def _drawn_anew(
     manifest: TargetManifest, models: FaultModels, scenario: Path, wanted: Mapping[str, _Wanted]
 ) -> dict[str, Pictures]:
-    """Draw and cache the images of groups: one run of the target for all groups of a place."""
+    """Draw and cache the images of groups, in one run of the target for all groups of a place."""
     check_requirements(manifest)
     places: dict[tuple[object, ...], list[str]] = {}
     for name, one in wanted.items():
@@ -209,7 +206,7 @@ def _drawn_anew(
 def _run(
     engine: ReferenceEngine, models: FaultModels, scenario: Path, groups: Sequence[_Wanted], folder: Path
 ) -> list[np.ndarray]:
-    """The image before, then those after each fault of each group."""
+    """The image before the effect, then the images after each fault of each group."""
     manifest, (location, picture) = engine.manifest, groups[0].place
     first = groups[0].faults[0]
     mutant = build(manifest, models, replace(first, injections=_effects(first)[:1]), always())
@@ -251,8 +248,8 @@ def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarr
 
 def _by_severity(changes: Sequence[float]) -> list[int]:
     """Indices into `changes`, least severe first. The order follows the amounts, in the direction in which
-    the image changes more. This ignores random differences between neighbouring amounts. Amounts on both
-    sides of "no effect" are ordered by change."""
+    the image changes more, so that random differences between neighbouring amounts do not matter. Amounts on
+    both sides of "no effect" are ordered by change."""
     order = list(range(len(changes)))
     trend = correlation(order, changes) if len(set(changes)) > 1 else 1.0
     if abs(trend) < CLEAR:

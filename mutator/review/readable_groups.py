@@ -31,7 +31,7 @@ def _shown_holes(shape: Shape) -> list[str]:
 
 
 def ranges(group: Group) -> str:
-    """The ranges of values in the specs, which an approval covers: `by: -40 to 40`."""
+    """The ranges of values that an approval covers: `by: -40 to 40`."""
     return values_in_words(group.values)
 
 

@@ -20,8 +20,8 @@ from mutator.review.entries import Bound, Decision, Entry, Flag, Remark, Verdict
 SCHEMA = "review/2"
 _FIRST = "review/1"
 _HEAD = """\
-# What reviewers said of the groups of mutants of this target: `mutator review` reads and writes this file.
-# A decision holds while diff, function, template and calls are what they were, and values within its own.
+# Reviews of this target's groups of mutants. `mutator review` reads and writes this file.
+# A decision is valid while diff, function, template and calls are unchanged and all values are in its ranges.
 """
 _WHEN = re.compile(r"; (?:always|time|state), (?:while|for|to_end)\Z")  # at the end of `what` in review/1
 _DIGEST = r"^[0-9a-f]{16}$"
@@ -66,8 +66,7 @@ class _FileModel(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """The file's content: entries by group, and whether authors are prevented from approving their own
-    changes."""
+    """The file's content: entries by group, and whether authors may not approve their own changes."""
 
     entries: Mapping[str, Entry]
     four_eyes: bool = False
@@ -96,7 +95,7 @@ def load(path: Path, target: str) -> Content:
 
 
 def write(path: Path, target: str, content: Content) -> None:
-    """Write the file atomically, sorted so that parallel work can be merged."""
+    """Write the file atomically, sorted so that git can merge parallel work."""
     blocks = [_block(content.entries[name]) for name in sorted(content.entries)]
     head = f"schema: {SCHEMA}\ntarget: {json.dumps(target)}\n" + "four_eyes: true\n" * content.four_eyes
     text = f"{_HEAD}{head}decisions:" + ("\n" + "".join(blocks) if blocks else " []\n")
@@ -174,11 +173,11 @@ def _given(remark: Remark) -> dict[str, str]:
 
 
 def _json(value: Any) -> str:
-    """A value on one line, which is also YAML."""
+    """The value on one line, which is also YAML."""
     return json.dumps(value, ensure_ascii=False)
 
 
-# Older files: a group for each kind of trigger, a remark with the decision
+# `review/1`: a group for each kind of trigger, a remark with the decision
 
 
 def _from_first(source: Source) -> Source:
@@ -210,8 +209,7 @@ def _merged(target: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 
 
 def _one(group: str, what: str, parts: Sequence[Entry]) -> Entry:
-    """Merge decisions: rejected if any part was rejected, else approved. `by` names everybody with that
-    verdict."""
+    """Merge decisions: rejected if any part was rejected, else approved. `by` names all with that verdict."""
     decisions = [entry.decision for entry in parts if entry.decision]
     remarks = tuple(dict.fromkeys(remark for entry in parts for remark in entry.remarks))
     counting = [one for one in decisions if one.verdict is Verdict.REJECTED] or decisions

@@ -23,16 +23,14 @@ def text_of(bound: Bound, values: Values, sections: Mapping[str, str]) -> str:
 
 
 def keep(path: Path, text: str) -> None:
-    """Write the text that a reviewer saw; replaces earlier text."""
+    """Write the text that a reviewer saw, replacing earlier text."""
     make_folder(path.parent)
     write_atomic(path, text.encode("utf-8", "surrogateescape"))
 
 
 def changes(path: Path, bound: Bound, text: str) -> str:
-    """A unified diff from what was seen when `bound` was decided to `text`, the current text.
-
-    Empty if nothing was stored for this decision.
-    """
+    """A unified diff from what was seen when `bound` was decided to the current `text`; empty if nothing was
+    stored for this decision."""
     try:
         before = no_pipe(path).read_bytes().decode("utf-8", "surrogateescape")
     except OSError:

@@ -14,7 +14,7 @@ _COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
 
 @dataclass(frozen=True, slots=True)
 class Import:
-    """`from module import name`, or without a name `import module`; `level`: dots before the module."""
+    """`from module import name`, or `import module` without a name; `level`: dots before the module."""
 
     module: str
     name: str | None = None
@@ -49,11 +49,10 @@ class Module:
     imports: Mapping[str, Sequence[Import]]
 
     def nodes_of(self, name: str) -> Sequence[ast.stmt]:
-        """The statements that define a name. There are several if the name is assigned more than once."""
+        """The statements that define a name: several if it is assigned more than once."""
         return self.defined.get(name, ())
 
     def knows(self, name: str) -> bool:
-        """Whether the module defines or imports a name."""
         return name in self.defined or name in self.imports
 
     def function(self, name: str) -> ast.stmt | None:
@@ -62,7 +61,6 @@ class Module:
         return found[-1] if found else None
 
     def bases_of(self, name: str) -> list[tuple[str, ...]]:
-        """The base classes of a class, as names with attributes."""
         classes = [node for node in self.nodes_of(name) if isinstance(node, ast.ClassDef)]
         bases = (
             base.value if isinstance(base, ast.Subscript) else base for one in classes for base in one.bases
@@ -96,8 +94,8 @@ def read_module(path: str, data: bytes, root: Path) -> Module:
 
 
 def uses_in(node: ast.AST, owner: str = "", wanted: _Wanted | None = None) -> Iterator[Use]:
-    """The external names that `node` uses, in its parts that `wanted` accepts. `owner` is its class if it is
-    a method."""
+    """The external names that `node` uses, in its parts that `wanted` accepts. `owner` is the class of a
+    method."""
     yield from _uses(node, _Scope(owner=owner), wanted or (lambda _: True))
 
 
@@ -117,7 +115,6 @@ class _Scope:
     me: str = ""  # the name of the method's first argument, such as `self`
 
     def inside(self, node: _Function) -> "_Scope":
-        """The scope of a nested function."""
         names, imports = _bound(node)
         method = bool(self.owner) and not self.local and not isinstance(node, ast.Lambda)
         arguments = [*node.args.posonlyargs, *node.args.args]
@@ -129,7 +126,7 @@ class _Scope:
         )
 
     def use(self, words: tuple[str, ...]) -> Use | None:
-        """The external use that a name with attributes stands for; None for a local variable."""
+        """The external use of a name with attributes; None for a local variable."""
         for name, one in reversed(self.imports):
             if name == words[0]:
                 return Use(words, imported=one)
@@ -168,7 +165,6 @@ def _parts(node: ast.AST, scope: _Scope) -> Iterator[tuple[ast.AST, _Scope]]:
 
 
 def _called_children(node: ast.AST) -> Iterator[ast.AST]:
-    """All parts except annotations."""
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns"):
             continue
@@ -191,7 +187,6 @@ def _is_super(node: ast.expr) -> bool:
 
 
 def _bound(node: _Function) -> tuple[frozenset[str], list[tuple[str, Import]]]:
-    """The names that a function binds, and its imports."""
     arguments = node.args
     every = [
         *arguments.posonlyargs,
@@ -254,7 +249,6 @@ def _imports(body: Sequence[ast.stmt]) -> Iterator[tuple[str, Import]]:
 
 
 def _blocks(node: ast.stmt) -> list[ast.stmt]:
-    """The statements in the blocks of a compound statement."""
     found = [one for name in ("body", "orelse", "finalbody") for one in getattr(node, name, [])]
     parts = [*getattr(node, "handlers", []), *getattr(node, "cases", [])]
     return found + [one for part in parts for one in part.body]

@@ -39,8 +39,8 @@ class Case:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Typical:
-    """A group's results in a run: the number of experiments, and counts by outcome. The typical one is the
-    median, by rank, of those with the most frequent outcome; the worst has the first rank."""
+    """A group's results in a run. The typical experiment is the median, by rank, of those with the most
+    frequent outcome; the worst has the first rank."""
 
     experiments: int
     outcomes: Mapping[str, int]
@@ -49,8 +49,8 @@ class Typical:
 
 
 def of_group(run: RunFolder, group: Group) -> Typical | None:
-    """The group's results in a run, from its current results table; None if the table has no experiment of
-    the group. MutatorError if the run has no table."""
+    """The group's results in a run; None if the results table has no experiment of the group. MutatorError if
+    the run has no table."""
     table = Results.of_run(run.path)
     try:
         written = table.path.stat().st_mtime_ns
@@ -62,7 +62,7 @@ def of_group(run: RunFolder, group: Group) -> Typical | None:
 
 @lru_cache(maxsize=8)
 def _of_run(path: Path, written: int) -> dict[str, Typical]:
-    """The results of each group by label; `written` is the time of the results."""
+    """The results of each group by label; `written`, the time of the table, only keys the cache."""
     import numpy as np
 
     texts = Results.of_run(path).texts()
@@ -79,8 +79,8 @@ def _of_run(path: Path, written: int) -> dict[str, Typical]:
 def _typical(
     texts: "pd.DataFrame", ended: Sequence[str], rows: Sequence[int], about: Mapping[str, str]
 ) -> Typical:
-    """The result for `rows`, which are sorted from worst to best. Of two equally frequent outcomes, the worse
-    one counts."""
+    """The result for `rows`, sorted from worst to best. Of two equally frequent outcomes, the worse one is
+    typical."""
     by_ending: dict[str, list[int]] = {}
     for row in rows:
         by_ending.setdefault(ended[row], []).append(row)

@@ -18,7 +18,7 @@ def ranges_of(faults: Iterable[Fault], specs: Mapping[str, FaultSpec], models: F
     """The range of each parameter of `faults`: all drawn values and all that their specs can draw.
 
     `specs` maps names to specs; a fault without a spec contributes only its own values. With several
-    injections a parameter is `1.by`, `2.by`. Texts and truth values define the group, so they are not
+    injections, names are numbered: `1.by`, `2.by`. Texts and truth values define the group, so they are not
     included.
     """
     found: dict[str, set[_Value]] = {}

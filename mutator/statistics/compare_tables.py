@@ -12,8 +12,8 @@ from mutator.statistics.tallies import by_kind
 
 
 def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """The table of rates, stratified odds ratio and resampled difference, per activated and per injected
-    fault."""
+    """The table of rates, stratified odds ratio and resampled difference, of activated and of injected
+    faults."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -72,7 +72,7 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def pairs_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of McNemar's exact test on matched pairs, for all pairs and by fault type, adjusted over the
+    """The table of McNemar's exact test on matched pairs, in total and by fault type, adjusted over the
     types."""
     paired = contrasts.pairs(frame)
     lines: list[tuple[Cell, ...]] = []

@@ -25,8 +25,6 @@ _PAIR = ["fault_id", "scenario", "row", "seed"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stratum:
-    """The numbers of hazards and faults of one fault type, by method."""
-
     kind: str
     guided_hazards: int
     guided: int
@@ -44,7 +42,7 @@ class Stratum:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pooled:
-    """The Mantel-Haenszel estimate over fault types. Above 1, guided faults are more hazardous. NaN: not
+    """The Mantel-Haenszel estimate over fault types: above 1 if guided faults are more hazardous, NaN if not
     defined.
 
     `p` tests that the common odds ratio is 1, and `p_equal` that the odds ratio is the same in all types.
@@ -120,7 +118,7 @@ def fisher(stratum: Stratum) -> float:
 
 
 def holm(p_values: Sequence[float]) -> tuple[float, ...]:
-    """Adjust p-values by Holm's method (Scandinavian Journal of Statistics 6, 1979). The k-th smallest of n
+    """Adjust p-values by Holm's method (Scandinavian Journal of Statistics 6, 1979): the k-th smallest of n
     is multiplied by n - k + 1; results are monotone and at most 1. NaN stays NaN."""
     known = sorted((p, place) for place, p in enumerate(p_values) if not math.isnan(p))
     adjusted, largest = [math.nan] * len(p_values), 0.0
@@ -143,13 +141,11 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def mcnemar(paired: pd.DataFrame) -> Matched:
-    """Compare hazards in the guided (first) and the random (second) run of each pair."""
     return exact_mcnemar(paired["is_hazard_guided"], paired["is_hazard_random"])
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    """The hazard rate of guided runs minus that of random runs, with its `resampled_interval` over faults
-    (location and value). A fault is drawn with all its runs."""
+    """The hazard rate of guided runs minus that of random runs, with its `resampled_interval` over faults."""
     data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
     seen = float(_rate_difference(*data))
     low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)
@@ -171,7 +167,7 @@ def _sums(frame: pd.DataFrame) -> tuple[Any, Any, Any, Any]:
 def _rate_difference(
     guided_hazards: Any, random_hazards: Any, guided: Any, random: Any, axis: int = -1
 ) -> Any:
-    """The difference of hazards per run, from sums over faults along `axis`; NaN if a method has no run."""
+    """The difference of hazards per run, summed over faults along `axis`; NaN if a method has no run."""
     totals = [np.sum(x, axis=axis) for x in (guided_hazards, guided, random_hazards, random)]
     with np.errstate(invalid="ignore"):
         return totals[0] / totals[1] - totals[2] / totals[3]

@@ -20,7 +20,7 @@ _RANDOM = "random/"  # prefix of the trigger of a random partner: random/C1
 def load(results: Path) -> pd.DataFrame:
     """Load the usable experiments of a results.csv, in order. Raise MutatorError if the file is invalid.
 
-    Harness errors and invalid mutants are left out. Crashes and timeouts count as injected.
+    Harness errors and invalid mutants are left out; crashes and timeouts are injected faults.
     """
     return prepare(Results(results).texts())
 
@@ -62,13 +62,13 @@ _SHARED = (
 
 
 def slim(frame: pd.DataFrame, *more: str) -> pd.DataFrame:
-    """Keep only the columns that most statistics need (times, flags, names) and those in `more`. With all
-    columns, selecting rows from a million takes seconds."""
+    """Keep only the columns that most statistics need, and those in `more`. With all columns, selecting rows
+    from a million takes seconds."""
     flags = [hazard.lower() for hazard in hazard_names(frame)]
     wanted = {*_SHARED, *flags, *more}
     return frame[[name for name in frame.columns if name in wanted or name.startswith(("t_", "is_"))]]
 
 
 def hazard_names(frame: pd.DataFrame) -> tuple[str, ...]:
-    """The hazards in the table, sorted. NEAR, for example, has a flag `near` and a time `t_near`."""
+    """The hazards in the table, sorted. A hazard NEAR has a flag `near` and a time `t_near`."""
     return tuple(sorted(hazards_in(frame.columns)))

@@ -1,7 +1,7 @@
 """Medians with bootstrap intervals that resample whole faults with all their runs.
 
 Each draw takes as many faults as there are, with replacement. The interval covers the middle 95 % of the
-medians of the draws. The seed is fixed, so results are deterministic.
+medians of the draws. The seed is fixed.
 """
 
 import math
@@ -29,7 +29,7 @@ def median_interval(values: pd.Series, cluster: pd.Series) -> tuple[float, float
 
 
 def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -> Difference:
-    """The median of the second values minus that of the first, with its interval. Draws keep pairs together.
+    """The median of the second values minus that of the first, with its interval; draws keep pairs together.
     NaN without pairs. The interval is NaN in the same cases as in `median_interval`."""
     before, after = first.to_numpy(dtype=float), second.to_numpy(dtype=float)
     if not before.size:
@@ -39,8 +39,7 @@ def median_difference(first: pd.Series, second: pd.Series, cluster: pd.Series) -
 
 
 def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, float]:
-    """The interval of the median of the first sample. If there is a second sample, its median is
-    subtracted."""
+    """The interval of the median of the first sample, minus the median of the second if there is one."""
     codes, names = pd.factorize(cluster)
     alike = np.ptp(samples[0] if len(samples) == 1 else samples[0] - samples[1]) == 0 if codes.size else True
     if len(names) < 2 or alike:
@@ -57,15 +56,14 @@ def _interval(samples: list[np.ndarray], cluster: pd.Series) -> tuple[float, flo
 
 
 def _block_of(clusters: int, runs: int) -> int:
-    """The number of values per block. It grows with runs and clusters. It balances two costs: a product for
-    each block and cluster, and the work on each value in the block that has the median, about 50 times as
-    much."""
+    """The number of values per block. It balances two costs: a product for each block and cluster, and the
+    work on each value in the block that has the median, about 50 times as much."""
     return max(_BLOCK, math.isqrt(clusters * runs // 50))
 
 
 def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
-    """Yield batches of shape (draws, clusters) that say how often each cluster is drawn. In memory, each draw
-    also needs `others` cells."""
+    """Yield batches of shape (draws, clusters): how often each cluster is drawn. Each draw also needs memory
+    for `others` cells."""
     rng = np.random.default_rng(_SEED)
     batch = max(1, _CELLS // max(clusters, others))
     for begin in range(0, RESAMPLES, batch):
@@ -74,8 +72,8 @@ def _draws(clusters: int, others: int) -> Iterator[np.ndarray]:
 
 
 class _Sorted:
-    """Sorted values in blocks, with the number of values that each cluster has in each block. The median of a
-    draw is located first by block, then within the block."""
+    """Sorted values in blocks, with the number of each cluster's values in each block. The median of a draw
+    is located first by block, then within the block."""
 
     def __init__(self, values: np.ndarray, codes: np.ndarray, clusters: int, block: int) -> None:
         self._block = block

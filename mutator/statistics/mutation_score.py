@@ -1,8 +1,7 @@
 """The mutation score of a closed loop: the share of operator mutants that change the drives.
 
 Each mutant counts once, and it has an effect if any of its drives has that effect. Shares are of activated
-mutants; others are listed separately. Harness errors and invalid mutants are not counted (`frame.load`
-removes them).
+mutants; others are listed separately.
 """
 
 import math
@@ -42,11 +41,11 @@ _UNKNOWN_ALERTS = " The fault-free runs cannot be read, so alerts are not compar
 def drives_of(
     frame: pd.DataFrame, faults: Mapping[str, Fault], golden_alerts: GoldenAlerts | None
 ) -> pd.DataFrame:
-    """A frame with what the score counts: a row for each usable experiment of an operator mutant.
+    """A frame with a row for each usable experiment of an operator mutant.
 
     Columns: `mutant` (the fault's id), `operator`, `function` (`path::name`), `fault` (permanent or
-    transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive counts as active.
-    Without `golden_alerts`, there is no flag for alerts.
+    transient), a flag `active`, and a flag for each effect. A crashed or timed-out drive is active. Without
+    `golden_alerts`, there is no flag for alerts.
     """
     found = frame[frame["module"] == OPERATORS]
     broken = found["status"].isin([Status.CRASHED.value, Status.TIMEOUT.value])
@@ -92,9 +91,9 @@ def score_sheet(
     golden_alerts: GoldenAlerts | None,
     told: Sequence[str] = (),
 ) -> Sheet:
-    """The score in total, by operator and by function, for permanent and transient faults. If no operator
-    mutant has a result, the sheet has no lines. `faults` are those of the plan. `golden_alerts` are the
-    alerts that golden runs raise (None: not known). `told` describes the available mutants and exclusions."""
+    """The score in total, by operator and by function, for permanent and transient faults. Without results of
+    operator mutants, it has no lines. `faults` are those of the plan. `golden_alerts` are the alerts that
+    golden runs raise (None: not known). `told` describes the available mutants and exclusions."""
     drives = drives_of(frame, faults, golden_alerts)
     planned = {name for name, fault in faults.items() if fault.module == OPERATORS}
     missing = len(planned - set(drives["mutant"]))
@@ -111,7 +110,7 @@ def score_sheet(
 
 
 def totals(sheet: Sheet) -> Table:
-    """The lines over all mutants, with fewer columns."""
+    """The lines for all mutants, with fewer columns."""
     rows = [
         (f"{'all' if lasting == EITHER else lasting} {counted}", *map(_short, cells))
         for name, counted, lasting, *cells in sheet.lines
@@ -146,7 +145,6 @@ def _of_mutants(name: str, drives: pd.DataFrame) -> Iterator[tuple[Cell, ...]]:
 
 
 def _any_drive(drives: pd.DataFrame) -> pd.DataFrame:
-    """The flags of each mutant: set if they are set for any of its drives."""
     flags = [name for name in (_ACTIVE, *_EFFECTS) if name in drives]
     return drives.groupby("mutant")[flags].any()
 

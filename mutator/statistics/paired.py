@@ -1,7 +1,7 @@
 """Statistics of pairs, each observed under a first and a second condition.
 
 Runs of one fault are similar, so tests that treat pairs as independent overstate significance.
-`rate_difference` resamples whole faults instead. All formulas come from scipy and statsmodels.
+`rate_difference` resamples whole faults instead.
 """
 
 import math
@@ -22,8 +22,8 @@ _DIGITS = 9  # decimals of a time difference; absorbs rounding errors
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Matched:
-    """The numbers of pairs with the event under both conditions, only the first, only the second, or neither.
-    `p` is from McNemar's exact test that the event is equally likely under both."""
+    """Numbers of pairs with the event under both conditions, only the first, only the second, or neither. `p`
+    is from McNemar's exact test that the event is equally likely under both."""
 
     both: int
     first_only: int
@@ -117,7 +117,7 @@ def _mean(changes: Any, pairs: Any, axis: int = -1) -> Any:
 
 def times(first: pd.Series, second: pd.Series) -> Times:
     """Compare the times of complete pairs: medians, the median difference with an exact interval from order
-    statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs). All are from scipy."""
+    statistics, and p of Wilcoxon's signed-rank test (NaN if no time differs). From scipy."""
     from scipy.stats import quantile_test
 
     known = first.notna() & second.notna()

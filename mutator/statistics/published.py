@@ -13,8 +13,8 @@ Counts = Mapping[tuple[str, str], Tally]
 class Published:
     """Published counts by (method, scenario) and by (method, fault type), and texts for their tables.
 
-    `source` labels the rows. Titles and notes are added to those of the tables. `driver_s` is the reaction
-    time of the driver, in s, that the publication assumes.
+    `source` labels the rows. Titles and notes are added to those of the tables. `driver_s` is the driver's
+    reaction time that the publication assumes, in s.
     """
 
     source: str
@@ -29,5 +29,5 @@ class Published:
 
 
 def by_source(published: Published | None, ours: Counts) -> dict[str, Counts]:
-    """The counts by fault type: first the published ones, if there are any, then those of the run."""
+    """The counts by fault type: first the published ones, if any, then those of the run."""
     return ({published.source: published.by_kind} if published else {}) | {OURS: ours}

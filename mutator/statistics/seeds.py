@@ -1,7 +1,7 @@
 """The variation between a campaign's seeds. Each seed is the whole campaign with other draws.
 
-An interval over runs assumes independence and ignores the variation of draws. This module resamples whole
-seeds instead, which shows how much another campaign with as many seeds may differ.
+An interval over runs assumes independence and ignores the variation of draws. Resampling whole seeds shows
+how much another campaign with as many seeds may differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -36,7 +36,7 @@ def seeds_of(frame: pd.DataFrame) -> list[str]:
 
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
     """The table of each share over all faults and by method. `alerts` says whether the target has alerts.
-    With a single seed, the table has no lines."""
+    With a single seed, it has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL: np.ones(len(frame), dtype=bool)}
     if len(methods) > 1:
@@ -51,7 +51,7 @@ def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 
 def kinds_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of fewer shares, by fault type."""
+    """The table of activated faults and hazards, by fault type."""
     kinds = sorted(map(str, frame["kind"].unique()))
     groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
     return Sheet(
@@ -75,7 +75,7 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
 
 
 def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
-    """For each quantity, whether each run counts."""
+    """For each quantity, the runs that count."""
     hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
     return {
         _INJECTED: np.ones(len(frame), dtype=bool),

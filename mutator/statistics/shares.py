@@ -1,4 +1,4 @@
-"""A share with its interval."""
+"""Shares with their intervals."""
 
 import math
 from dataclasses import dataclass
@@ -9,8 +9,7 @@ _DIGITS = 12
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Share:
-    """A share: `count` of `of`, with the interval of the rate. The interval is NaN if there is none, for
-    example without data."""
+    """A share: `count` of `of`, with the interval of the rate, which is NaN if there is none."""
 
     count: int
     of: int
@@ -22,7 +21,7 @@ class Share:
         return self.count / self.of if self.of else math.nan
 
     def __str__(self) -> str:
-        """The share as text, such as `35.8 % (1316/3678; 34.2 to 37.3)`, or `- (0/0)` without data."""
+        """Text such as `35.8 % (1316/3678; 34.2 to 37.3)`, or `- (0/0)` without data."""
         if not self.of:
             return "- (0/0)"
         if math.isnan(self.low):

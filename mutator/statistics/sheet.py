@@ -1,4 +1,4 @@
-"""A table that can be written as Markdown, and as CSV with a column for each number."""
+"""A table that can be written as Markdown and CSV."""
 
 import csv
 import io
@@ -45,11 +45,9 @@ class Sheet:
     lines: tuple[tuple[Cell, ...], ...]
 
     def table(self) -> Table:
-        """The cells as display text."""
         return Table(heads=self.heads, rows=[[text_of(cell) for cell in line] for line in self.lines])
 
     def markdown(self) -> str:
-        """Title, note and table."""
         return f"## {self.title}\n\n{self.note}\n\n{self.table().as_markdown()}\n"
 
     def csv(self) -> str:
@@ -70,7 +68,6 @@ class Sheet:
         return pd.DataFrame(lines, columns=columns)
 
     def _unfolded(self, number: Callable[[float], object]) -> tuple[list[str], list[list[object]]]:
-        """The headings and lines, with each share split into five cells."""
         wide = [any(isinstance(line[i], Share) for line in self.lines) for i in range(len(self.heads))]
         columns = [
             name
@@ -96,7 +93,6 @@ def _number(value: float) -> str:
 
 
 def text_of(cell: Cell) -> str:
-    """The text that shows a cell."""
     if cell is None or (isinstance(cell, float) and math.isnan(cell)):
         return "-"
     return str(cell) if isinstance(cell, P | Rate) or not isinstance(cell, float) else f"{cell:.3g}"

@@ -21,7 +21,7 @@ def run_sheets(
     alerts: Alerts | None,
     ends: Mapping[str, float] | None,
 ) -> tuple[Sheet, ...]:
-    """The tables of a frame. Empty if they would only repeat counts, that is for one method without published
+    """The tables of a frame; none for one method without published counts, because they would only repeat
     counts.
 
     `alerts` are those of each run with a hazard (None: the target has no alerts); they decide which event

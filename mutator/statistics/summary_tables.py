@@ -1,5 +1,4 @@
-"""Summary tables by scenario and by fault type, with published numbers above those of the run and an interval
-in each cell."""
+"""Summary tables by scenario and by fault type, with published numbers above those of the run."""
 
 from collections.abc import Iterable
 
@@ -24,8 +23,7 @@ _NOTE = "95 % Wilson intervals; in brackets count/whole."
 
 
 def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """The table by scenario for one method: a column for each scenario of the run, and a total. `alerts` says
-    whether the target has alerts."""
+    """The table by scenario for one method, with a total. `alerts` says whether the target has alerts."""
     scenarios = sorted({scenario for how, scenario in ours if how == method})
     theirs = published.by_scenario if published else {}
     sources = _sources(method, ours, published, theirs, scenarios)
@@ -47,7 +45,7 @@ def summary_sheet(method: str, ours: Counts, published: Published | None, *, ale
 
 
 def coverage_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
-    """The table by fault type for one method: a line for each fault type of the run, and a total."""
+    """The table by fault type for one method, with a total."""
     kinds = sorted({kind for how, kind in ours if how == method})
     theirs = published.by_kind if published else {}
     # fault types in the order of the publication, then the rest
@@ -76,8 +74,7 @@ def _title(title: str, published: str) -> str:
 def _sources(
     method: str, ours: Counts, published: Published | None, theirs: Counts, names: Iterable[str]
 ) -> dict[str, dict[str, Tally | None]]:
-    """The published counts, if there are any for these groups, and those of the run, by group. None: not
-    published."""
+    """The published counts, if any, and those of the run, by group. None: not published."""
     groups = list(names)
     known = {name: theirs.get((method, name)) for name in groups}
     sources: dict[str, dict[str, Tally | None]] = {}

@@ -9,7 +9,7 @@ import pandas as pd
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tally:
-    """The numbers of a group's faults that were injected, activated and so on. None: not known.
+    """Numbers of a group's faults that were injected, activated and so on. None: not known.
 
     Alerts and hazards count from activation on. `hazards_no_alerts` counts hazards in runs without any alert.
     """
@@ -24,7 +24,6 @@ class Tally:
 
 
 def tally(frame: pd.DataFrame) -> Tally:
-    """Count the rows of a frame of results."""
     hazard, alert = frame["is_hazard"], frame["is_alert"]
     return Tally(
         injected=len(frame),

@@ -94,7 +94,7 @@ def orders_sheet(frame: pd.DataFrame) -> Sheet:
         lines += [(str(method), str(module), order, n) for order, n in times.hazard_orders(group).items()]
     return Sheet(
         name="hazard_orders",
-        title="Hazards that came together",
+        title="Order of hazards",
         note="Runs with at least one hazard, by their hazards in order of first occurrence.",
         heads=("method", "module", "hazards", "N"),
         lines=tuple(lines),

@@ -1,7 +1,7 @@
 """Propagation times: from activation to effects, and from the first alert to the first hazard.
 
 Times from alert to hazard are censored, because a hazard might have followed after the end of the run. The
-Kaplan-Meier estimate uses such runs up to their end. A mean over the other runs would be too short.
+Kaplan-Meier estimate uses such runs up to their end; a mean over the other runs would be too short.
 """
 
 import math
@@ -34,16 +34,16 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reaction:
-    """The times and shares from the first alert to a hazard. Times are in s. NaN: not reached or not defined.
+    """The times from the first alert to a hazard, in s, and their shares. NaN: not reached or not defined.
 
     `at_risk` is the number of runs with an alert before any hazard. Of these, `events` then had a hazard; the
     others are censored at their end. `median` is the time at which the Kaplan-Meier curve crosses one half.
-    If the curve is flat at one half, `median` is the middle of the flat section, as in R's `survfit` and SAS.
-    Without censoring, this is the ordinary median. If the flat section reaches the end of the curve, `median`
-    is the section's beginning. From `median_low` to `median_high`, the curve's log-log transformed interval
-    contains one half (Brookmeyer and Crowley 1982). An infinite end is not reached within the runs.
-    `survival` is the Kaplan-Meier share of alerts without a hazard within the driver's reaction time;
-    `in_time` is the share of the hazards after an alert that came later than this reaction time.
+    If the curve is flat at one half, `median` is the middle of the flat section, as in R's `survfit` and SAS;
+    if the flat section reaches the end of the curve, it is the section's beginning. From `median_low` to
+    `median_high`, the curve's log-log transformed interval contains one half (Brookmeyer and Crowley 1982).
+    An infinite end is not reached within the runs. `survival` is the Kaplan-Meier share of alerts without a
+    hazard within the driver's reaction time; `in_time` is the share of the hazards after an alert that came
+    later than this.
     """
 
     at_risk: int
@@ -140,7 +140,7 @@ def _median_interval(curve: Any) -> tuple[float, float]:
 
 def alerts_before(frame: pd.DataFrame, alerts: Alerts) -> dict[tuple[str, str], Share]:
     """By (hazard, alert), the share of the runs with this hazard in which the alert came first. The names
-    `any` and `none` stand for any alert and no alert.
+    `any` and `none` mean any alert and no alert.
 
     `alerts` has, by experiment id, the name and first time (s) of each alert of a run with a hazard.
     """

@@ -1,7 +1,7 @@
 """The hazard analysis as data: control structure, unsafe control actions, causal factors.
 
-Loading checks all references between the files and reports errors with file and line. `mutator.stpa.checks`
-compares the analysis with fault specs and target.
+Loading checks all references between the files. `mutator.stpa.checks` compares the analysis with fault specs
+and target.
 """
 
 from collections.abc import Collection, Mapping
@@ -188,7 +188,6 @@ def load_analysis(folder: Path) -> Analysis:
 
 
 def _known(source: Source, keys: Keys, what: str, name: str, known: Collection[str]) -> None:
-    """Raise MutatorError at `keys` unless `name` is known."""
     if name not in known:
         raise source.error(
             keys,

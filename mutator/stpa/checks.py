@@ -92,7 +92,7 @@ def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator
 
 
 def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield contexts that use a variable that is in no process model."""
+    """Yield contexts that use a variable in no process model."""
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
     for table in analysis.tables.values():
@@ -162,9 +162,8 @@ def _row(analysis: Analysis, context: str) -> ContextRow:
 
 
 def _judged(row: ContextRow, action: UnsafeActionModel) -> set[str]:
-    """The row's hazards for an action of that category. For wrong timing or duration, these are the hazards
-    of both columns.
-    """
+    """The row's hazards for an action of that category; for wrong timing or duration, those of both
+    columns."""
     verdicts = row.actions.get(action.action)
     if verdicts is None:
         return set()
@@ -188,7 +187,6 @@ def _causeless(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield modules of components and places of factors that do not exist in the target."""
     files = manifest.tree.files
     for name, component in analysis.structure.components.items():
         for i, path in enumerate(component.modules):
@@ -212,7 +210,7 @@ def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorErr
 
 
 def functions(code: bytes) -> Iterator[str]:
-    """The qualified names of a module's functions and of the methods of its classes."""
+    """The qualified names of a module's functions and methods."""
     for node in ast.parse(code).body:
         if isinstance(node, ast.FunctionDef):
             yield node.name

@@ -20,9 +20,7 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """The hazards of one control action in one context: if it is provided, and if it is not (None: no
-    hazard).
-    """
+    """The hazards of one control action in one context, if it is provided and if it is not."""
 
     provided: str | None
     not_provided: str | None
@@ -31,8 +29,7 @@ class Verdicts:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContextRow:
     """A context: its id (`C1`), its condition with constants inserted, and the verdict on each control
-    action.
-    """
+    action."""
 
     id: str
     condition: str
@@ -43,8 +40,7 @@ class ContextRow:
 @dataclass(frozen=True, kw_only=True)
 class ContextTable:
     """A context table of the hazard analysis. Its rows cover every situation exactly once; `coverage` has the
-    proof.
-    """
+    proof."""
 
     name: str
     about: str
@@ -67,7 +63,7 @@ class ContextTable:
     ) -> tuple[Trigger, ...]:
         """One trigger per row, or per row in `rows`, with the row's name; MutatorError for an unknown row.
 
-        A trigger is active while the row's condition holds, or for `hold_s` from its start.
+        A trigger is active while the row's condition holds, or for `hold_s`.
         """
         by_id = {row.id: row for row in self.rows}
         unknown = [name for name in rows or () if name not in by_id]

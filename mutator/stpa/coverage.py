@@ -1,6 +1,6 @@
 """Prove that the conditions of a context table cover every situation exactly once.
 
-The constants in the conditions divide each variable's axis into points and open intervals. All conditions are
+The constants in the conditions divide each variable's axis into points and open intervals. Conditions are
 constant within such a cell, so a test of one value per cell is a proof. Variables are treated as independent:
 a table that is complete only because one variable depends on another fails.
 """
@@ -42,7 +42,7 @@ class _BeyondError(Exception):
 
 
 def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
-    """Test the checked conditions of a table, row id -> condition, in every cell."""
+    """Test the conditions of a table, row id -> condition, in every cell."""
     try:
         cuts = _cuts(conditions.values())
     except _BeyondError as error:

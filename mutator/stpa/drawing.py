@@ -27,7 +27,7 @@ STYLE = (
 
 
 def draw(analysis: Analysis) -> str:
-    """Return the SVG text; the same analysis always gives the same text."""
+    """Return the SVG text, which is deterministic."""
     layout = lay_out(analysis.structure)
     height = layout.height + LEGEND
     lines = [

@@ -1,4 +1,4 @@
-"""Place the labels of arrows next to their arrow, clear of boxes, other arrows and other labels.
+"""Place labels next to their arrows, clear of boxes, other arrows and other labels.
 
 Lengths are in px, y points down. A label has two lines: what the arrow carries, and a second text from the
 drawing.
@@ -30,9 +30,8 @@ class Label:
 def place_labels(
     words: Mapping[str, str], arrows: Mapping[str, Sequence[Point]], boxes: Iterable[Area]
 ) -> dict[str, Label]:
-    """A place for the label of each arrow in `arrows` (its corners). If no place is clear, the preferred one
-    is used.
-    """
+    """A place for the label of each arrow in `arrows` (its corners); the preferred one if no place is
+    clear."""
     taken = list(boxes)
     lines = {name: [_around(a, b) for a, b in pairwise(points)] for name, points in arrows.items()}
     found: dict[str, Label] = {}
@@ -57,11 +56,8 @@ def _length(start: Point, end: Point) -> float:
 
 
 def _places(points: Sequence[Point], width: float) -> Iterator[Label]:
-    """Yield places for a label, the best first.
-
-    They are around the middle of a horizontal segment. At a vertical segment they are next to it, near the
-    tip, where fewest other arrows cross.
-    """
+    """Yield places for a label, the best first: around the middle of a horizontal segment, or next to a
+    vertical one, near the tip, where fewest other arrows cross."""
     (x1, y1), (x2, y2) = _bearer(points)
     if y1 == y2:
         middle, free = (x1 + x2) / 2, max(abs(x1 - x2) - width, 0) / 2

@@ -1,7 +1,7 @@
 """Lay out a control structure: rows of boxes, and between them channels with one track per arrow.
 
 Lengths are in px, y points down. An arrow that cannot go straight up or down gets a separate track between
-two rows. An arrow that would cross a box runs along the left margin.
+two rows; one that would cross a box runs along the left margin.
 """
 
 from collections import defaultdict
@@ -24,7 +24,7 @@ APART = 24  # distance between parallel arrows
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Box:
-    """A drawn component: left, top, width, height, and its lines of text."""
+    """A drawn component."""
 
     x: float
     y: float
@@ -52,8 +52,6 @@ class Arrow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Layout:
-    """The whole drawing."""
-
     boxes: dict[str, Box]
     arrows: dict[str, Arrow]
     width: float
@@ -172,8 +170,7 @@ def _spread(
     boxes: dict[str, Box],
 ) -> float:
     """The x of a link at the box `own`. The links of an edge are spread evenly, in the order of their other
-    ends.
-    """
+    ends."""
     other = links[name].to if links[name].from_ == own else links[name].from_
     mates = edges[own, boxes[own].row < boxes[other].row]
     mates = sorted(mates, key=lambda mate: _middle(boxes, links[mate], own))
@@ -181,8 +178,8 @@ def _spread(
 
 
 def _apart(x: float, toward: float, box: Box, others: list[float]) -> float:
-    """The place on the box's edge that is nearest to `x` and keeps its distance from `others`; it is added to
-    `others`.
+    """The place on the box's edge that is nearest to `x` and keeps its distance from `others`, to which it is
+    added.
 
     The side towards the other end, `toward`, is tried first, because this saves a crossing.
     """

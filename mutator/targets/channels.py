@@ -15,8 +15,7 @@ SUFFIXES = (".npz", ".csv", ".parquet", ".mcap")
 
 class Role(StrEnum):
     """A channel's role in a verdict: a fault has manifested if an `actuator` channel differs from the golden
-    run.
-    """
+    run."""
 
     ACTUATOR = "actuator"
     TRUTH = "truth"
@@ -24,7 +23,6 @@ class Role(StrEnum):
 
     @property
     def tolerance(self) -> float:
-        """The default tolerance; 0 for actuators."""
         return 0.0 if self is Role.ACTUATOR else ROUNDING
 
 
@@ -50,7 +48,6 @@ class Channel:
 
     @property
     def in_trace(self) -> str:
-        """The channel's name in the trace."""
         return self.source or self.name
 
 

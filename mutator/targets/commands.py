@@ -1,4 +1,4 @@
-"""How a manifest runs and films a target: modules, arguments, changes of a scenario."""
+"""How a manifest runs and films a target."""
 
 from collections.abc import Collection
 
@@ -10,7 +10,7 @@ from mutator.targets.placeholders import OF_FILMED_RUNS, OF_FILMS, OF_RUNS, chec
 
 
 class ChangeModel(StrictModel, title="A change"):
-    """Further arguments and, with them, the scenarios that the change makes identical."""
+    """Further arguments, and the scenarios that they make identical."""
 
     args: list[str] = Field(description="Further arguments.")
     same_in: list[str] = Field(
@@ -20,10 +20,9 @@ class ChangeModel(StrictModel, title="A change"):
 
 class EntryModel(StrictModel, title="The entry"):
     """Arguments may contain placeholders: `{scenario}` is the scenario's file, `{seed}` the seed, `{out}` the
-    folder for trace and record. `{cache}` is a folder that all runs of the target share. It may be
-    missing, unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it.
-    `{root}` is the target's root. A run may read other files from it, but must never write to it.
-    """
+    folder for trace and record. `{cache}` is a folder that all runs of the target share. It may be missing,
+    unwritable or damaged, and `mutator cache` deletes from it, so results must not depend on it. `{root}` is
+    the target's root, to which a run must never write."""
 
     module: str = Field(description="The module, which is run as `python -m` from the root.")
     args: list[str] = Field(
@@ -63,7 +62,6 @@ class FilmModel(StrictModel, title="Films"):
 
 
 def check_commands(entry: EntryModel, film: FilmModel | None, source: Source) -> None:
-    """Raise MutatorError, with the line, for an invalid module, placeholder or change."""
     for key, command in (("entry", entry), ("film", film)):
         if command and not all(part.isidentifier() for part in command.module.split(".")):
             raise source.error(
@@ -112,7 +110,6 @@ def _check_films(film: FilmModel, changes: Collection[str], source: Source) -> N
 
 
 def read_film(model: FilmModel | None) -> Film | None:
-    """The film commands of a manifest as a `Film`; None if it has none."""
     if model is None:
         return None
     return Film(

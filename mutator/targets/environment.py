@@ -1,6 +1,4 @@
-"""The environment of a target's processes: the variables that the harness sets, and those that a manifest
-adds.
-"""
+"""The environment of a target's processes: the variables that the harness or a manifest sets."""
 
 import re
 from collections.abc import Mapping
@@ -23,9 +21,8 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
 
 
 def check_environment(env: Mapping[str, str], source: Source) -> None:
-    """Check a manifest's `env`. MutatorError for a variable that cannot be set, or that the harness sets to
-    another value.
-    """
+    """Raise MutatorError for a variable in a manifest's `env` that cannot be set, or that the harness sets
+    differently."""
     for name, value in env.items():
         if FIXED.get(name) == value:
             continue

@@ -8,8 +8,7 @@ from mutator.triggers.conditions import check_condition, check_formula
 
 def condition(text: str | None, known: Collection[str], source: Source, keys: Keys) -> str:
     """The condition in canonical text ('' for none). It may use the names `known`; MutatorError at `keys` of
-    the manifest.
-    """
+    the manifest."""
     if text is None:
         return ""
     with source.placing(keys):

@@ -1,4 +1,4 @@
-"""Hazards and metrics as data: what a run must avoid, and numbers that measure how bad it was."""
+"""Hazards, which a run must avoid, and metrics, which measure how bad it was."""
 
 import ast
 from collections.abc import Collection
@@ -19,10 +19,8 @@ _WORSE = Literal["higher", "lower"]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Metric:
-    """A number for each run: an aggregate of `formula` over the steps in which `where` holds.
-
-    Steps after the end of the drive, the first terminal hazard, do not count.
-    """
+    """A number for each run: an aggregate of `formula` over the steps in which `where` holds, up to the first
+    terminal hazard."""
 
     name: str
     aggregate: Aggregate
@@ -41,7 +39,7 @@ class Hazard:
     It occurs when `when` has held for `for_s` seconds, or when the STL formula `stl` is violated and all
     values that the formula needs are known. `margin` is a step's distance from the hazard, in `unit`; for
     `stl` it is the robustness. Once `terminal` holds, the drive is over, and metrics ignore later steps ('':
-    never; `True`: from the hazard on). Later hazards still count.
+    never; `True`: from the hazard on). Later hazards are still recorded.
     """
 
     name: str
@@ -55,12 +53,11 @@ class Hazard:
 
     @property
     def recorded(self) -> bool:
-        """Whether the target's record, not the trace, reports the hazard."""
         return not (self.when or self.stl)
 
     @property
     def metric(self) -> Metric | None:
-        """The metric `margin_<hazard>`: a run's smallest margin; None without margins."""
+        """The metric `margin_<hazard>`: a run's smallest margin."""
         if not (self.margin or self.stl):
             return None
         return Metric(

@@ -13,7 +13,7 @@ def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
 
 
 def check_file(manifest: TargetManifest, named: str) -> None:
-    """Raise MutatorError, without a file position, unless faults may be injected into the named file."""
+    """Raise MutatorError, without a file position, unless faults may be injected into the file."""
     path = inside(named)
     if path != named or not path.endswith(".py") or path not in manifest.tree.files:
         raise MutatorError(

@@ -26,7 +26,7 @@ _DELTA_V = Metric(
     formula="",
     unit="m/s",
     worse="higher",
-    about="change of the own speed in the contact, from contact speed and masses",
+    about="change of the car's speed in the contact, from contact speed and masses",
 )
 FILM = "film"  # the output folder of a filmed run
 
@@ -46,8 +46,8 @@ class Film:
 class TargetManifest:
     """A target: its tree, how to run it, what it records.
 
-    An instance is a snapshot: `tree` is read once, so an object never mixes two states of the sources. To see
-    an edit, load the manifest again.
+    `tree` is read once, so an object never mixes two states of the sources. To see an edit, load the manifest
+    again.
     """
 
     name: str
@@ -97,7 +97,6 @@ class TargetManifest:
 
     @cached_property
     def tree(self) -> SourceTree:
-        """The target's files, read once."""
         tree = read_tree(self.root, self.files, self.overlay)
         for name in self.packages:
             if name not in tree.files and not any(path.startswith(f"{name}/") for path in tree.files):
@@ -117,7 +116,6 @@ class TargetManifest:
 
     @cached_property
     def plotted(self) -> tuple[Channel, ...]:
-        """The channels that are not compared."""
         return tuple(channel for channel in self.channels if channel.role is not Role.ACTUATOR)
 
     @cached_property
@@ -130,12 +128,11 @@ class TargetManifest:
 
     @cached_property
     def hazards(self) -> tuple[str, ...]:
-        """The names of the hazards."""
         return tuple(hazard.name for hazard in self.rules)
 
     @cached_property
     def measures(self) -> tuple[Metric, ...]:
-        """All numbers of a run: the margins of its hazards, its metrics and delta-v."""
+        """The margins of the hazards, the metrics and delta-v."""
         margins = [hazard.metric for hazard in self.rules if hazard.metric]
         return (*margins, *self.metrics, *([_DELTA_V] if self.contact else []))
 
@@ -145,7 +142,7 @@ class TargetManifest:
         return (self.trace_file, *([self.record_file] if self.record_file else []))
 
     def reads_any(self, paths: Iterable[str]) -> bool:
-        """Whether a run itself reads one of these files, so that its caches depend on it."""
+        """Whether a run reads one of these files, so that its caches depend on it."""
         return any(matches(path, self.reads_itself) for path in paths)
 
     def arguments(
@@ -185,7 +182,6 @@ class TargetManifest:
 
 
 def _names_of(rules: Iterable[Hazard], metrics: Iterable[Metric], known: Collection[str]) -> set[str]:
-    """The names from `known` that the formulas of hazards and metrics use."""
     texts = [text for rule in rules for text in (rule.when, rule.margin, rule.terminal)]
     texts += [text for metric in metrics for text in (metric.formula, metric.where)]
     in_stl = (name for rule in rules for name in stl.names_in(rule.stl, known))

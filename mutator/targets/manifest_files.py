@@ -122,7 +122,7 @@ def upgrade_manifest(path: Path) -> Upgrade | None:
 
 
 def load_manifest(path: Path, root: Path | None = None, overlay: Path | None = None) -> TargetManifest:
-    """Read `fault_library/targets/<name>.yaml`; `root` and `overlay` override the values in the file."""
+    """Read a manifest; `root` and `overlay` override the values in the file."""
     model, source = read(path, ManifestModel, SCHEMA, older={OLD: upgraded})
     requires = read_requirements(model.requires, source)
     folder = (root or find_root(model.root, source, requires)).resolve()
@@ -209,7 +209,6 @@ def _check_recorded(source: Source, hidden: Collection[str]) -> None:
 
 
 def _check_events(model: ManifestModel, source: Source) -> None:
-    """Check that names of hazards and alerts are valid in tables and unique."""
     for key in ("hazards", "alerts"):
         seen = set[str]()
         names = getattr(model, key)

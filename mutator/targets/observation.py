@@ -28,10 +28,7 @@ _ARGUMENTS = {"abs": (1, 1), "float": (1, 1), "len": (1, 1), "hypot": (2, 2)}  #
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Value:
     """An observed value. `text` is an expression at the place; for a derived value it is a formula over
-    earlier values.
-
-    `unit` is for tables, `-` for none.
-    """
+    earlier values."""
 
     name: str
     text: str
@@ -41,9 +38,8 @@ class Value:
 
 @dataclass(frozen=True, kw_only=True)
 class Observation:
-    """Where a target is observed. `time` is an expression for the time (s) there; None: the probe counts
-    steps.
-    """
+    """Where a target is observed. `time` is an expression for the time (s); if it is None, the probe counts
+    steps."""
 
     location: FaultLocation
     time: str | None
@@ -52,17 +48,17 @@ class Observation:
 
     @property
     def expressions(self) -> tuple[tuple[str, str], ...]:
-        """The names and expressions that the probe evaluates at the place."""
+        """The names and expressions that the probe evaluates."""
         time = () if self.time is None else ((TIME, self.time),)
         return (*time, *((value.name, value.text) for value in self.values))
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
-        """The variables for conditions: the time, the observed values and the derived values."""
+        """The names for conditions: the time, the observed values and the derived values."""
         return (TIME, *(value.name for value in (*self.values, *self.derived)))
 
     def inputs(self, names: Iterable[str]) -> frozenset[str]:
-        """These names, and the inputs of those names that are derived values."""
+        """These names, and the inputs of those that are derived values."""
         found = set(names)
         for value in reversed(self.derived):
             if value.name in found:
@@ -71,8 +67,7 @@ class Observation:
 
     def judgeable(self, channels: Iterable[str]) -> tuple[str, ...]:
         """The names that formulas over a trace with these channels can use: time, channels, and values
-        derived from them.
-        """
+        derived from them."""
         known = dict.fromkeys((TIME, *(name for name in channels if name.isidentifier())))
         for value in self.derived:
             if all(name in known for name in names_in(value.text)):
@@ -116,7 +111,6 @@ class ObservationModel(StrictModel, title="The observation"):
 
 
 def read_observation(model: ObservationModel, source: Source) -> Observation:
-    """Read a manifest's observation; errors give the position in `source`."""
     location = model.at.location(source, ("observation", "at"))
     if location.anchor.kind in VALUE_ANCHORS | FIXED_ANCHORS:
         raise source.error(

@@ -12,12 +12,10 @@ _PLACEHOLDER = re.compile(r"\{([A-Za-z_]\w*)\}")
 
 
 def filled(arguments: Iterable[str], values: Mapping[str, str]) -> list[str]:
-    """The arguments with each `{name}` replaced by its value."""
     return [_PLACEHOLDER.sub(lambda found: values[found[1]], argument) for argument in arguments]
 
 
 def check_placeholders(arguments: Sequence[str], known: Sequence[str], source: Source, keys: Keys) -> None:
-    """Raise MutatorError, with the argument's line in `keys`, for an unknown placeholder."""
     for i, argument in enumerate(arguments):
         for name in _PLACEHOLDER.findall(argument):
             if name not in known:

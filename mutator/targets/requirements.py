@@ -32,8 +32,7 @@ def read_requirements(texts: Sequence[str], source: Source) -> tuple[Requirement
 
 def shortcoming(wanted: Requirement) -> str:
     """What is wrong with a package: `not installed`, or the installed version. Empty if it is installed as
-    required, or not needed here.
-    """
+    required, or not needed here."""
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return ""
     try:
@@ -45,9 +44,7 @@ def shortcoming(wanted: Requirement) -> str:
 
 
 def check_requirements(manifest: "TargetManifest") -> None:
-    """Raise MutatorError, with the command that installs them, if packages are missing or have wrong
-    versions.
-    """
+    """Raise MutatorError, with the install command, if packages are missing or have wrong versions."""
     found = {wanted: problem for wanted in manifest.requires if (problem := shortcoming(wanted))}
     if found:
         first = manifest.requires.index(next(iter(found)))
@@ -60,5 +57,4 @@ def check_requirements(manifest: "TargetManifest") -> None:
 
 
 def pip_install(wanted: Iterable[Requirement | str]) -> str:
-    """The pip command that installs these requirements."""
     return " ".join(["pip install", *(f"'{one}'" for one in wanted)])

@@ -15,10 +15,8 @@ INSTALLED = "installed:"  # prefix of an import package's name, as `root` of a m
 
 
 def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Path:
-    """Find the folder that a manifest's `root` names; it may not exist.
-
-    An installed package is located without importing it. If it is missing, the error says what to install.
-    """
+    """Find the folder that a manifest's `root` names; it may not exist. An installed package is not
+    imported."""
     if root == SHIPPED_TARGET:
         return shipped_folder() / "target"
     if not root.startswith(INSTALLED):
@@ -38,7 +36,6 @@ def find_root(root: str, source: Source, requires: Sequence[Requirement]) -> Pat
 
 
 def find_overlay(overlay: str | None, source: Source) -> Path | None:
-    """Find the overlay folder, relative to the manifest or its library."""
     path = source.path
     if overlay is None:
         return None

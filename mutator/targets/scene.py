@@ -1,4 +1,4 @@
-"""A scene: data for drawing a drive from above, which the report does."""
+"""Data for drawing a drive from above."""
 
 import math
 from collections.abc import Collection
@@ -18,8 +18,7 @@ class Actor:
     """Something that moves. Formulas over channels give its centre (`x`, `y`) in m and `heading` (rad, left
     positive).
 
-    `width` is the diameter of a circle. The actor is drawn while `visible` holds. A `believed` actor is at
-    the place that the controller assumes.
+    `width` is the diameter of a circle. A `believed` actor is at the place that the controller assumes.
     """
 
     name: str
@@ -46,10 +45,8 @@ class Line:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """What can be drawn of a drive. `follow` is the actor that the view follows ('': none).
-
-    `speed` is a formula for the speed (m/s) at which the origin moves along x.
-    """
+    """What can be drawn of a drive. `follow` is the actor that the view follows ('': none). `speed` is a
+    formula for the speed (m/s) at which the origin moves along x."""
 
     actors: tuple[Actor, ...]
     lines: tuple[Line, ...]
@@ -106,7 +103,6 @@ class SceneModel(StrictModel, title="The scene"):
 
 
 def read_scene(model: SceneModel, known: Collection[str], source: Source) -> Scene:
-    """Read a manifest's scene; formulas may use the names `known`. MutatorError with the mistake's line."""
     if model.follow is not None and model.follow not in model.actors:
         raise source.error(
             ("scene", "follow"),

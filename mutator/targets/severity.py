@@ -19,11 +19,8 @@ _KPH = UNITS["kph"].factor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """How severe a contact is.
-
-    A contact is the terminal hazard `hazard`. The metric `speed` is the closing speed (m/s), masses are in
-    kg, and `scale` names the scale of the classes.
-    """
+    """How severe a contact, the terminal hazard `hazard`, is. The metric `speed` is the closing speed (m/s),
+    masses are in kg, and `scale` names the scale of the classes."""
 
     hazard: str
     speed: str
@@ -32,18 +29,15 @@ class Contact:
     scale: str
 
     def delta_v(self, closing: float) -> float:
-        """The change of the ego car's speed in m/s, in an inelastic collision along the line of travel.
-
-        It is 0 if the closing speed is not positive.
-        """
+        """The change of the ego car's speed in m/s, in an inelastic collision along the line of travel; 0 if
+        the closing speed is not positive."""
         return max(closing, 0.0) * self.other_mass / (self.mass + self.other_mass)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scale:
     """The classes of delta-v: (name, least delta-v in m/s, meaning), the mildest first, from 0; `source`
-    cites the bounds.
-    """
+    cites the bounds."""
 
     name: str
     about: str
@@ -52,7 +46,6 @@ class Scale:
 
     @classmethod
     def from_plain(cls, data: Mapping[str, Any]) -> "Scale":
-        """Create the scale from what `plain` returned."""
         classes = tuple((name, float(least), about) for name, least, about in data["classes"])
         return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
 
@@ -88,7 +81,7 @@ class _ClassModel(StrictModel, title="A class"):
     from_kph: float = Field(
         ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
     )
-    about: str = Field(description="The harm that the class stands for.")
+    about: str = Field(description="The harm that the class means.")
 
 
 class ScaleModel(StrictModel, title="severity/*.yaml"):

@@ -1,4 +1,4 @@
-"""A target's files in memory: read once, hashed once, with a cache of data derived from them."""
+"""A target's files in memory, with a cache of data derived from them."""
 
 import os
 import re
@@ -53,14 +53,13 @@ class SourceTree:
         return cast("T", self._derived[key])
 
     def named(self, where: str) -> str:
-        """The path, relative to the target's folders, of a file that a spec names."""
+        """The path of a file as a spec names it, relative to the root or the overlay."""
         for folder in (self.root, self.overlay or self.root):
             where = where.removeprefix(f"{folder}{os.sep}")
         return where
 
     @property
     def digests(self) -> dict[str, str]:
-        """The digest of each file, by path."""
         return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
@@ -74,15 +73,13 @@ def _entries(files: Mapping[str, bytes]) -> dict[str, str]:
 
 
 def _digest(entries: Mapping[str, str]) -> str:
-    """The digest of a tree, from the canonical text of its sorted [path, digest] entries."""
     return digest(f"[{','.join(entries[path] for path in sorted(entries))}]".encode())
 
 
 def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> SourceTree:
-    """Read the files of `root` that match and all of `overlay`, except bytecode.
+    """Read the files of `root` that match and all of `overlay`, except bytecode. Links are followed.
 
-    A link counts as the file or folder to which it points. MutatorError for a dangling link, and for a path
-    that is in both folders.
+    MutatorError for a dangling link, and for a path that is in both folders.
     """
     files = _read(root, tuple(globs))
     laid_over = _read(overlay, ("**",)) if overlay else {}
@@ -107,7 +104,6 @@ def read_tree(root: Path, globs: Iterable[str], overlay: Path | None = None) -> 
 
 
 def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
-    """The files of a folder that match, by their path in it, sorted."""
     folders = {_SPECIAL.split(glob)[0].rpartition("/")[0] for glob in globs}
     found = {path: path.relative_to(root).as_posix() for name in folders for path in _below(root / name)}
     files = {}

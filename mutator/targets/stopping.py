@@ -16,9 +16,9 @@ def stop_source(manifest: TargetManifest) -> str:
     """Return the source of a function `over(recorded)`, which says whether a terminal hazard holds in a step.
 
     `recorded` has the step's values, by their names in the trace. The code needs `math`, and `min` and `max`
-    that propagate NaN. MutatorError if the target has no terminal hazard or no `entry.stepwise`. MutatorError
-    also for a hazard that cannot be decided from one step: it must last, looks at earlier steps, is judged by
-    the record or by temporal logic, or uses a channel that is not recorded in each step.
+    that propagate NaN. MutatorError if the target has no terminal hazard or no `entry.stepwise`, and for a
+    hazard that cannot be decided from one step: it must last, looks at earlier steps, is judged by the record
+    or by temporal logic, or uses a channel that is not recorded in each step.
     """
     if manifest.stepwise is None:
         raise _refused(manifest, ("entry",), "no `stepwise`", "a run that can be ended between two steps")

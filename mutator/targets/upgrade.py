@@ -37,9 +37,8 @@ _DERIVED = {
 
 
 def upgraded(source: Source) -> Source:
-    """The manifest as target/2; its values keep their line numbers. MutatorError if a key that target/1
-    requires is missing.
-    """
+    """The manifest as target/2, with the old line numbers. MutatorError if a key that target/1 requires is
+    missing."""
     data, lines = dict(source.data), dict(source.lines)
     _check_complete(data, _REQUIRED, source, ())
     if isinstance(observation := data["observation"], dict):
@@ -76,10 +75,8 @@ def _observation(old: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 
 def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
-    """Convert `compare` and `plot`, and remove them from `data`. They become actuators and internal channels.
-
-    A channel in both becomes an actuator.
-    """
+    """Convert `compare` and `plot` to actuators and internal channels, and remove them from `data`. A channel
+    in both becomes an actuator."""
     channels = dict[str, Any]()
     for key, role in (("compare", "actuator"), ("plot", "internal")):
         for name, channel in data.pop(key, {}).items():
@@ -154,7 +151,7 @@ def _line_by_line(text: str, source: Source, new: dict[str, Any]) -> Upgrade:
 
 
 def _comments(text: str) -> list[tuple[int, str]]:
-    """The line (from 0) and text of each comment; a `#` in a value does not count."""
+    """The line (from 0) and text of each comment."""
     masked = list(text)
     for token in yaml.scan(text, Loader=yaml.SafeLoader):
         if isinstance(token, yaml.ScalarToken):

@@ -1,7 +1,6 @@
 """Audit a run folder: check that everything in it follows from its content. Executes nothing.
 
-Digests and checksums are checked first, then the content: ids and plan, golden runs, sources, trees and
-patches, verdicts, proof, tables. Each step lists all differences.
+Digests and checksums are checked before the content. Each step lists all differences.
 """
 
 from collections.abc import Iterator
@@ -42,7 +41,7 @@ class Check:
 
     @classmethod
     def of(cls, what: str, count: int, problems: Problems) -> "Check":
-        """Collect all problems in a check. If `problems` raises an error, it comes last."""
+        """Collect all problems in a check. An error that `problems` raises comes last."""
         found = []
         try:
             for problem in problems:
@@ -63,21 +62,19 @@ class Check:
 def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
     """Audit a complete run folder.
 
-    Trees and patches are compared only with the run's own sources. If `workspace` is None or has other
-    sources, that is also a difference.
+    Trees and patches are compared only with the run's own sources. It is also a difference if `workspace` is
+    None or has other sources.
     """
     head = folder.head
-    here = Check.of("sources that are those of the run", len(head["sources"]), _sources(folder, workspace))
+    here = Check.of("sources that match those of the run", len(head["sources"]), _sources(folder, workspace))
     manifest = workspace.manifest(head["target"]) if workspace and not here.differences else None
     records, proven = recorded(folder, "records"), recorded(folder, "proof")
     checks = [
-        Check.of("files, lines and ids that are as they were written", _files(folder), _content(folder)),
+        Check.of("files, lines and ids that are unchanged", _files(folder), _content(folder)),
         Check.of(
             "ids, plan digest and run.json that follow from the plan", head["experiments"], _plan(folder)
         ),
-        Check.of(
-            "golden runs that are those of the checks", len(head["goldens"]), _goldens(folder, manifest)
-        ),
+        Check.of("golden runs that match the checks", len(head["goldens"]), _goldens(folder, manifest)),
         here,
     ]
     if workspace and manifest:
@@ -88,16 +85,16 @@ def audit_checks(folder: RunFolder, workspace: Workspace | None) -> list[Check]:
             "verdicts that follow from what was recorded", len(records), verdicts(head, records, manifest)
         ),
         Check.of(
-            "records of the proof that are those of the run", len(proven), proof(folder, records, proven)
+            "records of the proof that match those of the run", len(proven), proof(folder, records, proven)
         ),
-        Check.of("series that are as they were written", *series(folder)),
+        Check.of("series that are unchanged", *series(folder)),
         Check.of("tables that follow from the records", *tables(folder)),
     ]
     return checks
 
 
 def _files(folder: RunFolder) -> int:
-    """Check the files that have digests; return their number and the problems."""
+    """The number of files with digests."""
     try:
         return len(digests.read(folder.path).names) if folder.verifiable else 0
     except MutatorError:
@@ -122,8 +119,7 @@ def _content(folder: RunFolder) -> Problems:
 
 def _plan(folder: RunFolder) -> Problems:
     """Check that ids follow from the plan's lines, the digest from the ids, and run.json and plan.csv from
-    both.
-    """
+    both."""
     run, head = folder.path, folder.head
     yield from plan_file.problems(run)
     plan = load_plan(folder)
@@ -143,7 +139,9 @@ def _plan(folder: RunFolder) -> Problems:
             expected = f"{value}, which follows from {plan_file.EXPERIMENTS} and {CAMPAIGN}"
             yield MutatorError(f"{key} {head[key]}", where=run / HEAD, expected=expected)
     if Digest.of_file(run / CSV) != Digest.of(plan_csv(plan)):
-        yield MutatorError("not the plan", where=run / CSV, expected=f"what {plan_file.EXPERIMENTS} has")
+        yield MutatorError(
+            "differs from the plan", where=run / CSV, expected=f"what {plan_file.EXPERIMENTS} has"
+        )
 
 
 def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
@@ -164,7 +162,7 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
-    """Check that target, manifest, templates and scenarios are those of the plan."""
+    """Check that the workspace has the sources that the run was planned with."""
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(

@@ -33,7 +33,6 @@ class Recorded:
     record: Record
 
     def difference(self, got: str, expected: str) -> MutatorError:
-        """The error for an inconsistent record."""
         name = self.record.experiment_id
         return MutatorError(f"{name}: {got}", where=self.path, line=self.line, expected=expected)
 
@@ -61,10 +60,8 @@ def recorded(folder: RunFolder, kind: str) -> list[Recorded]:
 def mutants(
     folder: RunFolder, records: Sequence[Recorded], manifest: TargetManifest, models: FaultModels
 ) -> Iterator[MutatorError]:
-    """Yield trees and patches of records that differ from those of the rebuilt mutants.
-
-    Also yields stored patches that are missing, differ, or belong to no experiment.
-    """
+    """Yield trees and patches of records that differ from those of the rebuilt mutants, and stored patches
+    that are missing, differ, or belong to no experiment."""
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     built: dict[tuple[str, Trigger], tuple[str, str]] = {}
     for one in records:
@@ -96,7 +93,7 @@ def mutants(
 
 
 def _built(manifest: TargetManifest, models: FaultModels, fault: Fault, trigger: Trigger) -> tuple[str, str]:
-    """Digests of a mutant's tree and patch; empty if the mutant cannot be built."""
+    """Digests of a mutant's tree and patch; empty if it cannot be built."""
     try:
         mutant = build(manifest, models, fault, trigger)
     except InvalidMutant:
@@ -120,7 +117,6 @@ Flaws = Iterator[tuple[str, str]]  # found, expected
 
 
 def _flaws_of_end(record: Record) -> Flaws:
-    """Flaws of a run that finished normally."""
     activation = record.activation
     follows = judge(activation=activation, t_manifest=record.t_manifest, hazards=record.hazards)
     if record.outcome != follows:
@@ -137,7 +133,6 @@ def _flaws_of_end(record: Record) -> Flaws:
 
 
 def _flaws_of_bad_end(record: Record) -> Flaws:
-    """Flaws of a run without an outcome."""
     told = {
         "outcome": record.outcome,
         "t_manifest": record.t_manifest,
@@ -157,8 +152,7 @@ def _flaws_of_bad_end(record: Record) -> Flaws:
 
 def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping[str, float]) -> Flaws:
     """Hazards or channels that the target does not have, and differences beyond the tolerance without a
-    manifestation.
-    """
+    manifestation."""
     strangers = [name for name, _ in record.hazards if name not in head["hazards"]]
     if strangers:
         yield f"hazard {strangers[0]}", f"one of {', '.join(head['hazards'])}"
@@ -195,7 +189,6 @@ def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
 
 
 def _in_order(events: Events, activation: Activation | None) -> bool:
-    """Whether events are in the form that records have."""
     if activation is None:
         return not events
     times = [time for _, time in events]
@@ -206,9 +199,7 @@ def _in_order(events: Events, activation: Activation | None) -> bool:
 def proof(
     folder: RunFolder, records: Sequence[Recorded], proven: Sequence[Recorded]
 ) -> Iterator[MutatorError]:
-    """Yield problems of the proof: records that differ from the run's or are not in its sample, and missing
-    ones.
-    """
+    """Yield records of the proof that differ from the run's or are not in its sample, and missing ones."""
     place = folder.path / equivalence.FOLDER
     if not place.is_dir():
         modes = {str(line.get("engine")) for line in folder.timings().values()}

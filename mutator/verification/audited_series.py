@@ -10,10 +10,7 @@ from mutator.store.series_packing import segments
 
 
 def series(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of series files, and their problems: damaged files, and missing files that others need.
-
-    A folder without series is valid.
-    """
+    """The number of series files, and their problems: damaged files, and missing files that others need."""
     there = SeriesFolder(folder.path)
     return sum(path.is_file() for path in there.path.rglob("*")), _problems(folder, there)
 
@@ -66,7 +63,7 @@ def _told(err: MutatorError, got: str, remedy: str) -> MutatorError:
 
 
 def _users(index: Index, chunk: str) -> list[str]:
-    """The experiments that need a chunk for their own series or for the series of their golden run."""
+    """The experiments that need a chunk for their own series or for that of their golden run."""
     inside = {number for number, (name, _) in enumerate(index.places) if name == chunk}
     goldens = {key for key, number in index.goldens.items() if number in inside}
     return [

@@ -15,10 +15,8 @@ _REMEDY = "`mutator report` rebuilds it"
 
 
 def tables(folder: RunFolder) -> tuple[int, Iterator[MutatorError]]:
-    """The number of tables, and their differences.
-
-    Missing tables are no difference, because they are built when needed.
-    """
+    """The number of tables, and their differences. Missing tables are no difference: they are built when
+    needed."""
     there = [name for name in results.TABLES if (folder.path / name).is_file()]
     return len(there), _differences(folder, there)
 

@@ -1,6 +1,5 @@
-"""The canary: a fault known to be harmful. It counts as harmless only if every value of its variant is
-harmless.
-"""
+"""The canary: a fault known to be harmful. It fails its check only if every value of its variant is
+harmless."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -29,7 +28,6 @@ def tries(workspace: Workspace, manifest: TargetManifest, canary: Experiment) ->
 
 
 def job(workspace: Workspace, manifest: TargetManifest, experiment: Experiment) -> Job:
-    """The run of a canary."""
     built = build(manifest, workspace.fault_models(), experiment.fault, experiment.trigger)
     return Job(
         name=f"canary-{experiment.id}",

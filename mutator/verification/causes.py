@@ -18,7 +18,7 @@ _REMEDIES = {
     HASH: "do not depend on hashes; use `sorted(...)` where a set's order matters",
 }
 _UNKNOWN = (
-    "no line of the target was seen to read a clock, draw without a seed or start a thread; "
+    "no line of the target read a clock, drew without a seed or started a thread; "
     "check its inputs (files, the network) and the state of its libraries"
 )
 
@@ -26,7 +26,7 @@ _UNKNOWN = (
 def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: bool) -> tuple[list[Place], str]:
     """The most suspicious lines, likeliest first, and the remedies.
 
-    `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise. This points to set order
+    `by_hash` means that runs agree with equal PYTHONHASHSEED and differ otherwise, which points to set order
     or hashes. `watched` has the notes of a watched run.
     """
     noted = watched.get("noted", [])
@@ -42,12 +42,12 @@ def likely(manifest: TargetManifest, watched: Mapping[str, Any], *, by_hash: boo
 
 
 def sets(manifest: TargetManifest) -> list[Place]:
-    """Lines of target files that depend on the order of a set. Files that may have faults come first."""
+    """Lines of target files that depend on the order of a set. Files that may not have faults come last."""
     found = []
     for path in sorted(manifest.tree.files, key=lambda path: (matches(path, manifest.forbid), path)):
         if path.endswith(".py"):
             for one in set_order.places(manifest.tree.files[path]):
-                what = f"in {one.function}: goes through a set in its order, {one.what}"
+                what = f"in {one.function}: uses the order of a set, {one.what}"
                 found.append(Place(file=path, line=one.line, what=what))
     return found
 
@@ -58,7 +58,6 @@ def of_kind(watched: Mapping[str, Any], kind: str) -> list[Place]:
 
 
 def place_of(noted: Mapping[str, Any]) -> Place:
-    """The place of a line that a watched run noted."""
     via = f" by {noted['via']}" if noted["via"] else ""
     what = f"in {noted['function']}{via}: {noted['what']}"
     return Place(file=noted["file"], line=noted["line"], what=what)

@@ -1,4 +1,4 @@
-"""Check whether this machine can run campaigns, with one finding for each requirement."""
+"""Check whether this machine can run campaigns."""
 
 import fcntl
 import importlib.metadata
@@ -53,7 +53,7 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Check that each package that mutator requires (extras excluded) is present in an allowed version."""
+    """Check that each package that mutator requires (extras excluded) has an allowed version."""
     for line in importlib.metadata.requires("mutator") or ():
         wanted = Requirement(line)
         if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
@@ -102,7 +102,6 @@ def _folder() -> Finding:
 
 
 def _child() -> Finding:
-    """Start a fresh, isolated interpreter with limits, as experiments do."""
     command = [sys.executable, "-P", "-s", "-c", "import numpy; print(numpy.__version__)"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)

@@ -15,7 +15,6 @@ _NAME = "draws"
 
 
 def unused_draws(specs: tuple[FaultSpec, ...], models: FaultModels) -> Finding:
-    """The finding about draws and fault-model parameters that nothing uses."""
     places = [*_of_specs(specs, models), *_of_models(models)]
     if not places:
         return Finding(name=_NAME, level=Level.OK, found="all drawn values are used")
@@ -49,7 +48,6 @@ def _uses(injection: InjectionSpec, name: str, models: FaultModels) -> bool:
 
 
 def _of_models(models: FaultModels) -> Iterator[Place]:
-    """Parameters that the template of their model does not mention."""
     environment = ImmutableSandboxedEnvironment()
     for model in models:
         try:

@@ -2,7 +2,7 @@
 
 Each scenario runs twice without a fault, with two hash seeds. In the second run, a probe counts how often
 each statement with faults executes, and calls that prevent determinism are noted. If the runs differ, further
-runs without the probe and with both hash seeds show the cause.
+runs show the cause.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -43,10 +43,9 @@ _MOST = 20  # places listed in a finding
 def check_drive(workspace: Workspace, target: str, scenarios: Sequence[str] = ()) -> list[Finding]:
     """The findings from golden runs of the scenarios (default: those of the library's campaigns, or all).
 
-    They cover determinism, obstacles to forking, statements with faults that never run, triggers that never
-    hold, and harmless canaries. For a target that is not deterministic, they name likely causes. Raises
-    MutatorError for an unknown scenario or a mistake in the library; `check_library` reports all such
-    mistakes.
+    They cover determinism and the causes of its absence, obstacles to forking, statements with faults that
+    never run, triggers that never hold, and harmless canaries. Raises MutatorError for an unknown scenario or
+    a mistake in the library; `check_library` reports all such mistakes.
     """
     with ScratchFolder("mutator-drive-") as scratch:
         return _Drive(workspace, target, scenarios, scratch).findings()
@@ -57,7 +56,7 @@ class _Golden:
     """The runs of a scenario.
 
     `first` runs the pristine target, and `watched` the counting mutant with another hash seed. `again` runs
-    the pristine target with that seed, or is `watched` if no third run is needed.
+    the pristine target with that seed; if no third run is needed, it is `watched`.
     """
 
     first: Execution
@@ -66,8 +65,6 @@ class _Golden:
 
 
 class _Drive:
-    """The runs of one check, in a scratch folder."""
-
     def __init__(self, workspace: Workspace, target: str, scenarios: Sequence[str], scratch: Path) -> None:
         self.workspace = workspace
         self.manifest: TargetManifest = workspace.manifest(target)
@@ -91,7 +88,6 @@ class _Drive:
         self.engine = ReferenceEngine(self.manifest, base, work, limits)
 
     def findings(self) -> list[Finding]:
-        """All findings, most important first."""
         with ThreadPoolExecutor(usable_cores()) as pool:
             jobs = [job for name in self.scenarios for job in self._jobs(name)]
             runs = dict(zip((job.name for job in jobs), pool.map(self._run, jobs), strict=True))
@@ -114,7 +110,7 @@ class _Drive:
         yield self._counting(scenario, self.setting)
 
     def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
-        """The runs of a scenario. The third runs only if the first two differ."""
+        """The runs of a scenario. The third is needed only if the first two differ."""
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         one, other = self._look(first), self._look(watched)
         if one.problem or (one.digest == other.digest and not other.problem):
@@ -164,7 +160,6 @@ class _Drive:
         return self._not_deterministic(name, golden, by_hash=same.digest == first.digest)
 
     def _not_deterministic(self, name: str, golden: _Golden, *, by_hash: bool) -> Finding:
-        """Report where the runs first differ, and the likely causes."""
         where = first_difference(self.manifest, golden.first.out, golden.again.out)
         places, remedy = causes.likely(self.manifest, self._noted(golden), by_hash=by_hash)
         which = "with two hash seeds, and not with one, they" if by_hash else "they"
@@ -189,7 +184,7 @@ class _Drive:
         return {**golden.watched.watched, "noted": noted}
 
     def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
-        """Report where a deterministic target reads clocks. This is only a note."""
+        """Report where a deterministic target reads clocks."""
         noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
         if not noted:
             return []
@@ -288,7 +283,6 @@ class _Drive:
 
 
 def _threads(watched: Execution) -> Refused | None:
-    """Why the threads of a watched run prevent forking; None if they do not."""
     others = watched.watched.get("threads", [])
     return Refused(too_many(others), turned_off(others)) if others else None
 
@@ -298,7 +292,6 @@ def _reading(workspace: Workspace, campaign: Campaign) -> str:
 
 
 def _setting(workspace: Workspace, campaign: Campaign) -> tuple[str, ...]:
-    """The changes that apply to all runs of a campaign."""
     return campaign.setting_in(_reading(workspace, campaign))
 
 

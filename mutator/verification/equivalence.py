@@ -1,9 +1,8 @@
 """The equivalence check: rerun a sample of a campaign's experiments on the reference engine.
 
-Every record of the sample must be the same, including the trace digest. A difference fails the campaign. The
-check's runs are independent: they use nothing from other runs (`entry.independent` of the manifest), so the
-check also covers what runs share. Their records are in `proof/` of the run folder. If no experiment was
-forked, no check is needed and the folder is removed.
+Every record of the sample must be the same, including the trace digest. The check's runs use nothing from
+other runs (`entry.independent` of the manifest), so the check also covers what runs share. Their records are
+in `proof/` of the run folder, which is removed if no experiment was forked.
 """
 
 from collections import Counter
@@ -30,7 +29,7 @@ _SHARE = 100  # one experiment in this many
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """An experiment of the sample that has not run yet: its number in the sample, and its id."""
+    """An experiment of the sample that has not run yet."""
 
     number: int
     id: str
@@ -38,11 +37,8 @@ class Sample:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Proof:
-    """The state of a run's equivalence check.
-
-    It has the number of experiments in the sample, the number with the same result, and the harness errors of
-    the check's own runs (experiment id, detail).
-    """
+    """The state of a run's equivalence check: the number of experiments in the sample, the number with the
+    same result, and the harness errors of the check's own runs (experiment id, detail)."""
 
     sampled: int
     same: int
@@ -75,15 +71,12 @@ def sample(experiments: Sequence[Experiment], seed: int) -> tuple[Experiment, ..
 
 
 def _sample_of(folder: RunFolder) -> set[str]:
-    """Ids of a plan's sample.
-
-    With several seeds, the first seed's part is chosen as in a campaign with one seed. Each other seed adds
-    one experiment in a hundred.
-    """
+    """Ids of a plan's sample. For several seeds, each seed after the first adds one experiment in a
+    hundred."""
     return set(_sampled_ids(folder.path, folder.head["plan"], len(folder.seeds)))
 
 
-@lru_cache(maxsize=4)  # cached, because a session asks several times and the plan is frozen
+@lru_cache(maxsize=4)  # a session asks several times
 def _sampled_ids(run: Path, plan: str, seeds: int) -> tuple[str, ...]:
     if seeds == 1:
         head = RunFolder.unverified(run).head
@@ -122,7 +115,7 @@ def needless(folder: RunFolder) -> str | None:
 
 
 def drop(folder: RunFolder) -> None:
-    """Remove a proof that is no longer needed. Some of its runs may be older than that knowledge."""
+    """Remove a proof that is no longer needed."""
     gone = {name: None for name in digests.segments(folder.path) if name.startswith(f"{FOLDER}/")}
     with digests.rewriting(folder.path, gone):
         remove_folder(folder.path / FOLDER)
@@ -147,8 +140,7 @@ def sampled(folder: RunFolder) -> list[str]:
 
 def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
     """The state of the check; None if none is needed. CheckFailed if a record differs on the reference
-    engine.
-    """
+    engine."""
     if not (folder.path / FOLDER).is_dir():
         return None
     found = folder.records(FOLDER)

@@ -28,7 +28,6 @@ def loading(manifest: TargetManifest) -> Finding:
 
 
 def finding(refusal: Refused | None) -> Finding:
-    """The finding for a target that can be forked (`refusal` None) or cannot."""
     if refusal is None:
         return Finding(name=NAME, level=Level.OK, found="runs can be forked")
     return Finding(

@@ -27,7 +27,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
-    """The result of one check: what was found and where, and the remedy if there is a problem."""
+    """The result of one check, with a remedy if there is a problem."""
 
     name: str
     level: Level

@@ -33,7 +33,7 @@ T = TypeVar("T")
 
 
 def check_library(workspace: Workspace, target: str) -> list[MutatorError]:
-    """Every problem of library, templates and target, in file order; empty if there is none.
+    """Every problem of library, templates and target, in file order.
 
     * No placeholder may be left.
     * Manifests, models, specs, hazards and context tables must load.
@@ -96,12 +96,11 @@ def check_campaigns(
 
 
 def _check_triggers(campaign: Campaign, manifest: TargetManifest) -> None:
-    """Raise MutatorError for a campaign's listed trigger that uses a value unknown to the target."""
     listed_triggers(campaign.listed, campaign.yaml, manifest, armed_after_s=0.0, hold_s=None)
 
 
 def _placed(problem: MutatorError, campaign: Campaign) -> MutatorError:
-    """A study's problem. If it names no file, it is located at the campaign that uses the study."""
+    """A study's problem, located at the campaign that uses the study unless it names a file."""
     if problem.where:
         return problem
     return campaign.yaml.error(("study",), problem.got, expected=problem.expected, remedy=problem.remedy)
@@ -123,7 +122,6 @@ class _Found:
 
 
 def check_spec(spec: FaultSpec, models: FaultModels, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Problems of one spec: expansion in every reading, anchors, and a mutant of each shape."""
     for reading in spec.readings.names:
         try:
             faults = expand(spec, 0, reading, models=models, manifest=manifest)
@@ -182,7 +180,6 @@ def _unknown_hazards(
 
 
 def check_examples(models: FaultModels) -> Iterator[MutatorError]:
-    """Problems of the models' own examples."""
     for model in models:
         for example in model.examples:
             try:
@@ -201,7 +198,7 @@ def check_examples(models: FaultModels) -> Iterator[MutatorError]:
 
 
 def run_example(model: FaultModel, models: FaultModels, example: Example) -> str:
-    """Splice the example's injection into its `before` (tag `example`); the result must also un-splice."""
+    """Splice the example's injection into its `before`; the result must also un-splice."""
     file = parse_file(example.injection.location.path, example.before.encode(), Path("example"))
     injection = resolve(example.injection, model, model.source)
     edit = injection_edit(file, models, injection, EXAMPLE_TAG)

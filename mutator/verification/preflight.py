@@ -66,10 +66,8 @@ def run_checks(
 
 
 def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
-    """Remarks on triggers of the plan that no golden run reaches.
-
-    Empty unless the golden runs just ran or were cached.
-    """
+    """Remarks on triggers of the plan that no golden run reaches; none unless the golden runs just ran or
+    were cached."""
     experiments = ((folder.golden_of(e).key, e) for e in plan_file.iterate(folder.path))
     observed = unreached.read_observed(_kept(folder))
     manifest = workspace.manifest(folder.head["target"])
@@ -77,7 +75,6 @@ def unreached_triggers(workspace: Workspace, folder: RunFolder) -> list[str]:
 
 
 def are_there(folder: RunFolder) -> bool:
-    """Whether a run folder has check results and all golden runs."""
     places = (folder.golden(*one) for one in folder.goldens)
     goldens = (place / name for place in places for name in folder.head["golden_files"])
     return all(path.is_file() for path in (folder.path / FILE, *goldens))
@@ -89,8 +86,6 @@ def _kept(folder: RunFolder) -> Path:
 
 
 class _Checks:
-    """The checks of one run folder."""
-
     def __init__(self, workspace: Workspace, folder: RunFolder) -> None:
         head = folder.head
         self.workspace = workspace
@@ -114,10 +109,8 @@ class _Checks:
         self.digest = digest([*content, places])
 
     def known(self) -> tuple[CheckResult, ...] | None:
-        """Earlier results from this or another folder, which are copied here.
-
-        None unless all checks passed and the golden runs are unchanged.
-        """
+        """Earlier results, copied from another folder if necessary; None unless all checks passed and the
+        golden runs are unchanged."""
         if (results := self._passed(self._before(), self.folder.path)) is not None:
             return results
         copy = self.kept
@@ -185,10 +178,8 @@ class _Checks:
         return read_json(path, SCHEMA) if path.is_file() else None
 
     def _check_same_as_before(self, goldens: dict[str, str]) -> None:
-        """Raise CheckFailed if a run that has records would continue with different golden runs.
-
-        They differ on another processor, for example.
-        """
+        """Raise CheckFailed if a run that has records would continue with different golden runs, say on
+        another processor."""
         run, before = self.folder.path, (self._before() or {}).get("goldens", {})
         known = {key: before.get(key) or digest_of(self.manifest, run / "golden" / key) for key in goldens}
         other = [key for key in goldens if known[key] not in ("", goldens[key])]
@@ -227,10 +218,8 @@ class _Checks:
             yield _result(f"same {name}", judge_same(goldens), "one run for all")
 
     def _anchors(self) -> CheckResult:
-        """Check that each variant of the plan finds its statements.
-
-        A mutant that does not compile is a result, which is reported later.
-        """
+        """Check that each variant of the plan finds its statements. A mutant that does not compile is no
+        failure here."""
         problems: dict[str, list[str]] = {}
         for fault in self.variants.values():
             try:

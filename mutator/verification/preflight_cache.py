@@ -10,19 +10,14 @@ from mutator.verification.unreached import FOLDER
 
 
 def entry(key: str) -> Path:
-    """The path for checks with this digest.
-
-    Machines with a shared home folder have separate entries, because the digest may not cover everything that
-    changes last digits.
-    """
+    """The path for checks with this digest. Machines with a shared home folder have separate entries, because
+    the digest may not cover everything that changes last digits."""
     return caches.of_checks() / digest([key, platform.node()])
 
 
 def store(place: Path, run: Path, file: str, observed: Path) -> None:
-    """Store a run folder's golden runs, check results (`file`) and observations at `place`.
-
-    If the cache is not writable, do nothing.
-    """
+    """Store a run folder's golden runs, check results (`file`) and observations at `place`, if the cache is
+    writable."""
 
     def fill(made: Path) -> None:
         shutil.copytree(run / "golden", made / "golden")

@@ -17,11 +17,8 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckRun:
-    """What the checks need from a run.
-
-    That is: its problem, digests of all outputs and of its trace, hazards, alerts, whether its trigger was
-    seen, and the third-party top-level modules that it imported.
-    """
+    """What the checks need from a run. `digest` covers all outputs; `modules` are the third-party top-level
+    modules that it imported."""
 
     problem: str
     digest: str = ""
@@ -34,7 +31,6 @@ class CheckRun:
 
 
 def look(manifest: TargetManifest, execution: Execution) -> CheckRun:
-    """Extract what the checks need from a finished run."""
     if execution.status is not Status.OK:
         log = execution.log.strip()
         # the last printed line explains why a run was killed; an exception has its own message
@@ -92,5 +88,5 @@ def judge_same(goldens: Mapping[str, CheckRun]) -> str:
         if run.problem or reference.problem:
             return run.problem or reference.problem
         if (run.trace, run.alerts) != (reference.trace, reference.alerts):
-            return f"{name} is not what {first} is, although the manifest says so (same_in)"
+            return f"{name} differs from {first}, although the manifest says that they are equal (same_in)"
     return ""

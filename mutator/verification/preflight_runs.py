@@ -59,7 +59,6 @@ class CheckDriver:
             remove_folder(work)
 
     def _judge_canary(self, engine: ReferenceEngine) -> tuple[str, str]:
-        """Run and judge the canary; see `canary.judge`."""
 
         def run(experiment: Experiment) -> CheckRun:
             return self._run(engine, (_CANARY, None), canary.job(self.workspace, self.manifest, experiment))
@@ -101,7 +100,6 @@ class CheckDriver:
 
 
 def _follow(stage: str, futures: Collection[Future[Any]], notify: Notify) -> None:
-    """Wait for pending runs and report progress."""
     pace = Pace(stage, len(futures))
     notify(pace.at(0))
     for done, future in enumerate(as_completed(futures), 1):

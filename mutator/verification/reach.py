@@ -1,7 +1,7 @@
 """Find which statements with faults, and which triggers, golden runs reach.
 
-One mutant has a probe call at each of these statements, which only counts. A statement is therefore counted
-exactly when a fault in it would be active if its trigger always held.
+One mutant has a counting probe call at each of these statements. A statement is counted exactly when a fault
+in it would be active if its trigger always held.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,7 +27,7 @@ _MOST = 20  # places listed in a finding
 
 @dataclass(frozen=True, kw_only=True)
 class Wanted:
-    """A statement with faults: its location, its place in a spec, and the scenario changes."""
+    """A statement with faults, and the scenario changes that they need."""
 
     location: FaultLocation
     place: Place  # in the spec
@@ -79,7 +79,6 @@ class Reach:
         self.untriggered = [one for one in self.untriggered if not holds(self._armings[one.trigger], rows)]
 
     def findings(self) -> list[Finding]:
-        """Findings about statements and triggers that no run reached."""
         return [
             self._finding(
                 "statement",
@@ -133,7 +132,6 @@ def _counting(
 
 
 def _with_count(models: FaultModels) -> FaultModels:
-    """The fault models, and one more that only counts."""
     some = next(iter(models))
     count = FaultModel(
         name=_COUNT,
@@ -153,9 +151,7 @@ def _triggers(
     workspace: Workspace, manifest: TargetManifest, campaigns: Sequence[Campaign]
 ) -> Iterator[Awaited]:
     """The triggers that campaigns use, each armed as early as in any campaign, and the latest random times.
-
-    Without campaigns, the triggers of all context tables.
-    """
+    Without campaigns, the triggers of all context tables."""
     armed: dict[tuple[str, str], float] = {}
     for campaign in campaigns:
         earliest = min(campaign.armed_after_s.values(), default=manifest.armed_after_s)
@@ -177,7 +173,6 @@ def _triggers(
 
 
 def _rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
-    """Table and context of each row that a campaign uses."""
     if campaign.table is None:
         return []
     rows = campaign.rows or [row.id for row in workspace.context_table(campaign.table).rows]
@@ -185,7 +180,6 @@ def _rows(workspace: Workspace, campaign: Campaign) -> list[tuple[str, str]]:
 
 
 def _listed(campaign: Campaign, manifest: TargetManifest, armed_after_s: float) -> Iterator[Awaited]:
-    """The triggers of a campaign's own list."""
     triggers = listed_triggers(
         campaign.listed, campaign.yaml, manifest, armed_after_s=armed_after_s, hold_s=campaign.hold_s
     )

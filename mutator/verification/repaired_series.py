@@ -1,7 +1,6 @@
 """Set aside damaged series of a run folder, so that the others can be read.
 
-A chunk of golden series is rebuilt from the golden runs if that gives the same bytes. An experiment's series
-is made again when the experiment is rerun.
+A chunk of golden series is rebuilt from the golden runs if that gives the same bytes.
 """
 
 import os
@@ -50,7 +49,7 @@ def repair_series(
 
 
 def _golden_chunk(folder: RunFolder, workspace: Workspace | None, index: Index, name: str) -> bytes | None:
-    """The rebuilt content of a chunk of golden series; None if that is no longer possible."""
+    """The rebuilt content of a chunk of golden series, if that is still possible."""
     keys = {number: key for key, number in index.goldens.items()}
     numbers = [number for number, (chunk, _) in enumerate(index.places) if chunk == name]
     if workspace is None or not keys.keys() >= {*numbers}:

@@ -1,7 +1,7 @@
-"""Set aside damaged parts of a run folder, so that the same `run` fills the gaps.
+"""Set aside damaged parts of a run folder, so that `mutator run` can fill the gaps.
 
-Intact lines of a segment stay. Files that cannot be rebuilt (run.json, campaign.yaml, the plan) are not
-touched, because only a copy of the folder can replace them.
+Intact lines of a segment stay. Files that only a copy of the folder can replace (run.json, campaign.yaml, the
+plan) are not touched.
 """
 
 import os
@@ -37,7 +37,7 @@ _Change = tuple[str, bytes | None, str]  # a file, its new content (None: remove
 def repair(folder: RunFolder, workspace: Workspace | None = None) -> list[str]:
     """Move damaged files, lines, patches and series to `damaged/`; return a sentence for each action.
 
-    With a `workspace`, golden series are rebuilt. Raises MutatorError if a command works in the folder, its
+    With a `workspace`, golden series are rebuilt. Raises MutatorError if a command is using the folder, its
     schema is older, or the plan is damaged.
     """
     if not folder.verifiable:
@@ -94,7 +94,7 @@ def _files(folder: RunFolder, ledger: Ledger) -> Iterator[_Change]:
 
 
 def _lost_patches(folder: RunFolder) -> list[str]:
-    """Experiments with a stored patch that does not match the record."""
+    """Experiments whose stored patch does not match the record."""
     lost = []
     for one in recorded(folder, "records"):
         try:
@@ -106,10 +106,7 @@ def _lost_patches(folder: RunFolder) -> list[str]:
 
 def _drop_patches(folder: RunFolder, lost: Collection[str]) -> list[str]:
     """Set aside the files of these patches, and files with damaged blocks; return a sentence for each of the
-    latter.
-
-    Other patches in these files stay.
-    """
+    latter. Other patches in these files stay."""
     run, patches, said = folder.path, folder.patches, []
     for one in lost:
         old = patches.old_file(one)
@@ -158,7 +155,6 @@ def _segments(folder: RunFolder, ledger: Ledger, lost: Collection[str]) -> Itera
 
 
 def _in_place(segment: Segment, schema: str, known: Digest | None, data: bytes) -> bool:
-    """Whether a segment has a valid head, and is unchanged since it was closed."""
     try:
         segment.check_head(schema)
     except MutatorError:
@@ -198,7 +194,7 @@ def _kept(
 
 
 def _put_aside(run: Path, name: str) -> None:
-    """Copy a file to a free name in `damaged/`. Move anything that is not a file."""
+    """Copy a file to a free name in `damaged/`; move anything else."""
     if not os.path.lexists(run / name):
         return
     place = run / ASIDE / name

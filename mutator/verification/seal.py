@@ -1,9 +1,8 @@
 """The seal of a finished run: one digest of its results and everything that determines them.
 
-It does not depend on who computed the run, or on how many machines. It covers the plan, the choices that made
-it, the sources, the versions of mutator, Python and packages, the checks and golden runs, and each record
-with its patch. It excludes costs, hosts, processors, the git commit, and the division into sessions, workers
-and shards.
+It covers the plan, the choices that made it, the sources, the versions of mutator, Python and packages, the
+checks and golden runs, and each record with its patch. It excludes costs, hosts, processors, the git commit,
+and the division into sessions, workers and shards.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +18,7 @@ from mutator.store.records import ending_on
 from mutator.store.run_folder import RunFolder
 
 SCHEMA = "seal/1"
-# The parts of run.json that concern results. Reports print them.
+# the parts of run.json that concern results
 _HEAD = (
     *("plan", "campaign_digest", "study", "seed", "reading", "runs"),
     *("hazards", "compared", "sources", "target_files"),
@@ -27,10 +26,8 @@ _HEAD = (
 
 
 def seal_of(folder: RunFolder) -> str | None:
-    """The seal of a run folder, computed from its content: 64 hex digits.
-
-    None if the run is not finished or not verifiable.
-    """
+    """The seal of a run folder, computed from its content: 64 hex digits. None if the run is not finished or
+    not verifiable."""
     if not folder.finished:
         return None
     head, checks = folder.head, read_json(folder.path / CHECKS, CHECKS_SCHEMA)
@@ -58,7 +55,6 @@ def seal_or_why_not(folder: RunFolder) -> str:
 
 
 def not_verifiable(folder: RunFolder) -> str:
-    """The message for a run folder with an older schema."""
     return f"not verifiable, because {folder.head['schema']} has no digests"
 
 

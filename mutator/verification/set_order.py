@@ -1,7 +1,7 @@
 """Find where source code depends on the order of a set, which for strings varies with PYTHONHASHSEED.
 
-It reads only the source, so it finds only sets that are recognizable there: literals, calls of `set`, and
-names of the same function or attributes of `self` that are assigned a set.
+Finds only sets that the source makes recognizable: literals, calls of `set`, and names of the same function
+or attributes of `self` that are assigned a set.
 """
 
 import ast
@@ -113,7 +113,6 @@ def _own(node: ast.AST) -> Iterator[ast.AST]:
 
 
 def _called(function: ast.expr) -> str:
-    """The name of a function, `.name` for a method."""
     if isinstance(function, ast.Attribute):
         return f".{function.attr}"
     return function.id if isinstance(function, ast.Name) else ""

@@ -1,7 +1,7 @@
 """Find triggers that no golden run reaches.
 
-A faulty run equals the golden run until its fault is active. A trigger that never holds in the golden run
-therefore never fires. Null mutants equal their golden runs, and record what these observe.
+A faulty run equals the golden run until its fault is active, so a trigger that never holds in the golden run
+never fires. Null mutants equal their golden runs, and record what these observe.
 """
 
 from collections import Counter
@@ -29,37 +29,31 @@ Arming = tuple[float, Callable[..., bool]]  # arming time of a trigger (s), and 
 
 
 def write_observed(folder: Path, key: str, seen: Iterable[Sequence[float]]) -> None:
-    """Store what the golden run `key` observed in `folder`."""
     path = folder / FOLDER / f"{key}.npy"
     path.parent.mkdir(parents=True, exist_ok=True)  # scenario names may contain folders
     np.save(path, np.array(list(seen), dtype=float))
 
 
 def read_observed(folder: Path) -> dict[str, Observed]:
-    """The observations of golden runs that are stored in `folder`, by key."""
     base = folder / FOLDER
     found = {path.relative_to(base).as_posix(): path for path in base.rglob("*.npy")}
     return {name.removesuffix(".npy"): np.load(path) for name, path in found.items()}
 
 
 def arming(workspace: Workspace, manifest: TargetManifest, trigger: Trigger) -> Arming:
-    """The arming time of a trigger, and its condition over the target's observations."""
     path = probe_path(manifest.package)
     built = build(manifest, workspace.fault_models(), None, trigger)
     return decision(compile(built.files[path], path, "exec"))
 
 
 def holds(trigger: Arming, rows: Iterable[Sequence[float]]) -> bool:
-    """Whether a trigger holds in one of these observations."""
     armed_t, condition = trigger
     return any(row[0] >= armed_t and condition(*row) for row in rows)
 
 
 def _fits(trigger: Arming, observed: Observed) -> bool:
-    """Whether the condition has one argument for each observed column.
-
-    Older templates also ask for derived values.
-    """
+    """Whether the condition has one argument for each observed column; in older templates it also has derived
+    values."""
     return len(signature(trigger[1]).parameters) == len(observed.T)
 
 

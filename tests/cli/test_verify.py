@@ -203,7 +203,7 @@ def test_a_folder_without_sources(cli: Cli, sealed: str, tmp_path: Path, monkeyp
     found = cli("verify", "run", "--json")
     assert found.code == 1
     failed = [check["what"] for check in found.json["checks"] if check["differences"]]
-    assert failed == ["sources that are those of the run"]
+    assert failed == ["sources that match those of the run"]
 
 
 @pytest.mark.parametrize(

@@ -145,5 +145,5 @@ def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> 
     two_scenarios(toy, SHARED)
     edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
-    with pytest.raises(CheckFailed, match=r"same A\+C\+alone: C is not what A is"):
+    with pytest.raises(CheckFailed, match=r"same A\+C\+alone: C differs from A"):
         run_checks(toy, folder)

@@ -75,7 +75,7 @@ SETS = (
             "default_rng()",
             "in Driver.__init__: a generator of numpy.random",
         ),
-        ([SETS], "", "for name in", "in Driver.drive: goes through a set in its order"),
+        ([SETS], "", "for name in", "in Driver.drive: uses the order of a set"),
     ],
     ids=["clock", "unseeded generator", "set order"],
 )
