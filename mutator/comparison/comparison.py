@@ -72,7 +72,7 @@ class Comparison:
 
     @cached_property
     def names(self) -> Names:
-        """The display names of the runs: the folder names, made distinct if they are equal."""
+        """The display names of the runs, made distinct if they are equal."""
         a, b = self.a.name, self.b.name
         return Names(a=a, b=b) if a != b else Names(a=f"A: {a}", b=f"B: {b}")
 
@@ -173,7 +173,6 @@ def compare(
 
 
 def findings(comparison: Comparison, gates: Sequence[Gate]) -> tuple[Finding, ...]:
-    """The experiments that the gates fail on, in gate order."""
     found: list[Finding] = []
     for gate in gates:
         if gate is Gate.UNMATCHED:

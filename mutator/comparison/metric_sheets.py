@@ -18,8 +18,6 @@ NO_CONTACT = "no contact"
 
 
 def metrics_sheets(pairs: Sequence[Pair], a: Side, b: Side, names: Names) -> tuple[Sheet, Sheet]:
-    """Medians of each metric that both runs have, their difference and Wilcoxon's test, for all pairs and by
-    fault type. Pairs need a value in both runs."""
     whole: list[tuple[Cell, ...]] = []
     parts: list[tuple[Cell, ...]] = []
     units = {name: (unit, worse) for name, unit, _, worse in a.folder.head.get("metrics", ())}
@@ -59,8 +57,6 @@ def _medians(frame: pd.DataFrame) -> tuple[Cell, ...]:
 
 
 def severity_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """Pairs by severity class in the first run (lines) and the second (columns). Without contacts, it has no
-    lines."""
     order = [*CLASSES[::-1], ""]
     counts = Counter((p.row_a.severity, p.row_b.severity) for p in pairs if p.usable)
     seen = [name for name in order if any(name in pair for pair in counts)]

@@ -15,22 +15,23 @@ _TIME_DIGITS = 6  # decimals of a time from activation; absorbs rounding errors
 
 
 class Change(StrEnum):
-    """A change in the second run of a pair, relative to the first."""
+    """A change in the second run of a pair, relative to the first; `comparison.Gate` explains those for the
+    worse."""
 
-    NEW_HAZARD = "new-hazard"  # a hazard instead of none
-    OTHER_HAZARD = "other-hazard"  # another hazard, although the first run already has one
-    HIGHER_SEVERITY = "higher-severity"  # a contact of a higher class, or a contact instead of none
+    NEW_HAZARD = "new-hazard"
+    OTHER_HAZARD = "other-hazard"
+    HIGHER_SEVERITY = "higher-severity"
     HAZARD_GONE = "hazard-gone"
     LOWER_SEVERITY = "lower-severity"
-    EARLIER_HAZARD = "earlier-hazard"  # less time from activation to the first hazard
+    EARLIER_HAZARD = "earlier-hazard"
     LATER_HAZARD = "later-hazard"
     LOST_ALERT = "lost-alert"
     NEW_ALERT = "new-alert"
-    WORSE = "worse"  # a worse outcome, in the order no effect, sdc, hazard; includes new hazards
+    WORSE = "worse"
     BETTER = "better"
-    NEW_CRASH = "new-crash"  # the controller crashed or did not finish
+    NEW_CRASH = "new-crash"
     CRASH_GONE = "crash-gone"
-    HARNESS_ERROR = "harness-error"  # no result, although the first run has one
+    HARNESS_ERROR = "harness-error"
     MENDED = "mended"  # a result, although the first run has none
     OTHERWISE = "otherwise"  # another outcome that is neither better nor worse: masked or not activated
 

@@ -57,14 +57,11 @@ def _span(start: float | None, end: float | None) -> float:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Names:
-    """The display names of the two runs."""
-
     a: str
     b: str
 
 
 def rates_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
-    """Rates, differences and McNemar's exact test of each flag, for all pairs and by fault type."""
     whole = tuple((flag, *_rates(frame, flag)) for flag in FLAGS)
     parts: list[tuple[Cell, ...]] = []
     for flag in FLAGS:
@@ -93,7 +90,6 @@ def _rates(frame: pd.DataFrame, flag: str) -> tuple[Cell, ...]:
 
 
 def times_sheets(frame: pd.DataFrame, names: Names) -> tuple[Sheet, Sheet]:
-    """Medians, differences and Wilcoxon's test of each time, for all pairs and by fault type."""
     known = {name: frame[frame[[f"{name}_a", f"{name}_b"]].notna().all(axis=1)] for name in TIMES}
     whole = tuple((name, *_times(some, name)) for name, some in known.items() if len(some))
     parts: list[tuple[Cell, ...]] = []
@@ -148,7 +144,6 @@ def whole_and_parts(
 
 
 def changes_sheet(pairs: Sequence[Pair]) -> Sheet:
-    """The number of pairs with each change, by fault type. Changes that do not occur have no column."""
     seen = [change for change in Change if any(change in p.changes for p in pairs)]
     kinds = sorted({by_fault_type(p.row_a) for p in pairs})
     parts = {kind: [p for p in pairs if by_fault_type(p.row_a) == kind] for kind in kinds}
@@ -168,7 +163,6 @@ def _count_line(name: str, pairs: Sequence[Pair], seen: Sequence[Change]) -> tup
 
 
 def endings_sheet(pairs: Sequence[Pair], names: Names) -> Sheet:
-    """Pairs by outcome in the first run (lines) and the second (columns)."""
     counts = Counter((p.row_a.ending, p.row_b.ending) for p in pairs)
     order = [*(o.value for o in Outcome), *(s.value for s in Status if s is not Status.OK)]
     before, after = ([e for e in order if any(pair[i] == e for pair in counts)] for i in (0, 1))

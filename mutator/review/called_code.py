@@ -32,8 +32,6 @@ class _Place:
 
 
 class CalledCode:
-    """Finds called code in one tree."""
-
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
 

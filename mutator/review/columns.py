@@ -1,4 +1,4 @@
-"""The columns that filters over groups can use; a separate module because help texts need nothing else."""
+"""The columns for filters over groups, in a separate module because help texts need nothing else."""
 
 COLUMNS = (
     "group",

@@ -31,7 +31,7 @@ def _names(person: str) -> set[str]:
 
 
 def user_name(workspace: Workspace) -> str | None:
-    """Git's `user.name` for the library; None if it is not set or git is missing."""
+    """Git's `user.name` for the library."""
     return (git(workspace.library, "config", "user.name") or "").strip() or None
 
 

@@ -215,7 +215,7 @@ def _last_word(review: Review, group: Group) -> str:
 
 
 def _written(workspace: Workspace, review: Review, changes: Sequence[Change]) -> Review:
-    """Store the changes and return the review; the texts that reviewers saw are written first."""
+    """Store the changes. The texts that reviewers saw are written first."""
     at, commit = f"{datetime.now(UTC):%Y-%m-%dT%H:%M:%SZ}", library_commit(workspace)
     entries = dict(review.entries)
     for change in changes:

@@ -6,7 +6,7 @@ from enum import StrEnum
 
 from mutator._common.hashing import content_id
 
-# For each parameter: its least and greatest number, then values that are not finite (`nan`), as text.
+# for each parameter: least and greatest number, then values that are not finite (`nan`), as text
 Values = Mapping[str, tuple[float | str, ...]]
 
 _WORDS = {
@@ -18,8 +18,6 @@ _WORDS = {
 
 
 class Verdict(StrEnum):
-    """A reviewer's decision."""
-
     APPROVED = "approved"
     REJECTED = "rejected"
 
@@ -28,10 +26,10 @@ class Verdict(StrEnum):
 class Bound:
     """Digests of what a decision is about. If one changes, the decision is no longer valid."""
 
-    diff: str  # digest of the hunks with injected lines, without values and line numbers
-    function: str  # digest of the changed target functions, without injected lines
-    template: str  # digest of the templates of the injected lines
-    calls: str | None = None  # digest of the target code that the injected lines call; None: not stored
+    diff: str  # the hunks with injected lines, without values and line numbers
+    function: str  # the changed target functions, without injected lines
+    template: str  # the templates of the injected lines
+    calls: str | None = None  # the target code that the injected lines call; None: not stored
 
     def changed(self, now: "Bound") -> list[str]:
         differs = {name: getattr(self, name) != getattr(now, name) for name in _WORDS}

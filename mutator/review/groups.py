@@ -90,7 +90,7 @@ def shapes(patches: Iterable[tuple[str, str, str]]) -> list[Shape]:
 
 
 def without_values(patch: str) -> str:
-    """The patch without values: equal for all patches of a shape."""
+    """The patch without values, which is equal for all patches of a shape."""
     return _rest(patch, list(_spans(patch)))
 
 
@@ -138,7 +138,6 @@ def trigger_kind(trigger: Trigger) -> str:
 
 
 def hold_of(fault: Fault, trigger: Trigger) -> Hold:
-    """The fault's own hold, else the trigger's."""
     return fault.hold or trigger.hold
 
 
@@ -190,7 +189,6 @@ class _ShapeBuilder:
 
 
 def _unused_name(label: str, taken: list[str]) -> str:
-    """The label, numbered if it is taken; only a number if the label is empty."""
     if not label:
         return str(1 + sum(name.isdigit() for name in taken))
     same = sum(name.partition("_")[0] == label for name in taken)

@@ -38,7 +38,6 @@ class Material:
 
     @property
     def sections(self) -> dict[str, str]:
-        """The texts for display."""
         changes = (one if isinstance(one, str) else " -> ".join(one) + "\n" for one in self.diff)
         return {
             "diff": "".join(changes).replace(HOLE, _SHOWN_HOLE),

@@ -63,7 +63,6 @@ def page_html(
 
 
 def render_page(data: dict[str, Any]) -> str:
-    """The page as HTML; deterministic."""
     environment = Environment(
         autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )

@@ -42,7 +42,7 @@ MODEL = "image_effect"
 LEVELS = ("least", "middle", "most")
 MOST = 9  # most values of a group to draw; three are shown
 CLEAR = 0.5  # minimum correlation of amount and change for ranking severity by amount
-QUALITY = 85  # quality of JPEG files
+QUALITY = 85
 LIMITS = Limits(cpu_s=60, wall_s=120)
 _SCHEMA = "pictures/1"
 _drawing = Lock()  # a page requests all images of a group at once: the first request draws them
@@ -50,7 +50,7 @@ _drawing = Lock()  # a page requests all images of a group at once: the first re
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Level:
-    """An image after the effect: its name in LEVELS, the fault's value as text, the JPEG file."""
+    """An image after the effect as a JPEG file; `name` is one of LEVELS."""
 
     name: str
     label: str
@@ -156,7 +156,6 @@ def _lines(models: FaultModels, fault: Fault) -> tuple[str, ...]:
 
 
 def _label(fault: Fault) -> str:
-    """The fault's value as text, with the spec's unit or as an amount."""
     if fault.value is not None:
         plain = fault.unit in ("", "-", "1")
         return f"amount {fault.value}" if plain else f"{fault.value} {fault.unit}"
@@ -234,7 +233,6 @@ def _run(
 
 
 def _shown(before: np.ndarray, faults: Sequence[Fault], after: Sequence[np.ndarray]) -> Pictures:
-    """The least, middle and most severe of faults sorted by amount."""
     changes = [float(np.sqrt(np.mean(np.square(one.astype(float) - before)))) for one in after]
     order = _by_severity(changes)
     names = {1: LEVELS[2:], 2: LEVELS[::2]}.get(len(order), LEVELS)

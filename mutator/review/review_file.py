@@ -45,7 +45,7 @@ class _BlockModel(StrictModel):
     group: str = Field(pattern=r"^[0-9a-f]{12}$")
     what: str
     decision: Literal["approved", "rejected"] | None = None
-    by: str | None = Field(None, pattern=r"\S")  # not empty
+    by: str | None = Field(None, pattern=r"\S")
     at: str | None = Field(None, pattern=_TIME)
     commit: str | None = Field(None, pattern=r"^[0-9a-f]{40,64}(-dirty)?$")
     tool: str | None = None
@@ -66,8 +66,6 @@ class _FileModel(StrictModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """The file's content: entries by group, and whether authors may not approve their own changes."""
-
     entries: Mapping[str, Entry]
     four_eyes: bool = False
 

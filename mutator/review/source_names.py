@@ -111,7 +111,7 @@ class _Scope:
 
     local: frozenset[str] = frozenset()
     imports: tuple[tuple[str, Import], ...] = ()
-    owner: str = ""  # class of the method
+    owner: str = ""
     me: str = ""  # the name of the method's first argument, such as `self`
 
     def inside(self, node: _Function) -> "_Scope":

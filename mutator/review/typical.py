@@ -29,8 +29,6 @@ _PLAIN = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """An experiment: its id, label (fault, run), outcome or status, and verdict as text."""
-
     id: str
     label: str
     ending: str

@@ -12,8 +12,6 @@ from mutator.statistics.tallies import by_kind
 
 
 def overall_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """The table of rates, stratified odds ratio and resampled difference, of activated and of injected
-    faults."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -51,7 +49,6 @@ def _resampled(frame: pd.DataFrame, whole: Whole, source: str) -> tuple[Cell, ..
 
 
 def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
-    """The table of Fisher's exact test for each fault type, adjusted over all types."""
     sources = by_source(published, by_kind(frame))
     lines: list[tuple[Cell, ...]] = []
     for whole in WHOLES:
@@ -72,8 +69,6 @@ def kinds_sheet(frame: pd.DataFrame, published: Published | None) -> Sheet:
 
 
 def pairs_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of McNemar's exact test on matched pairs, in total and by fault type, adjusted over the
-    types."""
     paired = contrasts.pairs(frame)
     lines: list[tuple[Cell, ...]] = []
     for which, some in (

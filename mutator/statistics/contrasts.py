@@ -111,7 +111,6 @@ def mantel_haenszel(parts: Sequence[Stratum]) -> Pooled:
 
 
 def fisher(stratum: Stratum) -> float:
-    """The p-value of Fisher's exact test for one fault type (scipy)."""
     from scipy.stats import fisher_exact  # type: ignore[import-untyped]
 
     return float(fisher_exact(stratum.table).pvalue)
@@ -145,7 +144,6 @@ def mcnemar(paired: pd.DataFrame) -> Matched:
 
 
 def resampled(frame: pd.DataFrame, whole: Whole) -> Difference:
-    """The hazard rate of guided runs minus that of random runs, with its `resampled_interval` over faults."""
     data = _sums(frame[frame["is_activated"]] if whole == "activated" else frame)
     seen = float(_rate_difference(*data))
     low, high = (math.nan, math.nan) if math.isnan(seen) else resampled_interval(data, _rate_difference)

@@ -20,7 +20,7 @@ _RANDOM = "random/"  # prefix of the trigger of a random partner: random/C1
 def load(results: Path) -> pd.DataFrame:
     """Load the usable experiments of a results.csv, in order. Raise MutatorError if the file is invalid.
 
-    Harness errors and invalid mutants are left out; crashes and timeouts are injected faults.
+    Harness errors and invalid mutants are left out; crashes and timeouts are kept.
     """
     return prepare(Results(results).texts())
 

@@ -17,8 +17,8 @@ _INTERVAL = "Medians have 95 % intervals, resampled by fault (location and value
 
 
 def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Sheet:
-    """The table of the spread of each metric (name, unit, meaning, worse direction) over activated faults, by
-    fault type. Without values, it has no lines."""
+    """The table of the spread of each metric (name, unit, meaning, worse direction). Without values, it has
+    no lines."""
     lines: list[tuple[Cell, ...]] = []
     activated = frame.loc[frame["is_activated"], ["kind", "fault_id", *(name for name, *_ in metrics)]]
     for name, unit, _, worse in metrics:
@@ -41,7 +41,7 @@ def metrics_sheet(frame: pd.DataFrame, metrics: Sequence[Sequence[str]]) -> Shee
 
 
 def severity_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of activated faults by fault type and severity class. Without classes, it has no lines."""
+    """The table of activated faults by severity class. Without classes, it has no lines."""
     lines: list[tuple[Cell, ...]] = []
     known = [name for name in ("kind", "severity") if name in frame]
     activated = frame.loc[frame["is_activated"], known]
@@ -60,7 +60,6 @@ def severity_sheet(frame: pd.DataFrame) -> Sheet:
 
 
 def tolerant_times_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """The table of times to the first hazard by fault type. `alerts` says whether the target has alerts."""
     came = slim(frame)[frame["is_hazard"]]
     starts = {"activation": "t_activation", "manifestation": "t_manifest"}
     starts |= {"alert": "t_alert"} if alerts else {}

@@ -70,7 +70,6 @@ def drives_of(
 
 
 def function_of(fault: Fault) -> str:
-    """The function of a fault's first injection, as `path::function`."""
     place = fault.injections[0].location
     return f"{place.path}::{place.function}"
 

@@ -29,5 +29,4 @@ class Published:
 
 
 def by_source(published: Published | None, ours: Counts) -> dict[str, Counts]:
-    """The counts by fault type: first the published ones, if any, then those of the run."""
     return ({published.source: published.by_kind} if published else {}) | {OURS: ours}

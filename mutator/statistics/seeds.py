@@ -35,8 +35,7 @@ def seeds_of(frame: pd.DataFrame) -> list[str]:
 
 
 def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
-    """The table of each share over all faults and by method. `alerts` says whether the target has alerts.
-    With a single seed, it has no lines."""
+    """The table of each share over all faults and by method. With a single seed, it has no lines."""
     methods = sorted(map(str, frame["method"].unique()))
     groups = {ALL: np.ones(len(frame), dtype=bool)}
     if len(methods) > 1:
@@ -51,7 +50,6 @@ def seeds_sheet(frame: pd.DataFrame, *, alerts: bool = True) -> Sheet:
 
 
 def kinds_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of activated faults and hazards, by fault type."""
     kinds = sorted(map(str, frame["kind"].unique()))
     groups = {name: (frame["kind"] == name).to_numpy() for name in kinds}
     return Sheet(
@@ -75,7 +73,6 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> list[tuple[str, str]]:
 
 
 def _flags(frame: pd.DataFrame) -> dict[str, np.ndarray]:
-    """For each quantity, the runs that count."""
     hazard, alert = (frame[name].to_numpy(dtype=bool) for name in ("is_hazard", "is_alert"))
     return {
         _INJECTED: np.ones(len(frame), dtype=bool),
@@ -106,7 +103,6 @@ def _lines(
 
 
 def _spread(seeds: Sequence[str], counts: np.ndarray, wholes: np.ndarray) -> tuple[Cell, ...]:
-    """The cells of a share, from its count and base in each seed."""
     low, high = resampled_interval((counts, wholes), _rate)
     known = [(count / of, int(seed)) for seed, count, of in zip(seeds, counts, wholes, strict=True) if of]
     least, largest = min(known, default=None), min(known, key=lambda k: (-k[0], k[1]), default=None)

@@ -23,7 +23,6 @@ _NOTE = "95 % Wilson intervals; in brackets count/whole."
 
 
 def summary_sheet(method: str, ours: Counts, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """The table by scenario for one method, with a total. `alerts` says whether the target has alerts."""
     scenarios = sorted({scenario for how, scenario in ours if how == method})
     theirs = published.by_scenario if published else {}
     sources = _sources(method, ours, published, theirs, scenarios)
@@ -45,7 +44,6 @@ def summary_sheet(method: str, ours: Counts, published: Published | None, *, ale
 
 
 def coverage_sheet(method: str, ours: Counts, published: Published | None) -> Sheet:
-    """The table by fault type for one method, with a total."""
     kinds = sorted({kind for how, kind in ours if how == method})
     theirs = published.by_kind if published else {}
     # fault types in the order of the publication, then the rest

@@ -47,10 +47,8 @@ def total(tallies: Iterable[Tally]) -> Tally:
 
 
 def by_scenario(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    """The counts by (method, scenario)."""
     return {(str(m), str(s)): tally(group) for (m, s), group in frame.groupby(["method", "scenario"])}
 
 
 def by_kind(frame: pd.DataFrame) -> dict[tuple[str, str], Tally]:
-    """The counts by (method, module/fault type)."""
     return {(str(m), str(k)): tally(group) for (m, k), group in frame.groupby(["method", "kind"])}

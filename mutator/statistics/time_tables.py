@@ -16,8 +16,6 @@ _ALERT_NOTE = (
 
 
 def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alerts: bool = True) -> Sheet:
-    """The table of how fast faults propagate, by method and scenario. `alerts` says whether the target has
-    alerts."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         for step, spread in times.propagation(group).items():
@@ -45,7 +43,6 @@ def propagation_sheet(frame: pd.DataFrame, published: Published | None, *, alert
 
 
 def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: float) -> Sheet:
-    """The table of Kaplan-Meier estimates of the time from alert to hazard, by method and scenario."""
     lines: list[tuple[Cell, ...]] = []
     for method, scenario, group in _groups(frame):
         found = times.reaction(group, ends, driver_s)
@@ -72,7 +69,6 @@ def reaction_sheet(frame: pd.DataFrame, ends: Mapping[str, float], driver_s: flo
 
 
 def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
-    """The table of the alerts that came before each hazard."""
     lines: list[tuple[Cell, ...]] = []
     for method, group in frame.groupby("method"):
         shares = times.alerts_before(group, alerts)
@@ -88,7 +84,6 @@ def alerts_sheet(frame: pd.DataFrame, alerts: times.Alerts) -> Sheet:
 
 
 def orders_sheet(frame: pd.DataFrame) -> Sheet:
-    """The table of the orders in which hazards occurred."""
     lines: list[tuple[Cell, ...]] = []
     for (method, module), group in frame.groupby(["method", "module"]):
         lines += [(str(method), str(module), order, n) for order, n in times.hazard_orders(group).items()]

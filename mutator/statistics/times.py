@@ -34,7 +34,7 @@ class Spread:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reaction:
-    """The times from the first alert to a hazard, in s, and their shares. NaN: not reached or not defined.
+    """Times (s) and shares from the first alert to a hazard. NaN: not reached or not defined.
 
     `at_risk` is the number of runs with an alert before any hazard. Of these, `events` then had a hazard; the
     others are censored at their end. `median` is the time at which the Kaplan-Meier curve crosses one half.
@@ -57,7 +57,6 @@ class Reaction:
 
 
 def spread(times: pd.Series) -> Spread:
-    """The mean and quartiles of the times. Missing times are ignored."""
     known = times.dropna()
     if known.empty:
         return Spread(n=0, mean=math.nan, lower=math.nan, median=math.nan, upper=math.nan)

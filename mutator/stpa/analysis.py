@@ -19,8 +19,6 @@ _WIDEST = 100  # most rows and columns of the drawing
 
 
 class Kind(StrEnum):
-    """The kinds of components in the control structure."""
-
     HUMAN = "human"
     CONTROLLER = "controller"
     ESTIMATOR = "estimator"
@@ -212,7 +210,6 @@ def _check_structure(structure: StructureModel, source: Source) -> None:
 
 
 def _check_grid(structure: StructureModel, source: Source) -> None:
-    """Check that components do not overlap in the drawing's grid."""
     taken: dict[tuple[int, int], str] = {}
     for name, component in structure.components.items():
         row, column, width = component.drawn

@@ -78,7 +78,6 @@ def _unobserved(analysis: Analysis, manifest: TargetManifest) -> Iterator[Mutato
 
 
 def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorError]:
-    """Yield variables of process models that the target does not observe."""
     known = manifest.observation.variables
     for name, component in analysis.structure.components.items():
         for variable, model in component.process_model.items():
@@ -92,7 +91,6 @@ def _unknown_variables(analysis: Analysis, manifest: TargetManifest) -> Iterator
 
 
 def _unmodelled(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield contexts that use a variable in no process model."""
     models = [component.process_model for component in analysis.structure.components.values()]
     observed = {variable.observed for model in models for variable in model.values()}
     for table in analysis.tables.values():
@@ -119,7 +117,6 @@ def _categories(analysis: Analysis) -> Iterator[MutatorError]:
 
 
 def _contradictions(analysis: Analysis) -> Iterator[MutatorError]:
-    """Yield unsafe actions that are not hazardous according to the context tables."""
     for name, action in analysis.unsafe.items():
         for i, context in enumerate(action.contexts):
             row = _row(analysis, context)
@@ -210,7 +207,6 @@ def _places(analysis: Analysis, manifest: TargetManifest) -> Iterator[MutatorErr
 
 
 def functions(code: bytes) -> Iterator[str]:
-    """The qualified names of a module's functions and methods."""
     for node in ast.parse(code).body:
         if isinstance(node, ast.FunctionDef):
             yield node.name
@@ -237,7 +233,6 @@ def _faults(analysis: Analysis, specs: Specs) -> Iterator[MutatorError]:
 
 
 def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """Check that a factor's places are exactly those of its faults."""
     actual = {place for fault in factor.faults for place in injected(specs[fault])}
     if actual != set(factor.at):
         yield analysis.factors_source.error(
@@ -249,7 +244,6 @@ def _misplaced(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs
 
 
 def _misdirected(analysis: Analysis, keys: Keys, factor: FactorModel, specs: Specs) -> Iterator[MutatorError]:
-    """Check that every fault aims at a hazard that the factor leads to."""
     hazards = {hazard for action in factor.leads_to for hazard in analysis.unsafe[action].hazards}
     for i, fault in enumerate(factor.faults):
         for variant in specs[fault]:

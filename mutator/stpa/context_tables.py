@@ -20,8 +20,6 @@ _CONSTANT = re.compile(r"[a-z][a-z0-9_]*\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verdicts:
-    """The hazards of one control action in one context, if it is provided and if it is not."""
-
     provided: str | None
     not_provided: str | None
 
@@ -85,7 +83,7 @@ class ContextTable:
 
 @dataclass(frozen=True, kw_only=True)
 class HazardList:
-    """Accidents and hazards by id, with descriptions, and the accidents that each hazard may cause."""
+    """Accidents and hazards: id -> description; and the accidents that each hazard may cause."""
 
     source: Source
     accidents: Mapping[str, str]

@@ -81,7 +81,6 @@ def _cut(left: ast.expr, right: ast.expr) -> tuple[str, float]:
 
 
 def _constant(node: ast.expr) -> float | None:
-    """The value of a number with or without a sign; None for any other expression."""
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         value = _constant(node.operand)
         return None if value is None else -value
@@ -89,7 +88,6 @@ def _constant(node: ast.expr) -> float | None:
 
 
 def _cells(name: str, cuts: list[float]) -> list[Cell]:
-    """The cells of one variable's axis, from minus to plus infinity."""
     cells = [Cell(value=-math.inf, text=f"{name} < {cuts[0]}")]
     for low, high in pairwise(cuts):
         cells.append(Cell(value=low, text=f"{name} = {low}"))

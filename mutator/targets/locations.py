@@ -8,7 +8,6 @@ from mutator.targets.source_tree import matches
 
 
 def check_location(manifest: TargetManifest, location: FaultLocation) -> None:
-    """Raise MutatorError, without a file position, unless faults may be injected into the location's file."""
     check_file(manifest, location.path)
 
 

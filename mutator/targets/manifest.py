@@ -51,14 +51,14 @@ class TargetManifest:
     """
 
     name: str
-    path: Path  # the manifest file
+    path: Path
     root: Path  # absolute source root, added to sys.path
     packages: tuple[str, ...]  # import packages (`pkg`) and flat modules (`b.py`) in it
     files: tuple[str, ...]  # globs, relative to the root: the files of the tree
     overlay: Path | None  # absolute: a folder of glue files laid over the root
     forbid: tuple[str, ...]  # globs: files in which no fault may be injected
-    env: Mapping[str, str]  # environment variables of every process that runs the target
-    requires: tuple[Requirement, ...]  # installed packages that the target needs
+    env: Mapping[str, str]
+    requires: tuple[Requirement, ...]
     entry_module: str  # module, run as `python -m`
     entry_args: tuple[str, ...]  # with {scenario}, {seed}, {out}, {cache}, {root}
     stepwise: str | None  # function of the entry module: arguments -> a steppable run
@@ -74,7 +74,7 @@ class TargetManifest:
     observation: Observation
     rules: tuple[Hazard, ...]
     metrics: tuple[Metric, ...]
-    contact: Contact | None  # how severe a contact is
+    contact: Contact | None
     scene: Scene | None
     alerts: tuple[str, ...]  # the alerts that count
     source: Source = field(repr=False, compare=False)  # the file's lines, for errors

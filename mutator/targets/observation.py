@@ -48,7 +48,6 @@ class Observation:
 
     @property
     def expressions(self) -> tuple[tuple[str, str], ...]:
-        """The names and expressions that the probe evaluates."""
         time = () if self.time is None else ((TIME, self.time),)
         return (*time, *((value.name, value.text) for value in self.values))
 
@@ -220,6 +219,6 @@ class _Hypot(ast.NodeTransformer):
 
 
 def variable_units(observation: Observation) -> Mapping[str, tuple[str, str]]:
-    """The unit and meaning of every name that a condition can use."""
+    """The unit and meaning of every name in conditions."""
     values = (*observation.values, *observation.derived)
     return {TIME: ("s", "time"), **{value.name: (value.unit, value.about) for value in values}}

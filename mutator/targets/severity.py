@@ -19,8 +19,8 @@ _KPH = UNITS["kph"].factor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Contact:
-    """How severe a contact, the terminal hazard `hazard`, is. The metric `speed` is the closing speed (m/s),
-    masses are in kg, and `scale` names the scale of the classes."""
+    """How severe a contact is. `hazard` is the terminal hazard, and `speed` the metric of the closing speed
+    (m/s). Masses are in kg; `scale` names the scale of the classes."""
 
     hazard: str
     speed: str
@@ -50,7 +50,6 @@ class Scale:
         return cls(name=data["name"], about=data["about"], source=data["source"], classes=classes)
 
     def plain(self) -> dict[str, Any]:
-        """The scale as JSON types, for run.json and pages."""
         told = {"name": self.name, "about": self.about, "source": self.source}
         return told | {"classes": [list(one) for one in self.classes]}
 
@@ -81,7 +80,7 @@ class _ClassModel(StrictModel, title="A class"):
     from_kph: float = Field(
         ge=0.0, allow_inf_nan=False, description="The smallest delta-v in the class; 0 for S0."
     )
-    about: str = Field(description="The harm that the class means.")
+    about: str = Field(description="The harm in this class.")
 
 
 class ScaleModel(StrictModel, title="severity/*.yaml"):

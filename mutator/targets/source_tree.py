@@ -63,7 +63,6 @@ class SourceTree:
         return {path: digest(data) for path, data in self.files.items()}
 
     def digest_with(self, changed: Mapping[str, bytes]) -> str:
-        """The digest of the tree with the files `changed` replaced."""
         return _digest({**self._entries, **_entries(changed)})
 
 

@@ -91,7 +91,7 @@ def _channels(data: dict[str, Any], lines: dict[Keys, int]) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Upgrade:
-    """A manifest as text of target/2; `lost` are the comments in the rewritten parts, which are dropped."""
+    """A manifest as text of target/2; `lost` are the comments in the rewritten parts."""
 
     text: str
     lost: tuple[str, ...]

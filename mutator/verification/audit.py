@@ -1,7 +1,4 @@
-"""Audit a run folder: check that everything in it follows from its content. Executes nothing.
-
-Digests and checksums are checked before the content. Each step lists all differences.
-"""
+"""Audit a run folder: check that everything in it follows from its content. Executes nothing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -33,7 +30,7 @@ Problems = Iterator[MutatorError]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """One step of an audit: what must hold, the number of items checked, and the differences."""
+    """One step of an audit; `what` must hold."""
 
     what: str
     count: int
@@ -162,7 +159,6 @@ def _goldens(folder: RunFolder, manifest: TargetManifest | None) -> Problems:
 
 
 def _sources(folder: RunFolder, workspace: Workspace | None) -> Problems:
-    """Check that the workspace has the sources that the run was planned with."""
     where, head = folder.path / HEAD, folder.head
     if workspace is None:
         yield MutatorError(

@@ -26,8 +26,6 @@ _TINY = 1e-9  # s
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A record and its location."""
-
     path: Path
     line: int
     record: Record
@@ -168,11 +166,8 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
 
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:
-    """Flaws of the times at which channels left golden.
-
-    The channels must be the target's, and the times before the drive ended. The first actuator to leave
-    golden gives the manifestation time.
-    """
+    """The channels that left golden must be the target's, and the times before the drive ended. The first
+    actuator to leave golden gives the manifestation time."""
     if "channels" not in head:
         return
     end = inf if record.t_end is None else record.t_end + _TINY

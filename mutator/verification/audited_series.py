@@ -31,7 +31,6 @@ def _problems(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
 
 
 def _packed(folder: RunFolder, there: SeriesFolder) -> Iterator[MutatorError]:
-    """Yield the problems of the index and the chunks."""
     run, path = folder.path, there.path / f"{INDEX}.js"
     try:
         index = there.index

@@ -53,7 +53,6 @@ def sets(manifest: TargetManifest) -> list[Place]:
 
 
 def of_kind(watched: Mapping[str, Any], kind: str) -> list[Place]:
-    """The lines of one kind that a watched run noted."""
     return [place_of(one) for one in watched.get("noted", []) if one["kind"] == kind]
 
 

@@ -31,11 +31,8 @@ LITTLE_MEMORY = 1e9  # bytes; two controllers with their solvers, and the runner
 
 
 def examine(workspace: "Workspace | MutatorError") -> list[Finding]:
-    """Check interpreter, packages, machine, current folder, child processes, library and targets.
-
-    Each target is loaded to see whether it can be forked. `workspace` may be the error from looking for it,
-    which becomes a finding.
-    """
+    """Check interpreter, packages, machine, current folder, child processes, library and targets (including
+    whether each can be forked). `workspace` may be the error from looking for it, which becomes a finding."""
     findings = [_python(), *_packages(), _cores(), _memory(), _disk(), _folder(), _child()]
     if isinstance(workspace, MutatorError):
         remedy = workspace.remedy or ""
@@ -53,7 +50,6 @@ def _python() -> Finding:
 
 
 def _packages() -> Iterator[Finding]:
-    """Check that each package that mutator requires (extras excluded) has an allowed version."""
     for line in importlib.metadata.requires("mutator") or ():
         wanted = Requirement(line)
         if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
@@ -90,7 +86,6 @@ def _disk() -> Finding:
 
 
 def _folder() -> Finding:
-    """Check that run folders are writable, and that their file system supports locks."""
     here = Path.cwd()
     try:
         with tempfile.TemporaryFile(dir=here) as file:

@@ -110,7 +110,6 @@ class _Drive:
         yield self._counting(scenario, self.setting)
 
     def _golden(self, scenario: str, runs: Mapping[str, Execution]) -> _Golden:
-        """The runs of a scenario. The third is needed only if the first two differ."""
         first, watched = runs[f"first-{scenario}"], runs[f"counting-{scenario}"]
         one, other = self._look(first), self._look(watched)
         if one.problem or (one.digest == other.digest and not other.problem):
@@ -184,7 +183,6 @@ class _Drive:
         return {**golden.watched.watched, "noted": noted}
 
     def _clocks(self, goldens: Mapping[str, _Golden]) -> list[Finding]:
-        """Report where a deterministic target reads clocks."""
         noted = [place for golden in goldens.values() for place in causes.of_kind(self._noted(golden), CLOCK)]
         if not noted:
             return []

@@ -164,7 +164,6 @@ def judge(folder: RunFolder, records: Mapping[str, Record]) -> Proof | None:
 
 
 def difference(record: Record, truth: Record) -> str:
-    """The first field in which a record differs from the expected one."""
     names = [name for name in Record.__slots__ if getattr(record, name) != getattr(truth, name)]
     return f"{names[0]} {getattr(record, names[0])!r} instead of {getattr(truth, names[0])!r}"
 

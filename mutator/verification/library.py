@@ -113,7 +113,7 @@ class _Found:
         self.problems: list[MutatorError] = []
 
     def tried(self, make: Callable[[], T]) -> T | None:
-        """Return the result of `make`. If that fails, store the problem and return None."""
+        """The result of `make`; None if that fails."""
         try:
             return make()
         except MutatorError as error:

@@ -162,7 +162,6 @@ class _Checks:
         yield from results
 
     def _install(self, checks: bytes) -> None:
-        """Put the kept golden runs and these results into the run folder."""
         run, golden = self.folder.path, self.kept / "golden"
         golden.mkdir(parents=True, exist_ok=True)
         files = {f"golden/{path.relative_to(golden).as_posix()}": path for path in golden.rglob("*")}

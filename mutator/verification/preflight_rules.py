@@ -73,7 +73,6 @@ def judge_golden(first: CheckRun, again: CheckRun) -> str:
 
 
 def judge_null(first: CheckRun, null: CheckRun) -> str:
-    """The problem of a null mutant compared with its golden run; empty if there is none."""
     if null.problem:
         return null.problem
     if null.digest != first.digest:

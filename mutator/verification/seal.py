@@ -49,7 +49,6 @@ def _choices(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def seal_or_why_not(folder: RunFolder) -> str:
-    """The seal, or a short reason why there is none."""
     none = "the run is not finished" if folder.verifiable else not_verifiable(folder)
     return seal_of(folder) or f"none: {none}"
 

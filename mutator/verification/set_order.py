@@ -19,8 +19,6 @@ _SHORT = 60  # longest shown expression, in characters
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SetOrder:
-    """A place where the order of a set is used."""
-
     line: int
     function: str
     what: str

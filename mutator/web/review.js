@@ -127,7 +127,7 @@ const Review = (() => {
       this.#apply({ isKept: true });
     }
 
-    /** Mark groups. Returns false if the name of the reviewer is missing. Repeating the decision on a single group takes it back. */
+    /** Mark groups. Returns false if the name of the reviewer is missing. Repeating the decision on a single group withdraws it. */
     mark(all, kind, text = "") {
       const outbox = this.data.served && this.marks;
       if (!outbox) return this.marks.mark(all, kind);
@@ -159,7 +159,7 @@ const Review = (() => {
     #conflict(id, words, item) {
       this.conflicts.set(id, item);
       const { decision, flag } = this.groups.get(id);
-      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime flagged by ${flag.by}.` : "In the meantime the decision was taken back.";
+      const other = decision ? `In the meantime: ${Card.told(decision)}.` : flag ? `In the meantime flagged by ${flag.by}.` : "In the meantime the decision was withdrawn.";
       this.cards.get(id).conflict(`${other} Your mark was not saved: ${Card.name(item.kind).toLowerCase()}.`, item.kind);
       this.#say(id, "not saved", true);
       find("said").textContent = `${id}: ${words || other}`;

@@ -64,7 +64,7 @@ const Beside = (() => {
     return [el("p", {}, `${Card.plural(found.experiments, "experiment")} in this run: `, counts), one("Typical", found.typical), isOther ? one("Worst", found.worst) : null].filter(Boolean);
   }
 
-  /** Report each of `elements` once, when it comes near the visible part. */
+  /** Call `seen` once for each of `elements`, when it comes near the visible area. */
   function nearby(seen, elements) {
     const observer = new IntersectionObserver((entries) => {
       for (const { isIntersecting, target } of entries) {

@@ -93,7 +93,7 @@ class Card {
     this.#remarks();
   }
 
-  /** Whether a button shows as pressed: because of a mark that is being sent, or else of a valid decision. */
+  /** Whether a button is shown as pressed, for a mark that is being sent or else for a valid decision. */
   isMarked(kind, pending) {
     const { state, flag } = this.group;
     if (kind === "flag") return pending.has("flag") || (Boolean(flag) && !pending.has("unflag"));
@@ -108,7 +108,7 @@ class Card {
     kept.classList.toggle("bad", isBad);
   }
 
-  /** Another reviewer's change in the meantime; null: none. `mine`: the kind of my mark that was not saved. */
+  /** Show another reviewer's change (empty: none). `mine` is the kind of the mark that was not saved. */
   conflict(words, mine) {
     const { el } = Dom;
     const place = this.#part("conflict");
@@ -122,7 +122,7 @@ class Card {
   }
 
   static name(kind) {
-    return { approve: "Approve", reject: "Reject", clear: "Take back", flag: "Flag", unflag: "Remove the flag", remark: "Remark" }[kind];
+    return { approve: "Approve", reject: "Reject", clear: "Withdraw", flag: "Flag", unflag: "Remove the flag", remark: "Remark" }[kind];
   }
 
   /** A decision in one line: who, when, for which commit, and changes since. */

@@ -1,5 +1,5 @@
 "use strict";
-// A question with one way to say yes, in the page's dialog `ask`.
+// Asks for confirmation in the page's dialog `ask`.
 
 const Question = (() => {
   const find = (id) => document.getElementById(id);

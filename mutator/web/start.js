@@ -79,7 +79,7 @@
   }
 
   Jobs.ask("/api/library").then((library) => {
-    place.append(el("h2", {}, "Start something"), library.problem ? el("p.bad", {}, library.problem) : "",
+    place.append(el("h2", {}, "Start a job"), library.problem ? el("p.bad", {}, library.problem) : "",
       el("div.orders", {}, library.specs.length ? tryForm(library) : null, library.campaigns.length ? campaignForm(library) : null));
   }).catch((error) => place.append(el("p.bad", { role: "alert" }, `The library cannot be read: ${error.message}.`)));
 })();
