@@ -134,7 +134,7 @@ class Comparison:
             (f"only in {names.b}", m.only_b),
             (f"no result in {names.a}", m.no_result_a),
             (f"no result in {names.b}", m.no_result_b),
-            ("several of this name in one run", m.ambiguous),
+            ("several with the same key in one run", m.ambiguous),
         )
         return tuple((why, experiment) for why, group in groups for experiment in group)
 

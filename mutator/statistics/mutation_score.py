@@ -30,7 +30,7 @@ _NOTE = (
     "drive, *transient* ones while their trigger holds. Shares are of *activated* mutants; a mutant counts "
     "once, if any of its drives shows the effect. Intervals are 95 % Wilson intervals; for counts of drives, "
     "whole mutants are resampled (bootstrap). *New alert*: an alert that the scenario's fault-free run "
-    "does not raise. A drive that crashed or timed out is not judged: it counts only there and in the "
+    "does not raise. A drive that crashed or timed out is not judged: it counts only as such and in the "
     "total. *No effect*: none of the four, which includes mutants that are equivalent to the "
     "original."
 )

@@ -110,7 +110,7 @@ def _categories(analysis: Analysis) -> Iterator[MutatorError]:
             if category not in judged:
                 yield analysis.structure_source.error(
                     ("control_actions", name),
-                    f"no unsafe control action for '{name}' {category}",
+                    f"no unsafe control action for '{name}' in category {category}",
                     expected="one in each of the four categories",
                     remedy=f"add it to {analysis.unsafe_source.path.name}",
                 )

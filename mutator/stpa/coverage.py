@@ -51,7 +51,7 @@ def measure_coverage(conditions: Mapping[str, str]) -> Coverage:
     total = math.prod(len(line) for line in lines)
     if total * len(conditions) > MAX_TESTS:
         found = f"{total} cells for {len(conditions)} contexts"
-        return Coverage(beyond=f"its constants cut out {found}, too many to test them all")
+        return Coverage(beyond=f"its constants yield {found}, too many to test")
     for place in product(*lines):
         values = {name: cell.value for name, cell in zip(cuts, place, strict=True)}
         rows = tuple(row for row, condition in conditions.items() if evaluate(condition, values))

@@ -144,7 +144,10 @@ def _channel(name: str, model: ChannelModel, trace: TraceModel, source: Source) 
         )
     if in_topics and model.time:
         raise source.error(
-            (*keys, "time"), f"'{model.time}'", expected="none: a message has its time", remedy="leave it out"
+            (*keys, "time"),
+            f"'{model.time}'",
+            expected="none: each message has its time",
+            remedy="leave it out",
         )
     plain = model.model_dump(exclude={"from_", "tolerance"})
     tolerance = model.role.tolerance if model.tolerance is None else model.tolerance

@@ -33,7 +33,7 @@ def check_environment(env: Mapping[str, str], source: Source) -> None:
             raise source.error(
                 ("env", name),
                 f"variable {name}",
-                expected=f"one that the harness does not set itself{fixed}",
+                expected=f"a variable that the harness does not set{fixed}",
                 remedy="leave it out",
             )
         if "\0" in value or value != value.encode("utf-8", "ignore").decode():

@@ -165,7 +165,7 @@ def _hazard(name: str, model: HazardModel, known: Collection[str], source: Sourc
             raise source.error(
                 (*keys, key),
                 f"`{key}` of a hazard that is judged by {judged_by}",
-                expected="it only with `when`",
+                expected="this key only with `when`",
                 remedy="remove it",
             )
     when = condition(model.when, known, source, (*keys, "when"))

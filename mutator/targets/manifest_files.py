@@ -217,7 +217,7 @@ def _check_events(model: ManifestModel, source: Source) -> None:
                 raise source.error(
                     (key, name if isinstance(names, dict) else i),
                     f"'{name}'",
-                    expected="a name of letters, digits and _, once",
+                    expected="a unique name of letters, digits and _",
                     remedy="rename it",
                 )
             seen.add(name.lower())

@@ -143,7 +143,7 @@ def _check_names(model: ObservationModel, source: Source) -> None:
                 raise source.error(
                     ("observation", key, name),
                     f"'{name}'",
-                    expected=f"a name of letters, digits and _, once, none of {', '.join(_TAKEN)}",
+                    expected=f"a unique name of letters, digits and _, none of {', '.join(_TAKEN)}",
                     remedy="rename it",
                 )
 
@@ -167,7 +167,7 @@ def _read(text: str, source: Source, keys: tuple[str, ...]) -> str:
             shown(text),
             expected="names, attributes, items with constant keys, numbers, arithmetic, comparisons, and "
             f"calls of {', '.join(_FUNCTIONS)}",
-            remedy="write where that statement finds the value",
+            remedy="write an expression that gives the value at that statement",
         ) from None
 
 

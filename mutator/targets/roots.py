@@ -76,7 +76,7 @@ def read_packages(package: str | None, packages: Sequence[str] | None, source: S
             raise source.error(
                 ("packages", i),
                 f"'{name}'",
-                expected=f"a package, or a module's file such as drive.py, each once, none {PROBE_NAME}",
+                expected=f"a package, or a module's file such as drive.py, each once, and not {PROBE_NAME}",
                 remedy="correct it; leave out what is inside a package",
             )
         seen.add(stem)

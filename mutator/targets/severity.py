@@ -138,7 +138,7 @@ def load_scale(path: Path) -> Scale:
             raise source.error(
                 ("classes", name, "from_kph"),
                 f"{least[i]:g}",
-                expected="0 for S0, and for each other class more than for the one before",
+                expected="0 for S0, and for each other class more than for the one before it",
                 remedy="correct the bound",
             )
     return Scale(

@@ -110,7 +110,7 @@ def _read(root: Path, globs: tuple[str, ...]) -> dict[str, bytes]:
         check_is_text(path)
         if path.is_symlink() and not path.exists():
             raise MutatorError(
-                f"a link to {path.readlink()}, where nothing is",
+                f"a link to {path.readlink()}, which does not exist",
                 where=path,
                 expected="a file",
                 remedy="repair or remove the link, or leave it out of `files`",

@@ -56,7 +56,10 @@ def upgraded(source: Source) -> Source:
 def _check_complete(data: dict[str, Any], keys: tuple[str, ...], source: Source, at: Keys) -> None:
     if missing := [key for key in keys if key not in data]:
         raise source.error(
-            at, f"no `{missing[0]}`", expected=f"it in a manifest of {OLD}", remedy=f"add it, or write {NEW}"
+            at,
+            f"no `{missing[0]}`",
+            expected=f"this key in a manifest of {OLD}",
+            remedy=f"add it, or write {NEW}",
         )
 
 

@@ -162,7 +162,7 @@ def _flaws_of_names(record: Record, head: Mapping[str, Any], tolerances: Mapping
     if any(value > largest.get(name, -1.0) for name, value in record.dev):
         yield f"differences {record.dev} up to the drive's end", f"none larger than {record.max_dev}"
     if beyond and record.t_manifest is None:
-        yield f"{beyond[0]} differs, and was not manifested", "the time of the first difference"
+        yield f"{beyond[0]} differs, but no manifestation is recorded", "the time of the first difference"
 
 
 def _flaws_of_path(record: Record, head: Mapping[str, Any]) -> Flaws:

@@ -90,7 +90,7 @@ class Reach:
                 "trigger",
                 self._triggers,
                 [one.place for one in self.untriggered],
-                "its experiments are never active: add a scenario that reaches it, or remove "
+                "a fault with this trigger is never active: add a scenario that reaches it, or remove "
                 "it from the campaigns",
             ),
         ]

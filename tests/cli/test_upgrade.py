@@ -82,7 +82,7 @@ def test_line_breaks_and_links_stay(cli, path: Path) -> None:
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("time_channel: time\n", "no `time_channel`\n  expected: it in a manifest of target/1"),
+        ("time_channel: time\n", "no `time_channel`\n  expected: this key in a manifest of target/1"),
         ("record_file: said.json\n", "no `record_file`"),
         ("  v_lead: world.lead_speed\n", "toycar.yaml:30: no `v_lead`"),
         ("    alone: [--alone]\n", "toycar.yaml:13"),  # a mapping without entries

@@ -206,7 +206,7 @@ def test_a_category_or_a_hazard_that_is_left_out(
     problems = [str(p) for p in check_analysis(load_analysis(folder), specs, manifest)]
     assert len(problems) == 2, problems
     assert "hazard 'H4' follows from no unsafe control action" in problems[0]
-    assert "no unsafe control action for 'steer' wrong_duration" in problems[1]
+    assert "no unsafe control action for 'steer' in category wrong_duration" in problems[1]
 
 
 def test_an_unsafe_action_without_a_cause(

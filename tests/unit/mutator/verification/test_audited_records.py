@@ -78,7 +78,7 @@ def test_a_record_without_contradiction(record: MakeRecord, fields: dict[str, An
         ({"activation": Activation(first=2.0, last=3.0, count=0)}, "active from"),
         ({"trace_digest": ""}, "trace digest ''"),
         ({"max_dev": (("gas", 0.0),)}, "differences of gas; expected those of gas, brake"),
-        ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, and was not manifested"),
+        ({"max_dev": (("gas", 0.1), ("brake", 0.0))}, "gas differs, but no manifestation is recorded"),
         (BAD_END | {"status": Status.CRASHED, "outcome": Outcome.SDC}, "outcome sdc; expected none, as it"),
         (BAD_END | {"status": Status.TIMEOUT, "trace_digest": "f"}, "trace_digest f; expected none"),
     ],
