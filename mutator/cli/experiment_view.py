@@ -128,8 +128,8 @@ def _events(record: "Record") -> list[tuple[float, str]]:
     events: list[tuple[float, str]] = []
     if record.activation:
         times = record.activation.count
-        events.append((record.activation.first, f"fault active first ({times} times in all)"))
-        events.append((record.activation.last, "fault active last"))
+        events.append((record.activation.first, f"fault first active ({times} times in all)"))
+        events.append((record.activation.last, "fault last active"))
     if record.t_manifest is not None:
         events.append((record.t_manifest, "manifested: an actuator differs from golden"))
     events += [(t, f"alert {name}") for name, t in record.alerts]

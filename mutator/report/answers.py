@@ -61,9 +61,9 @@ def _told(run: ReportedRun) -> pd.DataFrame:
 
 
 def _warned(row: Row) -> str:
-    """The first alert and the reaction time, for example `fcw, 1.2 s`; or `too late`, or `none`."""
+    """The first alert and its lead, for example `fcw, 1.2 s`; or `only after`, or `none`."""
     if row.reaction_time is None:
-        return "too late" if row.alerts else "none"
+        return "only after" if row.alerts else "none"
     return f"{row.alerts[0]}, {row.reaction_time:.1f} s"
 
 
@@ -74,7 +74,7 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
     says = f"{share(len(silent), len(hazards), 'hazards')} {were(len(silent))} silent (no alert "
-    says += "came before)"
+    says += "before the hazard)"
     says += (
         f": {never:,} with no alert at all, {late:,} with an alert only after the hazard."
         if never or late
@@ -95,7 +95,7 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
     links = {"Silent hazards": SILENT, "No alert at all": [NO_ALERT], "Only after the hazard": [LATE]}
     return Answer(
         name="unwarned",
-        title="What came without a warning",
+        title="Which hazards were silent",
         says="No hazard came."
         if hazards.empty
         else says + _more(sum(part > 0 for _, part, _ in kinds), "fault types with silent hazards"),
@@ -110,7 +110,7 @@ def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
 
 def _more(count: int, what: str) -> str:
     """A note that a list is cut, or '' if it is complete."""
-    return f" The table has the first {TYPES} of {count:,} {what}." if count > TYPES else ""
+    return f" The table shows {TYPES} of the {count:,} {what}." if count > TYPES else ""
 
 
 def survived(frame: pd.DataFrame) -> Answer:
@@ -121,10 +121,11 @@ def survived(frame: pd.DataFrame) -> Answer:
     broken = len(active) - len(fine) - int((active["outcome"] == "hazard").sum())
     says = f"{share(len(fine), len(active), 'activated faults')} led to no hazard: "
     says += f"{len(fine) - moved:,} changed no actuator (masked), {moved:,} did (sdc)."
-    says += f" {broken:,} ended the program or kept it from ending." if broken else ""
+    says += f" {broken:,} crashed or timed out." if broken else ""
     kinds = by_kind(fine, active)
     whole = [(kind, of) for kind, part, of in kinds if part == of]
-    says += f" {share(len(whole), len(kinds), 'fault types')} never led to {'either' if broken else 'one'}."
+    says += f" {share(len(whole), len(kinds), 'fault types')} never led to a hazard"
+    says += ", a crash or a timeout." if broken else "."
     weak = sorted((k for k in kinds if k[1] < k[2]), key=lambda k: (k[1] / k[2], -k[2], k[0]))
     says += _more(len(weak), "fault types that did")
     ends = {"outcome": ["masked", "sdc"]}
@@ -132,10 +133,10 @@ def survived(frame: pd.DataFrame) -> Answer:
     never = [(kind_link(kind, **ends), f"{of:,}") for kind, of in whole]
     return Answer(
         name="survived",
-        title="What the controller survived",
+        title="What the controller tolerated",
         says="No fault was activated." if active.empty else says,
         listings=(
-            Listing(heads=("fault type, least survived first", "no hazard / activated"), lines=least),
+            Listing(heads=("fault type, lowest share first", "no hazard / activated"), lines=least),
             Listing(heads=("never led to a hazard", "activated"), lines=never),
         ),
         links=tuple(
@@ -152,7 +153,7 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
     says = f"The experiments took {duration(total)} of CPU time, by {counted(workers, 'worker')}: "
-    says += f"{share(ran, len(frame), 'experiments')} {were(ran)} driven{_undriven(frame, cpu, timings)}."
+    says += f"{share(ran, len(frame), 'experiments')} {were(ran)} simulated{_undriven(frame, cpu, timings)}."
     if ran:
         says += f" Median {cpu[cpu > 0].median():.2f} s, longest {cpu.max():.2f} s."
     says += " Checks, golden runs and the equivalence check are not timed."
@@ -176,7 +177,7 @@ def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str
     golden = timings[timings["engine"] == RunMode.GOLDEN.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())
     why = {
-        "whose trigger never held, so the golden run's result was used": idle,
-        "with the result of an experiment that is the same run": len(rest) - idle,
+        "the trigger never held, so the golden run's result was used": idle,
+        "the result is that of an experiment with the same run": len(rest) - idle,
     }
-    return "".join(f", {count:,} {words}" for words, count in why.items() if count)
+    return "".join(f"; for {count:,}, {words}" for words, count in why.items() if count)

@@ -31,6 +31,7 @@ from mutator.report.source_lines import SourceLines
 from mutator.report.studies import ReportedRun
 from mutator.report.warnings import warning
 from mutator.report.whole_map import map_of
+from mutator.report.words import meanings_of
 from mutator.review.groups import Shape, shapes
 from mutator.statistics.mutation_score import PERMANENT, TRANSIENT
 from mutator.store.run_folder import RunFolder
@@ -74,6 +75,7 @@ def browse_data(run: ReportedRun) -> Browse:
         "metrics": folder.head.get("metrics", []),
         "severity": folder.head.get("severity"),
         "hazards": folder.head.get("about_hazards", []),
+        "meanings": meanings_of(run),
     }
     return Browse(
         facts=Markup(json.dumps(facts).replace("<", "\\u003c")),

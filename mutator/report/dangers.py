@@ -32,7 +32,7 @@ def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_aler
     kinds = by_kind(ranked, active)
     came = [kind for kind in kinds if kind[1]]
     lines = [(kind_link(kind, outcome=["hazard"]), bar(part, of)) for kind, part, of in came[:TYPES]]
-    first = f"the first {TYPES} of {len(came)}" if len(came) > TYPES else "most hazards first"
+    first = f"top {TYPES} of {len(came)}" if len(came) > TYPES else "most hazards first"
     heads = (f"fault types with hazards, {first}", "hazards / activated")
     return Answer(
         name="dangerous",
@@ -83,14 +83,14 @@ def _worst_lists(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: 
     hit = ranked[ranked[SEVERITY] != ""] if SEVERITY in ranked else ranked
     missed = ranked.drop(hit.index)
     if hit.empty or missed.empty:
-        return (_worst(ranked.head(WORST), "the worst", HAZARD, units, has_alerts=has_alerts),)
+        return (_worst(ranked.head(WORST), "worst", HAZARD, units, has_alerts=has_alerts),)
     contacts = hit.head(max(CONTACTS, WORST - len(missed)))
     others = missed.head(WORST - len(contacts))
     classes = sorted(hit[SEVERITY].unique())
     shown, also = {**HAZARD, SEVERITY: classes}, {**HAZARD, SEVERITY: [NO_CONTACT]}
     return (
-        _worst(contacts, "the worst with contact", shown, units, has_alerts=has_alerts),
-        _worst(others, "the worst without contact", also, units, has_alerts=has_alerts),
+        _worst(contacts, "worst with contact", shown, units, has_alerts=has_alerts),
+        _worst(others, "worst without contact", also, units, has_alerts=has_alerts),
     )
 
 
@@ -110,13 +110,13 @@ def _worst(
         heads.append("severity")
         columns.append(("severity " + ranked[SEVERITY]).where(ranked[SEVERITY] != "", "-"))
     if contact or any(name.startswith(MARGIN) for name in units):
-        heads.append("how bad")
+        heads.append("measure")
         told = [_how_bad(row, contact, units) for row in ranked.to_dict("records")]
         columns.append(pd.Series(told, ranked.index, dtype=str))
-    heads.append("hazard after")
+    heads.append("time to hazard")
     columns.append((ranked["t_hazard"] - ranked["t_activation"]).map("{:.2f} s".format))
     if has_alerts:
-        heads.append("alert before")
+        heads.append("alert before hazard")
         columns.append(ranked["warned"])
     around = to_list(shown, "rank")
     links = [

@@ -29,8 +29,8 @@ def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: b
     classes = _classes(counted)
     order = _order(counted, classes)
     what = "silent hazards" if has_alerts else "hazards"
-    heads = ["fault type", f"{what} by severity" if SEVERITY in counted else what, "fastest hazard after"]
-    heads += ["let through to an actuator by", "stopped, of those active"] if paths else []
+    heads = ["fault type", f"{what} by severity" if SEVERITY in counted else what, "shortest time to hazard"]
+    heads += ["passed on to an actuator by", "stopped by, of all active"] if paths else []
     only: Mapping[str, Sequence[str]] = {"warning": SILENT} if has_alerts else {"outcome": ["hazard"]}
     lines = [
         _line(kind, frame[frame["kind"] == kind], counted[counted["kind"] == kind], classes, only, paths)
@@ -75,14 +75,15 @@ def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], w
     says = f"Start with {order[0]}: {share(int(mine.sum()), len(counted), what)}"
     if classes[0]:
         of_class = counted[SEVERITY] == classes[0]
-        says += f", and {int((mine & of_class).sum())} of {int(of_class.sum())} of severity {classes[0]}"
-        says += ", the highest that came"
+        part, all_ = int((mine & of_class).sum()), int(of_class.sum())
+        says += f", and {'the only one' if all_ == 1 else f'{part} of {all_}'} of severity {classes[0]}"
+        says += f", the highest among the {what}"
     says += f". The rule: fault types with the most {what}"
     if len(classes) > 1:
-        says += " of the highest severity come first; ties go to the next class"
+        says += " of the highest severity come first; ties are broken by the next lower class"
     says += ", then the shortest time from fault to hazard."
     if len(order) > LISTED:
-        says += f" The table has the first {LISTED} of {len(order)} fault types."
+        says += f" The table shows the first {LISTED} of {len(order)} fault types."
     return says
 
 

@@ -31,7 +31,7 @@ _HEADS = (
     "experiments",
     "hazards",
     "by severity",
-    "without a warning",
+    "silent hazards",
     "CPU time",
 )
 

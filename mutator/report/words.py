@@ -7,7 +7,6 @@ import yaml
 from mutator.errors import MutatorError
 from mutator.model import Method
 from mutator.report.studies import ReportedRun
-from mutator.report.warnings import LATE, NO_ALERT
 
 Words = Mapping[str, Mapping[str, str]]  # heading -> term -> meaning
 
@@ -17,7 +16,9 @@ _RUNS = {
     "activated": "a changed statement ran while its trigger held",
     "manifested": "after activation, an actuator output differed from the golden run",
     "fault-tolerant time": "the time from activation to the first hazard",
-    "margin": "the distance that a run kept from a hazard, negative inside it",
+    "margin": "the distance that a run kept from a hazard, negative once the hazard has occurred",
+    "end of the drive": "the first terminal hazard, such as a contact: the simulation continues, but metrics "
+    "and fault paths leave out later steps",
     "rank": "1 is the worst; by severity, then delta-v; without contact by outcome, then margin",
 }
 _ENDINGS = {
@@ -29,8 +30,8 @@ _ENDINGS = {
     "harness error, invalid mutant": "no result about the fault; counted only here",
 }
 _ALERTS = {
-    "silent hazard": f"no alert came before it: {NO_ALERT}, or an {LATE.removesuffix(' the hazard')} it",
-    "hazard, no alert": "in tables, the narrower meaning: no alert at all",
+    "silent hazard": "a hazard with no alert before it: either no alert at all, or only a later one",
+    "hazard, no alert": "a silent hazard with no alert at all, not even a later one",
     "reaction time": "the time from the first alert to the hazard that follows it",
 }
 _METHODS = {
@@ -54,13 +55,38 @@ def words_of(run: ReportedRun) -> Words:
     return {title: words for title, words in found.items() if words}
 
 
+def meanings_of(run: ReportedRun) -> Words:
+    """The meanings of the codes in the list of experiments: column -> code -> meaning."""
+    words = words_of(run)
+    triggers = words.get("Triggers", {})
+    drawn = run.texts[run.texts["method"] == Method.RANDOM.value]["trigger"].unique()
+    at_random = {
+        name: f"a time drawn at random, as the counterpart of {name.rpartition('/')[2]}"
+        for name in sorted(drawn)
+    }
+    endings = {
+        name.replace(" ", "_"): about for names, about in _ENDINGS.items() for name in names.split(", ")
+    }
+    return {
+        "scenario": words.get("Scenarios", {}),
+        "trigger": triggers | at_random,
+        "method": triggers,
+        "ending": endings,
+        "outcome": endings,
+        "hazards": words.get("Hazards", {}),
+        "severity": {
+            name.removeprefix("severity "): about for name, about in words.get("Severity", {}).items()
+        },
+    }
+
+
 def _severity(scale: Mapping[str, object] | None) -> dict[str, str]:
     """The severity classes with their lower limits of delta-v."""
     if not scale:
         return {}
     classes = scale["classes"]
     assert isinstance(classes, list)
-    told = {f"severity {name}": f"delta-v from {low:.2f} m/s: {about}" for name, low, about in classes}
+    told = {f"severity {name}": f"delta-v of {low:.2f} m/s or more: {about}" for name, low, about in classes}
     return told | {"no contact": "no class; these hazards rank by margin, with hazard types alternating"}
 
 

@@ -2,9 +2,9 @@
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
+  /** What the header says after the outcome; by `warning`. */
+  static ALERTED = { "no alert at all": ", no alert at all,", "alert only after the hazard": ", no alert before it,", "alert before the hazard": " after an alert," };
   static open = null; // {id, experiment} for scripts that add buttons, which the event `filled` notifies
-  static NO_PICTURES = "A campaign with camera images makes stills of only some of its worst experiments, because each needs a rerun. "
-    + "This command makes stills of this experiment; then rebuild the report to see them here:";
 
   /** `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
   constructor(place, table, state, facts, actions) {
@@ -80,19 +80,20 @@ class Experiment {
     const { el } = Dom;
     const id = this.text("experiment_id");
     document.title = `${this.text("fault")} in ${this.text("scenario")} - ${this.title}`;
+    const code = (name) => el("span", { title: this.table.meaning(name, this.text(name)) }, this.text(name));
     const section = (title, name) => el(`section.${name}`, {}, el("h3", {}, title), el("div.content", {}, el("p.quiet", {}, "…")));
     this.place.replaceChildren(
       el("header", {},
         el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, this.text("fault")),
-          el("p.under", {}, Grid.ending(this.text("ending")), ` in ${this.text("scenario")}, ${this.text("method")}, trigger ${this.text("trigger")} `)),
+          el("p.under", {}, Grid.ending(this.text("ending")), Experiment.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
         this.#buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
       this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
-      el("section.happened", {}, el("h3", {}, "What happened"), this.#events()),
+      el("section.happened", {}, el("h3", {}, "What happened"), this.#setting(), this.#events()),
       typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
       section("Replay", "replay"),
       section("Pictures", "pictures"),
-      section("Change", "change"),
+      section("Diff", "change"),
       section("Injected lines", "snippet"),
       section("Fault spec with this experiment's value", "spec"),
       el("section.again", {}, el("h3", {}, "Run it again"), this.#commands()),
@@ -105,12 +106,31 @@ class Experiment {
     return `${location.href.split("#")[0]}#e=${this.text("experiment_id")}`;
   }
 
+  /** Scenario, trigger and alerts in words. */
+  #setting() {
+    const { el } = Dom;
+    const known = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
+    const condition = this.text("condition"), trigger = known("trigger");
+    const rows = [["scenario", known("scenario")], ["trigger", trigger.includes(condition) ? trigger : `${condition} (${trigger})`]];
+    if (this.#endedWell && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
+    return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
+      el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, about)))));
+  }
+
+  /** Whether there was an alert, and whether it came before the hazard. */
+  #alert() {
+    const first = this.text("alerts").split(";")[0], reaction = this.table.number(this.row, "reaction_time");
+    if (!first) return this.text("hazards") ? "none, neither before nor after the hazard" : "none";
+    if (!this.text("hazards")) return `${first}, without a hazard`;
+    return Number.isNaN(reaction) ? `none before the hazard, ${first} only after it` : `${first}, ${reaction.toFixed(2)} s before the hazard`;
+  }
+
   #events() {
     const { el } = Dom;
     const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
     const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in the whole run)`],
       ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
-      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)])]
+      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)]), ["t_end", "end of the drive: later steps count in no metric"]]
       .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
     if (!happened.length) return el("p", {}, Experiment.#nothing(this.text("status"), this.text("outcome")));
     const reaction = at("reaction_time");
@@ -163,7 +183,7 @@ class Experiment {
     const { el } = Dom;
     const id = this.text("experiment_id"), run = this.facts.run();
     const tried = this.text("module") === "operators" ? [] // specs have no operators
-      : [el("p", {}, "The same fault with another value, trigger or scenario:"), this.command(this.#try())];
+      : [el("p", {}, "Try a variation: change the value, trigger or scenario in this command:"), this.command(this.#try())];
     return el("div", {}, el("p", {}, "Rerun it and compare it with its record; show its diff, times and plot:"),
       this.command(`mutator rerun ${id} --run ${run}`), this.command(`mutator show ${id} --run ${run}`), tried);
   }
@@ -231,7 +251,7 @@ class Experiment {
     } }, title);
     place.replaceChildren(el("div.buttons", { role: "group", "aria-label": "Diff layout" },
       button("unified", "Unified"), button("split", "Side by side"), Dom.copyButton(() => patch, "Copy diff")), shown,
-      el("p.quiet", {}, "Not shown: the probe, which is the same file in every mutant."));
+      el("p.quiet", {}, "Not shown: the probe, a helper module that is the same in every mutant."));
     renderDiff(shown, patch, { mode: this.mode });
     const lines = Diff.injected(patch);
     snippet.replaceChildren(...lines.map(({ path, lines: code }) => el("div", {}, el("p.quiet", {}, path),
@@ -240,8 +260,8 @@ class Experiment {
 
   #spec(spec, setting) {
     const { el } = Dom;
-    const rows = [["condition", this.text("condition")], ["duration", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
-      ["not before", `${setting.armed_after_s} s`], ["scenario changes", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
+    const rows = [["trigger", this.text("condition")], ["hold", setting.hold + (setting.hold_s === null ? "" : ` ${setting.hold_s} s`)],
+      ["armed after", `${setting.armed_after_s} s`], ["scenario changes", setting.changes.join(", ") || "none"], ["seed", this.text("seed")]];
     return el("div", {}, el("pre", { tabindex: 0 }, el("code", {}, spec)),
       el("table", {}, el("tbody", {}, rows.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, value))))));
   }
@@ -260,8 +280,9 @@ class Experiment {
       ...(kept ? kept.stills : []).map(([time, link]) => el("figure", {}, el("img", { src: link, alt: `Golden and faulty runs at ${time} s`, loading: "lazy" }), el("figcaption", {}, this.#moment(time)))),
       ...(kept ? kept.films : []).map((link) => link.endsWith(".gif") ? el("img", { src: link, alt: "Golden and faulty runs", loading: "lazy" })
         : el("video", { src: link, controls: true, preload: "none", "aria-label": "Golden and faulty runs" })),
-      el("p", {}, kept ? "More stills, or a film:" : Experiment.NO_PICTURES),
-      this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`));
+      el("p", {}, kept ? "More stills, or a film:" : "There are no pictures of this experiment yet. This command makes a still and a film:"),
+      this.command(`mutator show ${id} --run ${run} --still ${t.toFixed(2)} --video ${run}${separator}plots${separator}${id}.mp4`),
+      el("p", {}, "Then rebuild the report to see them here:"), this.command(`mutator report ${run}`));
   }
 
   /** The event at the time of a still, which its file name has. */

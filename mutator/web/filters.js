@@ -25,10 +25,10 @@ class Filters {
   #facet(facet) {
     const { el } = Dom;
     if (facet.values.length < 2) return null; // nothing to choose from
-    const options = facet.values.map((value) => {
+    const { table } = this, options = facet.values.map((value) => {
       const box = el("input", { type: "checkbox", onchange: () => this.state.toggle(facet.name, value) });
       const count = el("span.count");
-      return { value, box, count, element: el("label.option", {}, box, el("span", {}, Filters.shown(facet, this.table.called(facet.name, value))), count) };
+      return { value, box, count, element: el("label.option", { title: table.meaning(facet.name, value) }, box, el("span", {}, Filters.shown(facet, table.called(facet.name, value))), count) };
     });
     const badge = el("b.badge");
     const element = el("details.facet", { "data-facet": facet.name },

@@ -179,7 +179,8 @@ class Grid {
     const cells = this.columns.map((column) => {
       const classes = `td.${Grid.#classes(column)}`;
       if (column.isNumber) return el(classes, {}, Grid.number(this.table.number(row, column.name)));
-      if (!column.time) return el(classes, {}, column.cell ? column.cell(this.table, row) : this.table.called(column.name, this.table.text(row, column.name)));
+      const title = this.table.meaning(column.name, this.table.text(row, column.name));
+      if (!column.time) return el(classes, { title }, column.cell ? column.cell(this.table, row) : this.table.called(column.name, this.table.text(row, column.name)));
       const value = this.table.number(row, column.name);
       return el(classes, {}, Number.isNaN(value) ? "" : value.toFixed(2));
     });

@@ -128,7 +128,7 @@ class HeatMap {
         onclick: () => this.#choose(kinds[y], scenarios[x], isChosen && this.#isAny),
       }, all ? text : "·"));
     };
-    const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col" }, s || "all")));
+    const head = el("tr", {}, el("td"), scenarios.map((s) => el("th", { scope: "col", title: this.table.meaning(HeatMap.COLUMN, s) }, s || "all")));
     const body = kinds.map((kind, y) =>
       el("tr", {}, el("th", { scope: "row" }, kind ? kind.split(/(?<=[/_])/).flatMap((part) => [part, el("wbr")]) : "all"), scenarios.map((_, x) => cell(y, x))));
     this.place.replaceChildren(el("table.heat", { "aria-label": `${measure.title} by fault type and scenario` },

@@ -5,9 +5,9 @@ const Path = (() => {
   /** Sign, word and meaning of each state. */
   const STATES = {
     injected: { sign: "⚡", word: "injected", about: "the fault is injected here" },
-    reached: { sign: "●", word: "reached", about: "it left the golden run" },
+    reached: { sign: "●", word: "reached", about: "it differs from the golden run" },
     passed: { sign: "○", word: "passed on", about: "none of its recorded channels changed, but a component that only it feeds did" },
-    feedback: { sign: "↺", word: "by feedback", about: "it left the golden run only after the controlled process had" },
+    feedback: { sign: "↺", word: "by feedback", about: "it differs from the golden run, but only after the controlled process did" },
     held: { sign: "■", word: "held", about: "it stayed equal to the golden run" },
     unseen: { sign: "?", word: "not recorded", about: "it has no recorded channels" },
   };
@@ -59,8 +59,8 @@ const Path = (() => {
     const label = (name) => paths.components[name]?.label || name;
     const all = (names) => names.split(";").map(label).join(" and ");
     const reached = results.text("reached"), stopped = results.text("stopped_at");
-    const far = reached ? `The fault changed recorded channels as far as ${label(reached)}.` : "The fault changed no recorded channel on its path.";
-    return Dom.el("p", {}, far, stopped ? [" It was stopped at ", Dom.el("strong", {}, all(stopped)), "."] : "");
+    const far = reached ? ["Farthest component that the fault reached: ", Dom.el("strong", {}, label(reached)), "."] : "The fault changed no recorded channel on its path.";
+    return Dom.el("p", {}, far, stopped ? [" Stopped at: ", Dom.el("strong", {}, all(stopped)), "."] : "");
   }
 
   /** A component of the path. `t` is when it changed; with `by`, the latest time, inferred from what only it feeds. */
@@ -99,7 +99,7 @@ const Path = (() => {
     const { el } = Dom;
     const all = stages.filter((one) => one.state === "reached" && stages.some((other) => other.state === "reached" && other.column > one.column && other.t < one.t));
     const names = all.map((one) => paths.components[one.name]?.label || one.name).join(" and ");
-    return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after a component further along: the fault got there another way.`) : "";
+    return names ? el("p.quiet", {}, `Recorded channels of ${names} changed only after those of a component further along the path. The fault reached that component by another way.`) : "";
   }
 
   /** All channels that left the golden run, including those of components off the path. */
@@ -108,7 +108,7 @@ const Path = (() => {
     const rows = [...left].flatMap(([component, channels]) => channels.map((c) => ({ ...c, component }))).sort((a, b) => a.t - b.t);
     if (!rows.length) return "";
     const heads = ["channel", "component", "first at", "from activation", "largest difference", "meaning"];
-    return el("details", {}, el("summary", {}, `Channels that left the golden run (${rows.length} of ${paths.channels.length})`),
+    return el("details", {}, el("summary", {}, `Channels that differ from the golden run (${rows.length} of ${paths.channels.length})`),
       el("div.scroll", {}, el("table", {}, el("thead", {}, el("tr", {}, heads.map((h) => el("th", { scope: "col" }, h)))),
         el("tbody", {}, rows.map((c) => el("tr", {}, el("th", { scope: "row" }, c.name), el("td", {}, paths.components[c.component]?.label || c.component),
           el("td.time", {}, seconds(c.t)), el("td.time", {}, since(c.t, begin)), el("td.time", {}, amount(c.largest, c.unit)), el("td", {}, c.about)))))));

@@ -41,7 +41,7 @@ class ReplayPlots {
       el("div.buttons", { role: "group", "aria-label": "Time range shown" },
         button("−", "Zoom out (−)", () => this.zoom(-1)), button("+", "Zoom in (+)", () => this.zoom(1)),
         button("◀", "Earlier", () => this.pan(-0.4)), button("▶", "Later", () => this.pan(0.4)),
-        button("Event", "From the activation to the end of the drive (e)", () => this.event()), button("All", "The whole run (0)", () => this.all())));
+        button("Events", "From the activation to the end of the drive (e)", () => this.event()), button("Whole run", "The whole run (0)", () => this.all())));
   }
 
   #fill() {

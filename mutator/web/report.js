@@ -17,7 +17,7 @@ const Report = (() => {
   async function start() {
     const data = await Packed.read("table");
     const given = JSON.parse(find("facts").textContent);
-    const table = new Rows.Table(data), state = new State(() => view.update()), search = find("search");
+    const table = new Rows.Table(data, given.meanings), state = new State(() => view.update()), search = find("search");
     const heat = new HeatMap(find("heat"), find("measure"), table, state, given.metrics);
     const filters = new Filters(find("facets"), find("chips"), table, state);
     const grid = new Grid(find("grid"), table, state, given.metrics);

@@ -14,10 +14,10 @@ const Rows = (() => {
     { name: "severity", title: "Severity", none: "no contact", show: (value) => (value === "no contact" ? `${value}, any outcome` : `severity ${value}`) },
     { name: "hazards", title: "Hazard", between: ";", none: "no hazard" },
     { name: "alerts", title: "Alert", between: ";", none: "no alert" },
-    { name: "warning", title: "Warning", none: "no hazard" },
-    { name: "reached", title: "Reached", none: "nothing" },
-    { name: "stopped_at", title: "Stopped at", between: ";", none: "not stopped" },
-    { name: "through", title: "Got through", between: ";", none: "no link" },
+    { name: "warning", title: "Alert in time", none: "no hazard" },
+    { name: "reached", title: "Fault reached", none: "nothing" },
+    { name: "stopped_at", title: "Fault stopped at", between: ";", none: "not stopped" },
+    { name: "through", title: "Link passed", between: ";", none: "no link" },
   ];
   const OF_COMPONENTS = ["reached", "stopped_at", "through"];
   const SEARCHED = ["experiment_id", "kind", "variant", "value", "unit", "scenario", "method", "trigger", "condition",
@@ -48,7 +48,7 @@ const Rows = (() => {
   }
 
   class Table {
-    constructor(data) {
+    constructor(data, meanings = {}) {
       this.count = data.count;
       this.checked = data.checked; // the hazards that were checked
       this.labels = data.labels; // labels of components
@@ -56,6 +56,7 @@ const Rows = (() => {
       this.map = data.map || null; // of all experiments, if not all are listed (report/whole_map.py)
       this.columns = new Map(data.columns.map((c) => [c.name, column(c)]));
       this.facets = FACETS.map((of) => facet(of, this.columns)).filter(Boolean);
+      this.meanings = meanings; // by column and code
       this.byId = null;
       const status = this.columns.get("status");
       const unusable = status && status.words ? status.words.map((w) => w === "harness_error" || w === "invalid_mutant") : [];
@@ -71,6 +72,11 @@ const Rows = (() => {
     /** The text that shows a value of a column. Components have labels. */
     called(name, text) {
       return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
+    }
+
+    /** What a code in a column means, such as `S3` in `scenario`; null if the page does not know it. */
+    meaning(name, code) {
+      return this.meanings[name]?.[code] ?? null;
     }
 
     number(row, name) {

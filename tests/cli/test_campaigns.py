@@ -285,7 +285,7 @@ def test_show_tells_everything_of_an_experiment(cli: Cli, run: Path) -> None:
     name = experiment_with(run, "hazard")
     answer = cli("show", name)
     assert answer.code == 0
-    for wanted in (name, "# fi:", "verdict: hazard", "fault active first", "hazard H", "largest difference"):
+    for wanted in (name, "# fi:", "verdict: hazard", "fault first active", "hazard H", "largest difference"):
         assert wanted in answer.out
     [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
     assert ET.parse(plot).getroot().tag.endswith("svg")

@@ -15,7 +15,7 @@ _HTML = """\
 <p>{{ engines.proof }}</p>
 {{ engines.table.as_html("plain") }}
 {% endif %}
-<h2>Where this comes from</h2>
+<h2>Origin of the results</h2>
 {{ facts.as_html("plain facts") }}
 """
 
@@ -26,7 +26,7 @@ def origin_panel(run: ReportedRun) -> Panel:
     parts = []
     if engines:
         parts += ["## How the experiments were run", engines.proof, engines.table.as_markdown()]
-    parts += ["## Where this comes from", Table(heads=("what", "value"), rows=facts).as_markdown()]
+    parts += ["## Origin of the results", Table(heads=("what", "value"), rows=facts).as_markdown()]
     html = rendered(_HTML, engines=engines, facts=Table(heads=("", ""), rows=facts, named=True))
     return Panel(anchor="origin", link="Origin", markdown="\n\n".join(parts), html=html)
 

@@ -12,21 +12,19 @@ from mutator.report.studies import ReportedRun
 from mutator.web import plainly_embedded
 
 _ABOUT = (
-    "For active faults: how many reached the start of each link between components, and "
-    "how many got through, so that signals recorded after it differ from the golden run."
+    "Each link shows how many active faults came to it and how many got through: after it, recorded signals "
+    "differ from the golden run."
 )
 _NONE_STOPPED = "None: every active fault changed an actuator."
 _HTML = """\
-<h2>How far faults got</h2>
+<h2>Fault paths</h2>
 <p>{{ about }}</p>
 {% if figure %}
-<p class="quiet">Thicker links let more faults through. A dashed link let none through; a thin link has no
-recorded end. Dotted: feedback and people, which are on no path. Orange boxes: faults
-<strong>injected</strong> there. Green boxes: faults <strong>stopped</strong> there reached the component
-and got no further through it; each counts once, whatever its number of links. Those <strong>masked</strong>
-changed no actuator; the others got further through another component. A fault that two components stopped
-counts at both. Select a link to list the experiments that got through it, or a box to list those masked
-there.</p>
+<p class="quiet">Links: thicker, more faults got through; dashed, none did; thin, the end is not recorded;
+dotted, feedback and people, which are on no path. Boxes: orange, faults were <strong>injected</strong> here;
+green, faults were <strong>stopped</strong> here, so they got no further through this component. A fault that
+two components stopped counts at both. A <strong>masked</strong> fault changed no actuator by any way. Select a
+link to list the experiments that got through it, or a box to list those masked there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
@@ -64,7 +62,7 @@ def paths_panel(run: ReportedRun) -> Panel | None:
     links = _links(paths)
     structure = paths.ways.structure
     stops = _stops(counts, paths)
-    parts = ["## How far faults got", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
+    parts = ["## Fault paths", _ABOUT, _table(links, counts[ALL], paths).as_markdown()]
     parts += ["### Where masked faults were stopped", stops.as_markdown() if stops else _NONE_STOPPED]
     html = rendered(
         _HTML,
@@ -80,7 +78,7 @@ def paths_panel(run: ReportedRun) -> Panel | None:
         stops=stops,
         none_stopped=_NONE_STOPPED,
     )
-    return Panel(anchor="propagation", link="Paths", markdown="\n\n".join(parts), html=html)
+    return Panel(anchor="propagation", link="Fault paths", markdown="\n\n".join(parts), html=html)
 
 
 Links = Mapping[str, tuple[str, str, str]]  # tail, tip, and what the link carries

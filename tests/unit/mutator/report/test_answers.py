@@ -91,12 +91,12 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
         Link("car/speed/x", f"e={'4' * 16}&outcome=hazard&sort=rank"),
         Link("car/speed/x", f"e={'3' * 16}&outcome=hazard&sort=rank"),
     ]
-    assert worst.heads[3:] == ("how bad", "hazard after", "alert before")
+    assert worst.heads[3:] == ("measure", "time to hazard", "alert before hazard")
     assert [line[3:] for line in worst.lines] == [
         ("contact at 9.00 m/s", "4.00 s", "fcw, 1.0 s"),
         ("contact at 4.00 m/s", "3.00 s", "none"),
         ("margin -0.50 m", "7.00 s", "none"),
-        ("margin -0.25 m", "5.00 s", "too late"),
+        ("margin -0.25 m", "5.00 s", "only after"),
     ]
     assert [line[1] for line in kinds.lines] == [Part(2, 3, "2 of 3"), Part(2, 3, "2 of 3")]
     assert answer.links == (Link("All 4 hazards", "outcome=hazard&sort=rank"),)
@@ -106,7 +106,7 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
     """Three of four hazards had no alert before them: two had no alert, and one had an alert too late."""
     answer = said["unwarned"]
     assert answer.says == (
-        "3 of 4 hazards (75 %) were silent (no alert came before): 2 with no alert at all, 1 with an "
+        "3 of 4 hazards (75 %) were silent (no alert before the hazard): 2 with no alert at all, 1 with an "
         "alert only after the hazard."
     )
     assert [line[2] for line in answer.listings[0].lines] == ["1", "1"]
@@ -163,7 +163,7 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
         "1 severity S3, 1 without contact",
         "kind=d%2Fboth&warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard&severity=S3&sort=rank",
     )
-    assert "and 1 of 3 of severity S3, the highest that came" in answer.says
+    assert "and 1 of 3 of severity S3, the highest among the silent hazards." in answer.says
 
 
 def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
@@ -203,13 +203,13 @@ def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
     assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
 
 
-def test_what_was_survived_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
-    """A fault that never became active does not count as survived. The weakest fault type comes first, and
+def test_what_was_tolerated_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
+    """A fault that never became active does not count as tolerated. The weakest fault type comes first, and
     types without a hazard are named."""
     answer = said["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
-        "1 of 3 fault types (33 %) never led to one."
+        "1 of 3 fault types (33 %) never led to a hazard."
     )
     weak, never = answer.listings
     assert [line[1] for line in weak.lines] == [Part(1, 3, "1 of 3"), Part(1, 3, "1 of 3")]
@@ -220,8 +220,8 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
     """The fault type with the most CPU time comes first. An experiment that did not run costs no time."""
     answer = said["time"]
     assert answer.says == (
-        "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were driven, 1 "
-        "whose trigger never held, so the golden run's result was used. Median 8.00 s, longest 64.00 s. "
+        "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were "
+        "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, longest 64.00 s. "
         "Checks, golden runs and the equivalence check are not timed."
     )
     [first, *_] = answer.listings[0].lines
@@ -246,30 +246,30 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
     """The report of a run without hazards has no empty table and no share of zero."""
     panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
-    assert "## What came without a warning\n\nNo hazard came." in panel.markdown
-    assert "the worst" not in panel.markdown
+    assert "## Which hazards were silent\n\nNo hazard came." in panel.markdown
+    assert "| worst" not in panel.markdown
     assert "What to fix first" not in panel.markdown
 
 
 def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
-    """If no fault was activated, nothing is reported as dangerous or as survived, and no link leads to an
+    """If no fault was activated, nothing is reported as dangerous or as tolerated, and no link leads to an
     empty list."""
     idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
     assert not any(answer.links for answer in found.values())
     assert found["time"].says.startswith(
-        "The experiments took 0 s of CPU time, by 2 workers: 0 of 1 experiment (0 %) were driven"
+        "The experiments took 0 s of CPU time, by 2 workers: 0 of 1 experiment (0 %) were simulated"
     )
 
 
-def test_a_crash_is_not_survived(run: ReportedRun) -> None:
+def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
     """A crash is not a hazard and is counted separately."""
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
     found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
     assert found["survived"].says == (
         "2 of 7 activated faults (29 %) led to no hazard: 1 changed no actuator (masked), 1 did (sdc). "
-        "1 ended the program or kept it from ending. 0 of 3 fault types (0 %) never led to either."
+        "1 crashed or timed out. 0 of 3 fault types (0 %) never led to a hazard, a crash or a timeout."
     )
 
 
@@ -278,7 +278,7 @@ def test_one_is_singular(run: ReportedRun) -> None:
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
-    assert "1 of 1 experiment (100 %) was driven" in found["time"].says
+    assert "1 of 1 experiment (100 %) was simulated" in found["time"].says
 
 
 def test_a_link_names_facets_as_the_page_reads_them() -> None:
