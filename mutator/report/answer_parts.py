@@ -37,8 +37,7 @@ class Listing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Answer:
-    """The answer to a question: one or two sentences, tables, and links to the experiments. `wide` is set if
-    the tables have many columns."""
+    """The answer to a question. `wide`: its tables have many columns."""
 
     name: str
     title: str
@@ -55,13 +54,12 @@ def to_list(facets: Mapping[str, Sequence[str]], sort: str = "") -> str:
 
 
 def share(part: int, of: int, what: str) -> str:
-    """A share as text, for example `20 of 96 activated faults (21 %)`. If `of` is 1, the noun is singular."""
+    """A share as text, for example `20 of 96 activated faults (21 %)`."""
     noun = what.removesuffix("s") if of == 1 else what
     return f"{part:,} of {of:,} {noun}" + (f" ({100 * part / of:.0f} %)" if of else "")
 
 
 def were(count: int) -> str:
-    """The verb that fits a count: was or were."""
     return "was" if count == 1 else "were"
 
 
@@ -73,10 +71,8 @@ def by_kind(part: pd.DataFrame, of: pd.DataFrame) -> list[tuple[str, int, int]]:
 
 
 def kind_link(kind: str, **facets: Sequence[str]) -> Link:
-    """A fault type, linked to its experiments that match `facets`."""
     return Link(kind, to_list({"kind": [kind], **facets}))
 
 
 def bar(part: int, of: int) -> Part:
-    """A bar labelled, for example, `2 of 3`."""
     return Part(part, of, f"{part:,} of {of:,}")

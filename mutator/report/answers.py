@@ -1,7 +1,4 @@
-"""Answers to the first questions of a reader, each with a few numbers and their denominators.
-
-Each answer links to its experiments in the list.
-"""
+"""Answers to the first questions of a reader. Each links to its experiments in the list."""
 
 import pandas as pd
 
@@ -46,8 +43,7 @@ def answers_of(run: ReportedRun) -> tuple[Answer, ...]:
 
 
 def _told(run: ReportedRun) -> pd.DataFrame:
-    """The usable experiments with rank, course and warning. Only experiments that may be listed get names of
-    faults and hazards."""
+    """The usable experiments with rank, course and warning. Those that may be listed also have names."""
     frame = run.frame
     told = frame.assign(place=frame[PLACE], course=frame[COURSE], warning=warnings_of(frame))
     shown = worst_of(told)
@@ -68,8 +64,7 @@ def _warned(row: Row) -> str:
 
 
 def unwarned(frame: pd.DataFrame, note: str = "") -> Answer:
-    """Answer which hazards had no earlier alert, only a later one or none. `note` is a caveat on alerts that
-    were not observed."""
+    """Answer which hazards were silent. `note` is a caveat on alerts that were not observed."""
     hazards = frame[frame["outcome"] == "hazard"]
     silent = hazards[hazards["warning"] != FIRST]
     never, late = (int((silent["warning"] == name).sum()) for name in (NO_ALERT, LATE))
@@ -148,7 +143,7 @@ def survived(frame: pd.DataFrame) -> Answer:
 
 
 def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
-    """Answer how much CPU time the experiments took, in total and by fault type, and why some took none."""
+    """Answer how much CPU time the experiments took, and why some took none."""
     cpu = frame["experiment_id"].map(timings.set_index("experiment_id")["cpu_s"])
     total, ran = float(cpu.sum()), int((cpu > 0).sum())
     workers = timings["worker"].nunique()
@@ -172,7 +167,6 @@ def time_spent(frame: pd.DataFrame, timings: pd.DataFrame) -> Answer:
 
 
 def _undriven(frame: pd.DataFrame, cpu: pd.Series, timings: pd.DataFrame) -> str:
-    """Why the other experiments needed no run, with counts."""
     rest = frame["experiment_id"][~(cpu > 0)]
     golden = timings[timings["engine"] == RunMode.GOLDEN.value]
     idle = int(rest.isin(golden["experiment_id"]).sum())

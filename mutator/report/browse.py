@@ -1,8 +1,4 @@
-"""The data of each experiment in the report's page: results as columns, fault, trigger and diff.
-
-A text column is stored as its distinct values and a code for each row. A diff is stored as a shape and the
-values of its holes.
-"""
+"""The data of each experiment in the report's page: results as columns, fault, trigger and diff."""
 
 import base64
 import json
@@ -45,13 +41,13 @@ SCHEMA = "report-table/1"
 DETAILS_SCHEMA = "report-details/1"
 _OF_ALERTS = ("alerts", "t_alert", "reaction_time")  # columns that need a target with alerts
 STILLS_BYTES = 1_000_000  # limit of the stills embedded in the page; the others become links
-LISTED = 50_000  # maximum of experiments that the page lists; with more it would open slowly
+LISTED = 50_000  # maximum of experiments that the page lists; more would open slowly
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Browse:
     """Data for the page's scripts: `facts` as JSON, the rest as script elements. `listed` says which
-    experiments the page lists and how to see the others. It is '' if the page lists all."""
+    experiments the page lists; '' if all."""
 
     facts: Markup
     scripts: tuple[Markup, ...]
@@ -85,7 +81,6 @@ def browse_data(run: ReportedRun) -> Browse:
 
 
 def _which(run: ReportedRun) -> str:
-    """Which experiments the page lists, and how to see the others; '' if it lists all."""
     count, path = len(run.texts), run.folder.path.name
     if count <= LISTED:
         return ""
@@ -97,8 +92,7 @@ def _which(run: ReportedRun) -> str:
 
 
 def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, Any]:
-    """What the page needs to know of the target, from its current manifest: whether films can be made (true
-    without a manifest), and the scene seen from above."""
+    """Whether films can be made (true without a manifest), and the scene seen from above."""
     try:
         manifest = workspace.manifest(folder.head["target"]) if workspace else None
     except MutatorError:
@@ -108,8 +102,7 @@ def _of_target(folder: RunFolder, workspace: "Workspace | None") -> dict[str, An
 
 
 def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
-    """The rows that the page lists, in reading order, and their cells. For a large run the page lists only
-    the worst."""
+    """The rows that the page lists, in reading order, and their cells."""
     lines = lines_of(run.texts[run.seen.places < LISTED])
     rows = [row_from(line) for line in lines]
     order = sorted(range(len(rows)), key=lambda i: reading_order(rows[i]))
@@ -119,7 +112,6 @@ def _listed(run: ReportedRun) -> tuple[list[Row], list[dict[str, str]]]:
 def _tables(
     run: ReportedRun, rows: Sequence[Row], lines: Sequence[Mapping[str, str]]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The data of the table and of the experiments' details."""
     planned = [run.experiments.get(row.experiment_id) for row in rows]
     paths = run.paths
     if paths:
@@ -144,9 +136,8 @@ def table(
     alerts: bool = True,
     source: SourceLines | None = None,
 ) -> dict[str, Any]:
-    """The results by column, plus derived columns: `kind`, `fault` (its label), `ending`, `hazards`,
-    `warning`, `rank` (1: the worst), `t_hazard`, `through`. Alert columns need a target with `alerts`; `line`
-    (of the fault) and `lasting` need a `source`. `labels` are those of components."""
+    """The results by column, with derived columns such as `rank` (1: the worst). Alert columns need a
+    target with `alerts`; `line` (of the fault) and `lasting` need a `source`."""
     left_out = () if alerts else _OF_ALERTS
     columns: dict[str, list[str]] = {
         name: [line[name] for line in lines] for name in (lines[0] if lines else ()) if name not in left_out
@@ -171,8 +162,7 @@ def table(
 
 
 def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> dict[str, list[str]]:
-    """The columns `value`, `variant`, `line` and `lasting`. For an operator's fault, `value` is the change
-    that it makes."""
+    """The columns of operators' faults. `value` is the change that an operator makes."""
     changes = [source.changes.get(line["fault_id"], "") for line in lines]
     both = list(zip(lines, changes, strict=True))
     return {
@@ -184,8 +174,8 @@ def _of_operators(source: SourceLines, lines: Sequence[Mapping[str, str]]) -> di
 
 
 def column(name: str, values: Sequence[str]) -> dict[str, Any]:
-    """A column's data: numbers unchanged (None: empty), ids as texts, everything else as codes of the
-    distinct values in order. Names are never parsed as numbers, because a variant may be called `nan`."""
+    """A column's data: numbers (None: empty), ids as texts, else codes of the distinct values. Names are
+    never parsed as numbers, because a variant may be called `nan`."""
     if not is_text(name) and any(values):
         try:
             return {"numbers": [_number(text) for text in values]}
@@ -199,7 +189,7 @@ def column(name: str, values: Sequence[str]) -> dict[str, Any]:
 
 
 def _number(text: str) -> float | int | str | None:
-    """The value as JavaScript reads it. Infinities become strings."""
+    """The value for JSON, which has no infinities."""
     if not text:
         return None
     value = float(text)
@@ -214,8 +204,7 @@ def details(
     experiments: Sequence[Experiment | None], found: Sequence[Shape], rows: Sequence[Row]
 ) -> dict[str, Any]:
     """For each row, the codes of its spec and trigger setting (-1: not in the plan), and the index of its
-    diff's shape (-1: no diff). The members of a shape are in row order. Each hole has a list with the value
-    of each member."""
+    diff's shape (-1: no diff). Each hole of a shape has the values of its members, in row order."""
     specs, settings = _Codes(), _Codes()
     faults = {e.fault.id: e.fault for e in experiments if e}
     spec = {name: _spec(fault) for name, fault in faults.items()}
@@ -234,8 +223,6 @@ def details(
 
 
 class _Codes:
-    """Numbers for texts, in order of first appearance."""
-
     def __init__(self) -> None:
         self._codes: dict[str, int] = {}
 
@@ -278,11 +265,8 @@ def _patches(run: ReportedRun, rows: Iterable[Row]) -> Iterator[tuple[str, str, 
 
 
 def media(folder: RunFolder, seen_from: Path, budget: int) -> dict[str, dict[str, Any]]:
-    """The stills, films and exact plots in plots/, by experiment.
-
-    A still is embedded if it fits into what is left of `budget` bytes. Other stills, films and plots become
-    links relative to `seen_from`.
-    """
+    """The stills, films and exact plots in plots/, by experiment. Stills are embedded up to `budget` bytes
+    in total; the rest become links relative to `seen_from`."""
     found: dict[str, dict[str, Any]] = {}
     for path in sorted((folder.path / "plots").glob("*"), key=lambda p: (len(p.name), p.name)):
         name, _, time = path.stem.partition("-")

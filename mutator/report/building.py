@@ -26,8 +26,8 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Report:
-    """The files of a report, and its number of experiments. `summaries` are tables for the terminal; they are
-    present only if the report was just written."""
+    """The files of a report, and its number of experiments. Only a new report has `summaries`, tables for
+    the terminal."""
 
     markdown: Path
     page: Path
@@ -71,7 +71,7 @@ def write(run: Path, workspace: Workspace | None) -> Report:
 
 
 def _write_study(content: Content, panels: Sequence[Panel], out: Path) -> None:
-    """Write the study's page, or remove the page of an earlier report if there is nothing to show."""
+    """Write the study's page, or remove that of an earlier report."""
     text, hypertext = (out / name for name in STUDY_FILES)
     if not panels:
         text.unlink(missing_ok=True)
@@ -101,7 +101,6 @@ def _content(run: ReportedRun, browse: Callable[[], Browse]) -> Content:
 
 
 def _planned(folder: RunFolder) -> str:
-    """How many experiments and runs are planned, and why the numbers differ."""
     experiments, runs = int(folder.head["experiments"]), folder.head.get("runs")
     text = f"{experiments} experiments are planned"
     if folder.shard:

@@ -1,5 +1,4 @@
-"""The most dangerous results: the worst experiments with and without contact, and the fault types with most
-hazards."""
+"""The most dangerous results: the worst experiments, and the fault types with most hazards."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,7 +17,6 @@ NO_CONTACT = "no contact"  # the page filter's name for an empty severity
 
 
 def dangerous(frame: pd.DataFrame, metrics: Sequence[Sequence[str]], *, has_alerts: bool) -> Answer:
-    """The worst experiments, and the fault types that most often lead to a hazard."""
     active = frame[frame["is_activated"]]
     ranked = frame[frame["outcome"] == "hazard"].sort_values("place")
     contact = contact_measure(frame)
@@ -54,7 +52,6 @@ def worst_of(frame: pd.DataFrame) -> list[str]:
 
 
 def _links(ranked: pd.DataFrame) -> tuple[Link, ...]:
-    """Links to all hazards, and to those with and without contact if both exist."""
     if ranked.empty:
         return ()
     made = [Link(f"All {len(ranked):,} hazards", to_list(HAZARD, "rank"))]
@@ -78,8 +75,8 @@ def _classes(hazards: pd.DataFrame) -> str:
 
 
 def _worst_lists(ranked: pd.DataFrame, units: Mapping[str, str], *, has_alerts: bool) -> tuple[Listing, ...]:
-    """The worst hazards in one list, or in two if only some have a severity class. Hazards without a class
-    rank by margin and would rarely appear in a common list."""
+    """The worst hazards in one list, or in two if only some have a severity class: the others, which rank
+    by margin, would rarely appear in a common list."""
     hit = ranked[ranked[SEVERITY] != ""] if SEVERITY in ranked else ranked
     missed = ranked.drop(hit.index)
     if hit.empty or missed.empty:
@@ -102,7 +99,8 @@ def _worst(
     *,
     has_alerts: bool,
 ) -> Listing:
-    """The experiments with their measures of danger; each link opens within the list filtered by `shown`."""
+    """The experiments with their measures of danger. Each link opens within the list filtered by
+    `shown`."""
     contact = contact_measure(ranked)
     heads = [head, "scenario", "hazards"]
     columns = [ranked["scenario"], ranked["hazard_names"]]
@@ -127,8 +125,8 @@ def _worst(
 
 
 def _how_bad(row: Mapping[Any, Any], contact: str, units: Mapping[str, str]) -> str:
-    """The severity as text: for a contact its speed, for example `delta-v 6.70 m/s`; else the least margin to
-    the hazards that occurred, or `-` if none is known."""
+    """For a contact its speed, for example `delta-v 6.70 m/s`; else the least margin to the hazards that
+    occurred, or `-`."""
     if contact and row[contact] not in ("", "0.0"):
         words = "delta-v" if contact == "delta_v" else "contact at"
         return f"{words} {float(row[contact]):.2f} {units.get(contact, '')}"

@@ -28,22 +28,19 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineSummary:
-    """How many experiments each mode executed, and the equivalence check as a sentence and in brief.
-
-    `failed`: an experiment had another result on the reference engine.
-    """
+    """How many experiments each mode executed, and the equivalence check as a sentence and in brief."""
 
     table: Table
     proof: str
     state: str
-    failed: bool
+    failed: bool  # an experiment had another result on the reference engine
 
 
 def engine_summary(
     folder: RunFolder, records: Mapping[str, Record], timings: "DataFrame"
 ) -> EngineSummary | None:
-    """Summarize the `timings` (as in `Seen`) and `proof/` of a run folder with these records. None if no
-    timing names an engine and there is no `proof/`."""
+    """Summarize a run's `timings` (as in `Seen`) and `proof/`. None if no timing names an engine and there
+    is no `proof/`."""
     ways = _ways(timings)
     if not ways and not (folder.path / equivalence.FOLDER).is_dir():
         return None
@@ -53,7 +50,6 @@ def engine_summary(
 
 
 def _ways(timings: "DataFrame") -> Counter[tuple[str | None, str]]:
-    """The number of experiments by mode and by the reason for not using the requested mode."""
     told = timings[timings["engine"].astype(object) != ""]  # older runs have no engine names
     engines = (None if name is None or name != name else str(name) for name in told["engine"])
     return Counter(zip(engines, map(str, told["why"]), strict=True))
@@ -72,7 +68,6 @@ def _lines(ways: Counter[tuple[str | None, str]]) -> Iterator[list[str]]:
 
 
 def _proof(folder: RunFolder, records: Mapping[str, Record]) -> tuple[str, str, bool]:
-    """The result of the equivalence check as a sentence and in a few words, and whether it failed."""
     try:
         found = equivalence.judge(folder, records)
     except CheckFailed as err:

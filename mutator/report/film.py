@@ -26,7 +26,7 @@ EVENTS_SCHEMA = "film-events/1"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Shot:
-    """A still at time `t` (s) or a video to write. The file's suffix selects the format."""
+    """A still at time `t` (s) or a video to write."""
 
     out: Path  #: the file to write; its suffix selects the format
     t: float | None = None  #: the time of a still in s; None for a video
@@ -43,13 +43,13 @@ class Filming:
 
     @classmethod
     def of(cls, workspace: Workspace, folder: RunFolder) -> "Filming":
-        """Prepare to film experiments of a run folder. Raise MutatorError if the target cannot be filmed or
-        has changed since the run."""
+        """Prepare to film. Raise MutatorError if the target cannot be filmed or has changed since the
+        run."""
         manifest = manifest_of(workspace, folder)
         return cls(workspace, folder, manifest, manifest.filming())
 
     def golden(self, experiment: Experiment, out: Path) -> Path:
-        """Rerun an experiment's golden run into the folder `out`, so that several films can use it."""
+        """Rerun an experiment's golden run into the folder `out`."""
         return run_golden(self.workspace, self.filmed, experiment, out, limits=self.folder.limits)
 
     def take(
@@ -61,10 +61,8 @@ class Filming:
         golden: Path | None = None,
     ) -> bool:
         """Rerun an experiment's faulty run, and the golden run unless it is given, and write `shots`.
-
         Returns whether the new record equals `known`; true if `known` is None. Raise MutatorError if the
-        faulty run left no film or the target's command fails.
-        """
+        faulty run left no film or the target's command fails."""
         with ScratchFolder("mutator-film-") as scratch:
             single = run_single(
                 self.workspace,
@@ -94,8 +92,7 @@ class Filming:
 
 
 def hazards_in_words(workspace: Workspace, manifest: TargetManifest) -> dict[str, str]:
-    """A short text for each hazard, from the manifest, or else from the hazard analysis up to its first
-    bracket."""
+    """A short text for each hazard, from the manifest or the hazard analysis (up to its first bracket)."""
     known = workspace.hazards()
     about = known.hazards if known else {}
     names = {name: words.partition(" (")[0].rstrip(".") for name, words in about.items()}
@@ -121,7 +118,7 @@ def _events(record: Record, title: str, names: Mapping[str, str]) -> dict[str, o
 
 
 def _show(manifest: TargetManifest, folder: Path, places: Mapping[str, str], shot: Shot) -> None:
-    """Write one file with the target's command. `folder` is for temporary files."""
+    """Write one file with the target's command."""
     film = manifest.film
     assert film is not None  # callers checked this
     tree = manifest.root

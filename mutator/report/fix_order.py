@@ -1,10 +1,4 @@
-"""Which fault types to fix first, by a simple rule, and the component that lets them through.
-
-Fault types are ordered by their silent hazards (no alert before) in the highest severity class, most first.
-Ties are broken by the next class, down to hazards without contact, then by the shortest time from activation
-to hazard. If the target has no alerts, all hazards count. If it has no severity classes, all hazards are in
-one class.
-"""
+"""Which fault types to fix first, and the component that lets them through."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -21,7 +15,10 @@ LISTED = 5  # maximum of fault types listed
 
 
 def first_to_fix(frame: pd.DataFrame, paths: FoundPaths | None, *, has_alerts: bool) -> Answer:
-    """Answer which fault types to fix first, with their numbers. `frame` must have at least one hazard."""
+    """Answer which fault types to fix first: those with the most silent hazards in the highest severity
+    class, then in the next class, down to hazards without contact, then with the shortest time from
+    activation to hazard. If the target has no alerts, all hazards count. `frame` must have at least one
+    hazard."""
     hazards = frame[frame["outcome"] == "hazard"]
     counted = hazards[hazards["warning"] != FIRST] if has_alerts else hazards
     if counted.empty:  # all hazards came after an alert, so count all
@@ -60,7 +57,6 @@ def _after(hazards: pd.DataFrame) -> pd.Series:
 
 
 def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
-    """The fault types, in the order in which to fix them."""
     groups = {str(kind): group for kind, group in hazards.groupby("kind")}
     key = {
         kind: (*(-len(_of_class(group, name)) for name in classes), float(_after(group).min()), kind)
@@ -70,7 +66,6 @@ def _order(hazards: pd.DataFrame, classes: Sequence[str]) -> list[str]:
 
 
 def _says(order: Sequence[str], counted: pd.DataFrame, classes: Sequence[str], what: str) -> str:
-    """The answer in one sentence, followed by the rule."""
     mine = counted["kind"] == order[0]
     says = f"Start with {order[0]}: {share(int(mine.sum()), len(counted), what)}"
     if classes[0]:
@@ -135,14 +130,13 @@ def _let_through(
 
 
 def _courses(frame: pd.DataFrame, paths: FoundPaths) -> Iterator[tuple[Course, int]]:
-    """Yield each course that the frame's experiments took, and how many took it."""
     for code, count in frame["course"].value_counts(sort=False).items():
         if (place := int(str(code))) >= 0:
             yield paths.courses[place], int(count)
 
 
 def _stopped(kind: str, active: pd.DataFrame, paths: FoundPaths) -> Cell:
-    """The component that stopped most faults of this type. It is a candidate for stopping the rest."""
+    """The component that stopped most faults of this type, a candidate for stopping the rest."""
     stopped: Counter[str] = Counter()
     for course, count in _courses(active, paths):
         for name in course.stopped_at:

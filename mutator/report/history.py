@@ -1,7 +1,4 @@
-"""The history of a folder of runs: the results of each run, and the changes from each run to the next.
-
-Writes HISTORY.md and history.html into that folder, and nothing into the run folders.
-"""
+"""Writes the history of a folder of runs: the results of each run, and the changes between runs."""
 
 import shlex
 from collections import Counter
@@ -38,8 +35,7 @@ _HEADS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PastRun:
-    """One run of the folder. `date` is the file time of the last record, `commit` the commit of the target.
-    `rows` are by experiment id."""
+    """One run. `date` is the time of its last record, `commit` that of the target."""
 
     folder: RunFolder
     date: datetime
@@ -110,7 +106,7 @@ def _past_run(path: Path) -> PastRun:
 
 
 def _plans(runs: Sequence[PastRun]) -> dict[str, list[PastRun]]:
-    """The runs by campaign and plan. The plan of the latest run comes first."""
+    """The runs by campaign and plan, the plan of the latest run first."""
     found: dict[str, list[PastRun]] = {}
     for run in runs:
         found.setdefault(f"{run.folder.head['campaign']}, plan {run.folder.head['plan'][:8]}", []).append(run)
@@ -135,7 +131,6 @@ def _cells(run: PastRun) -> list[str]:
 
 
 def _changes(before: PastRun, after: PastRun) -> str:
-    """How the results of the experiments in both runs changed, as text."""
     shared = before.rows.keys() & after.rows.keys()
     pairs = [(before.rows[name], after.rows[name]) for name in shared]
     new = sum(b.outcome is Outcome.HAZARD is not a.outcome for a, b in pairs)
@@ -147,7 +142,7 @@ def _changes(before: PastRun, after: PastRun) -> str:
 
 
 def _steps(runs: Sequence[PastRun]) -> Iterator[tuple[PastRun, PastRun]]:
-    """Pairs of consecutive runs, newest first. `runs` are those of one plan, oldest first."""
+    """Pairs of consecutive runs of one plan, newest first."""
     return zip(runs[-2::-1], runs[:0:-1], strict=True)
 
 
@@ -187,7 +182,7 @@ def _page(folder: Path, runs: Sequence[PastRun], left_out: Sequence[str]) -> str
 
 
 def _linked(group: Sequence[PastRun]) -> Table:
-    """The table of runs, newest first. Each has a link to its report and a bar for its hazards."""
+    """The table of runs, newest first, with links to their reports."""
     from markupsafe import Markup
 
     link = Markup('<a href="{}">{}</a>').format

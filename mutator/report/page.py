@@ -44,13 +44,9 @@ SCRIPTS = (  # in load order, because scripts use earlier ones
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """The content of both forms of a report.
-
-    `alarm` is shown first; it is '' if there is none. `outcomes` counts outcomes and statuses. `planned` is a
-    text on the number of experiments. `words` explains the terms of the page. `study` cites the study that
-    has its own page, or is '' if there is none. `answers` come before the list of experiments, the other
-    `panels` after it.
-    """
+    """The content of both forms of a report. `alarm` is shown first. `outcomes` counts outcomes and
+    statuses. `study` cites the study that has its own page. `answers` come before the list of experiments,
+    `panels` after it."""
 
     name: str
     alarm: str
@@ -64,7 +60,6 @@ class Content:
 
 
 def markdown(content: Content) -> str:
-    """The report as Markdown."""
     total = sum(content.outcomes.values())
     endings = ", ".join(f"{n} {name}" for name, n in content.outcomes.items())
     which = "the worst of them" if content.browse.listed else "them"
@@ -101,7 +96,6 @@ def page_html(content: Content) -> str:
 
 
 def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
-    """The study's page as Markdown."""
     parts = (
         f"# {content.name}, compared with its study",
         f"{content.study}.",
@@ -111,7 +105,6 @@ def study_markdown(content: Content, panels: Sequence[Panel]) -> str:
 
 
 def study_html(content: Content, panels: Sequence[Panel]) -> str:
-    """The study's page as self-contained HTML."""
     from markupsafe import Markup
 
     styles = [Markup(asset(name)) for name in STYLES]

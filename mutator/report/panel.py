@@ -14,13 +14,10 @@ FOLDER = "report"  # the report's folder in a run folder
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Panel:
-    """One part of a report with its headings: `##` in Markdown, `<h2>` in HTML.
+    """One part of a report. `link` is its name in the navigation bar, `summary` the table that the command
+    line shows, `style` a CSS file that it needs."""
 
-    `anchor` is the panel's id on the page, `link` its name in the navigation bar, `summary` the table that
-    the command line shows, and `style` a CSS file that the panel needs.
-    """
-
-    anchor: str
+    anchor: str  # its id on the page
     link: str
     markdown: str
     html: "Markup"
@@ -29,8 +26,7 @@ class Panel:
 
 
 def rendered(template: str, **values: Any) -> "Markup":
-    """Render a Jinja template as HTML. Values that are not Markup are escaped. The filter `marked` renders
-    notes."""
+    """Render a Jinja template as HTML. Values that are not Markup are escaped."""
     from jinja2 import Environment, StrictUndefined
     from markupsafe import Markup
 

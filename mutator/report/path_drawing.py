@@ -1,8 +1,5 @@
 """Draws the control structure of a run, with the number of faults that passed each link or stopped in each
-box.
-
-It uses the page's light or dark colours. ways.js updates the numbers when another fault type is chosen.
-"""
+box. ways.js updates the numbers."""
 
 from collections.abc import Collection, Iterator
 from html import escape
@@ -42,7 +39,7 @@ def draw_ways(structure: StructureModel, counts: PathCounts, links: Collection[s
 
 
 def share_text(through: int, came: int) -> str:
-    """The share of faults that got through a link, for example `12 of 40, 30 %`; '' if none came to it."""
+    """For example `12 of 40, 30 %`; '' if none came."""
     return f"{through} of {came}, {100 * through / came:.0f} %" if came else ""
 
 
@@ -59,7 +56,6 @@ def _line(arrow: Arrow) -> str:
 
 
 def _place(arrow: Arrow, line: int = 0) -> str:
-    """The SVG attributes that place a line of an arrow's label."""
     x, y = arrow.label.at
     y += (0, arrow.label.apart, arrow.label.apart + _LINE)[line]
     return f'x="{x:.1f}" y="{y:.1f}" text-anchor="{arrow.label.anchor}"'
@@ -71,7 +67,6 @@ def _is_short(arrow: Arrow) -> bool:
 
 
 def _idle(arrow: Arrow, link: LinkModel) -> Iterator[str]:
-    """The SVG of a link that is on no path."""
     yield (
         f'<g class="idle"><path d="{_line(arrow)}" stroke-dasharray="3 4" marker-end="url(#ways-quiet)"/>'
         f'<text class="label" {_place(arrow)}>{escape(link.label)}</text></g>'
@@ -97,7 +92,6 @@ def _way(name: str, arrow: Arrow, link: LinkModel, counts: PathCounts) -> Iterat
 
 
 def box_lines(injected: int, stopped: int, masked: int) -> tuple[str, str]:
-    """The two lines below the name in a box."""
     told = ((injected, "injected"), (stopped, "stopped"))
     return ", ".join(f"{n} {what}" for n, what in told if n), f"{masked} masked" if masked else ""
 

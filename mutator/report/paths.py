@@ -1,5 +1,4 @@
-"""The fault paths of a report: one for each experiment on the page, and counts by fault type for the
-figure."""
+"""The fault paths of a report: one for each experiment on the page, and counts by fault type."""
 
 import math
 from collections import Counter, defaultdict
@@ -25,7 +24,7 @@ class _PathsById(Mapping[str, Path]):
 
     def __init__(self, ways: Ways, planned: Mapping[str, Experiment], records: Mapping[str, Record]) -> None:
         self._ways, self._planned, self._records = ways, planned, records
-        self._last: tuple[str, Path | None] | None = None  # the path that was computed last
+        self._last: tuple[str, Path | None] | None = None
 
     def __getitem__(self, name: str) -> Path:
         last = self._last
@@ -45,8 +44,7 @@ class _PathsById(Mapping[str, Path]):
 
 @dataclass(frozen=True, kw_only=True)
 class FoundPaths:
-    """The known paths of a run. `records` list the channels that left the golden run. `courses` are the
-    distinct courses of the experiments."""
+    """The known paths of a run, and the distinct courses of its experiments."""
 
     ways: Ways
     channels: Sequence[Sequence[str]]  # as in run.json
@@ -64,7 +62,6 @@ class FoundPaths:
         records: Mapping[str, Record],
         courses: Sequence[Course],
     ) -> "FoundPaths":
-        """The paths of a run folder with this plan and these records."""
         by_id = _PathsById(ways, planned, records)
         return cls(ways=ways, channels=folder.head["channels"], by_id=by_id, records=records, courses=courses)
 
@@ -78,9 +75,9 @@ class FoundPaths:
         return ";".join(link_text(c.tail, c.tip) for c in crossings if c.passage is Passage.THROUGH)
 
     def data(self, ids: Sequence[str]) -> dict[str, Any]:
-        """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each channel
-        a column of first times and a column of largest deviations. For each row, `by` lists the components
-        that changed before their own channels show it, with the latest possible time of the change."""
+        """The page's data for the experiments `ids`: the shape of each path (-1: none), and for each
+        channel a column of first times and a column of largest deviations. `by` lists the components that
+        changed before their own channels show it, with the latest possible time."""
         shapes: dict[str, int] = {}
         columns: dict[str, Any] = {}
         codes, by, names = [], {}, [name for name, *_ in self.channels]
@@ -148,10 +145,9 @@ def _placed(path: Path) -> Iterator[tuple[Any, int]]:
 
 @dataclass(slots=True, kw_only=True)
 class PathCounts:
-    """Counts over the paths of some faults. By link: how many faults `came` to the start of the link and got
-    `through`; links whose end is not recorded are left out. By component: how many faults were `injected`,
-    `stopped`, and `masked` (stopped with no actuator changed) there. `ends` counts masked faults by the set
-    of components that stopped them."""
+    """Counts over the paths of some faults. By link: how many `came` to its start and got `through`, if its
+    end is recorded. By component: how many were `injected`, `stopped`, and `masked` there. `ends` counts
+    masked faults by the set of components that stopped them."""
 
     active: int = 0
     came: Counter[str] = field(default_factory=Counter)
@@ -162,7 +158,6 @@ class PathCounts:
     ends: Counter[tuple[str, ...]] = field(default_factory=Counter)
 
     def add(self, path: Path | Course, count: int = 1) -> None:
-        """Add a path `count` times."""
         self.active += count
         passages = [(c.link, c.tip, c.passage) for c in path.crossings]
         stopped = {tip for _, tip, passage in passages if passage is Passage.STOPPED}
@@ -179,7 +174,6 @@ class PathCounts:
             self.ends[path.stopped_at] += count
 
     def plain(self) -> dict[str, Any]:
-        """The counts as plain data for the page."""
         links = {name: [self.through[name], came] for name, came in self.came.items()}
         names = dict.fromkeys((*self.injected, *sorted(self.stopped)))
         components = {n: [self.injected[n], self.stopped[n], self.masked[n]] for n in names}
@@ -189,8 +183,7 @@ class PathCounts:
 def counts_by_fault_type(
     kinds: "pd.Series[str]", codes: "np.ndarray", paths: FoundPaths
 ) -> Mapping[str, PathCounts]:
-    """The counts of all faults, then those by fault type. `codes` has the index of each row's course (-1:
-    none)."""
+    """The counts of all faults, then those by fault type. `codes` has each row's course (-1: none)."""
     import pandas as pd
 
     found: dict[str, PathCounts] = defaultdict(PathCounts)

@@ -1,5 +1,4 @@
-"""The data that a report needs from all experiments in addition to the results. It is read once and kept in
-columns."""
+"""The data that a report needs from all experiments in addition to the results, read once."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -25,10 +24,9 @@ _Alerts = tuple[tuple[str, float], ...]  # the alerts of one experiment
 
 @dataclass(frozen=True, kw_only=True)
 class Seen:
-    """Data of a run in addition to its results. `places` (the rank, from 0) and `courses_of` (an index into
-    `courses`, -1: none) have a number for each row of the results. `alerts` are those of experiments with a
-    hazard. `timings` has a row for each timed experiment: id, CPU time, worker, engine ('' if not recorded)
-    and reason."""
+    """`places` (the rank, from 0) and `courses_of` (an index into `courses`, -1: none) have a number for
+    each row of the results. `alerts` are those of experiments with a hazard. `timings` has a row for each
+    timed experiment; its engine is '' if not recorded."""
 
     places: np.ndarray
     courses_of: np.ndarray
@@ -40,7 +38,6 @@ class Seen:
     def of(
         cls, folder: RunFolder, texts: "DataFrame", records: Mapping[str, Record], ways: Ways | None
     ) -> "Seen":
-        """Read a run folder with these results."""
         codes: dict[int, int] = {}  # compared by identity, because equal courses are one object
         courses: list[Course] = []
         courses_of = np.full(len(texts), -1, dtype=np.int32)

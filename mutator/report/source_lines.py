@@ -1,7 +1,5 @@
-"""The source of a run's target, with the outcomes of the faults injected in each line.
-
-Line numbers refer to the tree that ran. If the target has changed since, no source is shown.
-"""
+"""The source of a run's target, with the outcomes of the faults in each line. If the target has changed
+since, no source is shown."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -37,8 +35,7 @@ _JOINED = 3  # gaps up to this many lines are shown, too
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """The outcomes of a line's mutants. `mutants` is their number, `ending` the worst outcome, and `worst`
-    the number of mutants with that outcome."""
+    """The outcomes of a line's `mutants`: the worst one, and the number of mutants with it."""
 
     ending: str
     worst: int
@@ -66,9 +63,9 @@ class MarkedFile:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SourceLines:
-    """The files of a run, worst first. `places` has the line of each fault, such as `pkg/plan.py:42`.
-    `changes` has the change that each operator's fault makes, such as `a + b -> a - b`. If there are no
-    files, `why` is the reason."""
+    """The files of a run, worst first. `places` has the line of each fault, such as `pkg/plan.py:42`;
+    `changes` the change of each operator's fault, such as `a + b -> a - b`. `why` is the reason if there are
+    no files."""
 
     files: tuple[MarkedFile, ...] = ()
     places: Mapping[str, str] = field(default_factory=dict)
@@ -118,7 +115,6 @@ class SourceLines:
 
 
 def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
-    """The file and line (from 1) of a fault's first location."""
     location = fault.injections[0].location
     return location.path, parsed(manifest.tree, location.path).span(location)[0] + 1
 
@@ -126,8 +122,8 @@ def _place(manifest: TargetManifest, fault: Fault) -> tuple[str, int]:
 def _marks(
     at: Mapping[str, tuple[str, int]], texts: "DataFrame"
 ) -> Iterator[tuple[tuple[str, int], str, Mark]]:
-    """Yield the marks of each line, separately for permanent and transient faults. Each fault counts once,
-    with its worst experiment."""
+    """Yield the marks of each line, for permanent and transient faults. Each fault counts once, with its
+    worst experiment."""
     found: dict[tuple[tuple[str, int], str], dict[str, int]] = {}
     for name, trigger, ending in zip(texts["fault_id"], texts["trigger"], endings(texts), strict=True):
         if name in at and ending in ENDINGS:
@@ -150,7 +146,7 @@ def _file(file: ParsedFile, marks: Marks) -> MarkedFile:
 
 
 def _around(file: ParsedFile, line: int) -> range:
-    """The lines of the outermost function around `line`. Outside functions, a few lines around it."""
+    """The outermost function around `line`; outside functions, a few lines."""
     function = file.outer_function(line - 1)
     if function is not None:
         return range(function.start + 1, function.stop + 1)
@@ -158,7 +154,7 @@ def _around(file: ParsedFile, line: int) -> range:
 
 
 def _joined(parts: Iterable[range]) -> tuple[range, ...]:
-    """The ranges in order. Ranges that touch, or almost touch, are joined."""
+    """The ranges in order, joined if they almost touch."""
     found: list[range] = []
     for part in sorted(parts, key=lambda part: (part.start, part.stop)):
         if found and part.start <= found[-1].stop + _JOINED:
@@ -169,6 +165,5 @@ def _joined(parts: Iterable[range]) -> tuple[range, ...]:
 
 
 def _badness(file: MarkedFile) -> tuple[object, ...]:
-    """A sort key that puts files with the most lines of the worst ending first."""
     counts = file.worst_lines()
     return (*(-counts.get(ending, 0) for ending in ENDINGS), file.path)

@@ -21,8 +21,7 @@ FILE = "made_from.json"
 
 
 def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
-    """The digest of a report's inputs: results, run.json, records, timings, proof, reviews, series, the files
-    in plots/, the library's citations, and the sources of mutator."""
+    """The digest of all inputs of a report, including the sources of mutator."""
     run = folder.path
     plots = sorted(path.name for path in (run / "plots").glob("*"))
     series = [series_facts(folder), _files(run, f"{series_store.FOLDER}/{series_store.INDEX}.js")]
@@ -37,7 +36,7 @@ def made_from(folder: RunFolder, workspace: Workspace | None) -> str:
 
 
 def is_current(out: Path, made_from: str) -> bool:
-    """Whether the report in `out` was made from inputs with the digest `made_from` and is unchanged since."""
+    """Whether the report in `out` was made from these inputs and is unchanged since."""
     try:
         stamp = read_json(out / FILE, SCHEMA)
     except MutatorError:  # unreadable, so the report is written again
@@ -46,12 +45,11 @@ def is_current(out: Path, made_from: str) -> bool:
 
 
 def write_stamp(out: Path, made_from: str) -> None:
-    """Record the digests of a report's inputs and files. Call this last."""
+    """Record the digests. Call this last."""
     write_json(out / FILE, {"schema": SCHEMA, "made_from": made_from, "files": _written(out)})
 
 
 def _written(out: Path) -> dict[str, str]:
-    """The digest of each file of a report, without comparisons."""
     paths = {path.relative_to(out): path for path in out.rglob("*") if path.is_file()}
     return {
         name.as_posix(): digest(path.read_bytes())
@@ -61,7 +59,7 @@ def _written(out: Path) -> dict[str, str]:
 
 
 def remove_stamp(out: Path) -> None:
-    """Remove the stamp before writing a report, so that an interrupted report does not pass as complete."""
+    """Remove the stamp, so that an interrupted report does not pass as complete."""
     (out / FILE).unlink(missing_ok=True)
 
 

@@ -1,4 +1,4 @@
-"""Takes stills of a finished run, of the few worst experiments whose controller sees pictures."""
+"""Takes stills of the few worst experiments whose controller sees pictures."""
 
 import time
 from collections.abc import Callable, Collection, Iterable, Mapping
@@ -24,10 +24,7 @@ Notify = Callable[[Progress], None]
 
 
 def take_stills(workspace: Workspace, folder: RunFolder, *, workers: int, notify: Notify) -> str:
-    """Take the run's missing stills, `workers` experiments at a time. None starts after `BUDGET_S`.
-
-    Returns the reason why the first experiment without stills has none, or ''.
-    """
+    """Take the run's missing stills. Returns why the first experiment without stills has none, or ''."""
     manifest = workspace.manifest(folder.head["target"])
     if manifest.film is None or not manifest.film.pictures:
         return ""
@@ -77,8 +74,7 @@ def _due(
     experiments: Mapping[str, Experiment],
     records: Mapping[str, Record],
 ) -> dict[str, list[Shot]]:
-    """The missing stills by experiment, worst first: at activation, first alert and first hazard of the worst
-    experiments that see `pictures`."""
+    """The missing stills of the worst experiments that see `pictures`, worst first."""
     seeing = set(pictures)
     texts = Results.of_run(folder.path).texts()
     moved = ((texts["status"] == Status.OK.value) & (texts["t_manifest"] != "")).to_numpy()

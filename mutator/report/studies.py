@@ -31,14 +31,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReportedRun:
-    """The data that a report is made from.
-
-    `texts` are all experiments of results.csv, `frame` the usable ones. `experiments` (the plan) and
-    `records` are read on access, by experiment id. `seen` has the data that a report needs from all of them.
-    Without a workspace, no experiment can be rerun, and studies are not available. `study` is None if the
-    campaign asks for none or if the study is not installed. `compared` is set if the study has its own page
-    on these results.
-    """
+    """The data that a report is made from. `texts` are all experiments of results.csv, `frame` the usable
+    ones. `experiments` (the plan) and `records` are read on access. Without a workspace, no experiment can
+    be rerun, and there is no study. `compared`: the study has its own page on these results."""
 
     folder: RunFolder
     workspace: Workspace | None
@@ -50,7 +45,7 @@ class ReportedRun:
     compared: bool = False
     paths: FoundPaths | None = None
     source: SourceLines | None = None
-    experiments: Mapping[str, Experiment] = field(default_factory=dict)  # all planned experiments
+    experiments: Mapping[str, Experiment] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
 
     @classmethod
@@ -80,7 +75,6 @@ class ReportedRun:
 
     @property
     def out(self) -> Path:
-        """The folder of the report."""
         return self.folder.path / FOLDER
 
     @property
@@ -116,13 +110,10 @@ class ReportedRun:
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Study:
     """Published work with which runs are compared, provided by an entry point in `mutator.studies`. `about`
-    cites it.
-
-    `check` finds problems in the study's data in a fault library. `published` returns the counts to show next
-    to those of a run, or None if they do not apply to the run. Each function in `panels` may return a panel
-    of the study's page and write files next to the page. If none does, there is no page. `drawings` returns
-    the figures of that page.
-    """
+    cites it. `check` finds problems in its data in a fault library. `published` returns the counts to show
+    next to those of a run, or None if they do not apply. Each function in `panels` may return a panel of
+    the study's page and write files next to it. If none does, there is no page. `drawings` returns the
+    figures of that page."""
 
     about: str
     check: Callable[[Workspace], Iterable[MutatorError]]
@@ -132,7 +123,6 @@ class Study:
 
 
 def _study(folder: RunFolder) -> Study | None:
-    """The study that a run's campaign asks for; None if there is none or it is not installed."""
     name = folder.head.get("study")  # older runs do not have this key
     try:
         return cast(Study, find_study(name)) if name else None

@@ -1,7 +1,5 @@
-"""The map of fault type and scenario over all experiments, for pages that list only the worst experiments.
-
-The measures have the same names as in heat.js.
-"""
+"""The map of fault type and scenario over all experiments, for pages that list only the worst. The measures
+have the same names as in heat.js."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -60,7 +58,6 @@ def _shares(frame: pd.DataFrame, *, alerts: bool) -> Iterator[tuple[str, np.ndar
 
 
 def _counted(y: np.ndarray, x: np.ndarray, rows: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """The number of the `rows` in each cell."""
     inner = (shape[0] - 1) * (shape[1] - 1)
     found = np.zeros(shape, dtype=np.int64)
     counts = np.bincount((y * (shape[1] - 1) + x)[rows], minlength=inner)

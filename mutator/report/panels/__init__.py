@@ -1,7 +1,5 @@
-"""The panels of every report, one module each. To add a panel, add a module and a line in `PANELS`.
-
-A panel function maps `ReportedRun` to `Panel`, or to None if it has nothing to show.
-"""
+"""The panels of every report. To add one, add a module and a line in `PANELS`; its function returns None if
+there is nothing to show."""
 
 from collections.abc import Callable
 
@@ -22,11 +20,8 @@ PANELS: tuple[Callable[[ReportedRun], Panel | None], ...] = (
 
 
 def study_panels(run: ReportedRun) -> tuple[Panel, ...]:
-    """The panels of the study's page: the study's own panels, then the run's tables and figures next to the
-    published ones.
-
-    Empty if the study does not apply: too few experiments, or none of the study's faults.
-    """
+    """The panels of the study's page: its own, then the run's tables and figures next to the published
+    ones. Empty if the study does not apply: too few experiments, or none of the study's faults."""
     said = [panel for panel_of in run.study.panels if (panel := panel_of(run))] if run.study else []
     if not said:
         return ()

@@ -34,7 +34,6 @@ _BAR = '<span class="meter" style="--share: {:.3f}"></span><span class="of">{}</
 
 
 def answers_panel(run: ReportedRun) -> Panel:
-    """The panel of all answers. Answers with wide tables get their own column."""
     made = answers_of(run)
     parts = []
     for answer in made:
@@ -51,8 +50,7 @@ def _table(listing: Listing) -> Table:
 
 
 def _html(listing: Listing) -> Markup:
-    """The table as HTML, with links and bars. On narrow screens, each cell shows the heading of its
-    column."""
+    """The table as HTML. On narrow screens, each cell shows the heading of its column."""
     rows = [
         [
             _labelled(head, cell) if i else _cell(cell)

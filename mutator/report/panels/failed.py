@@ -47,7 +47,6 @@ def _markdown(failed: Sequence[Row], count: int) -> str:
 
 
 def _linked(failed: Sequence[Row]) -> Table:
-    """The table for the page. Each experiment links to its details."""
     from markupsafe import Markup
 
     ending = Markup('<span class="ending {0}">{0}</span>').format

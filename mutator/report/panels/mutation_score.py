@@ -24,8 +24,7 @@ _HTML = """\
 
 
 def score_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the shares in total and by operator; the shares by function are folded. Writes
-    tables/mutation_score.csv."""
+    """The panel with the shares in total and by operator. Writes tables/mutation_score.csv."""
     if not (run.texts["module"] == OPERATORS).any():
         return None
     runs = run.fault_free()

@@ -1,5 +1,4 @@
-"""The panel of fault paths: the control structure with the share of faults that passed each link, and where
-faults stopped."""
+"""The panel of fault paths: what passed each link, and where faults stopped."""
 
 from collections.abc import Mapping, Sequence
 
@@ -23,8 +22,8 @@ _HTML = """\
 <p class="quiet">Links: thicker, more faults got through; dashed, none did; thin, the end is not recorded;
 dotted, feedback and people, which are on no path. Boxes: orange, faults were <strong>injected</strong> here;
 green, faults were <strong>stopped</strong> here, so they got no further through this component. A fault that
-two components stopped counts at both. A <strong>masked</strong> fault changed no actuator by any way. Select a
-link to list the experiments that got through it, or a box to list those masked there.</p>
+two components stopped counts at both. A <strong>masked</strong> fault changed no actuator by any way. Select
+a link to list the experiments that got through it, or a box to list those masked there.</p>
 <div class="row"><label for="ways-kind">Faults:</label> <select id="ways-kind" disabled>
 {% for kind in kinds %}
 <option>{{ kind }}</option>
@@ -109,8 +108,8 @@ def _table(links: Links, counts: PathCounts, paths: FoundPaths) -> Table:
 
 
 def _stops(counts: Mapping[str, PathCounts], paths: FoundPaths) -> Table | None:
-    """The table of masked faults: a line for each fault type, then the total, and a column for each set of
-    components that stopped them. None if no fault was masked."""
+    """The table of masked faults by fault type, with a column for each set of components that stopped them.
+    None if no fault was masked."""
     ends = sorted(counts[ALL].ends, key=lambda names: (len(names), list(map(paths.label, names))))
     if not ends:
         return None

@@ -21,8 +21,7 @@ _HTML = """\
 
 
 def seeds_panel(run: ReportedRun) -> Panel | None:
-    """The panel with the spread of each share between seeds. Writes tables/seeds.csv and
-    tables/seeds_by_fault_type.csv."""
+    """The panel with the spread of each share between seeds. Writes its tables."""
     seeds = seeds_of(run.frame)
     if len(seeds) < 2:
         return None

@@ -1,5 +1,5 @@
-"""The panel of the source: each line coloured by the worst outcome of its mutants. Only runs with operators
-have it."""
+"""The panel of the source, for runs with operators: each line coloured by the worst outcome of its
+mutants."""
 
 import io
 import keyword
@@ -88,7 +88,6 @@ def _told(file: MarkedFile) -> str:
 
 
 def _worst(files: Sequence[MarkedFile]) -> Table:
-    """The table of the lines with the worst outcomes, for Markdown."""
     found = [
         (min(ENDINGS.index(mark.ending) for mark in here.values()), number, line, here)
         for number, file in enumerate(files)

@@ -66,8 +66,7 @@ def notes(folder: RunFolder) -> str:
 
 
 def tables_panel(run: ReportedRun) -> Panel:
-    """The panel of counts by fault type, scenario and method, then statistics. Statistics with published
-    counterparts are on the study's page instead."""
+    """The panel of counts, then statistics. Those with published counterparts are on the study's page."""
     runs = run.fault_free()
     note = own_alerts(runs)
     own = () if run.compared else _statistics(run, None)
@@ -117,13 +116,11 @@ def _counts(run: ReportedRun) -> list[tuple[str, Table]]:
 
 
 def _statistics(run: ReportedRun, published: Published | None) -> tuple[Sheet, ...]:
-    """The tables by method and scenario, next to published counts if there are any."""
     alerts = run.seen.alerts if run.folder.has_alerts else None
     return run_sheets(run.frame, published, alerts, run.ends())
 
 
 def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
-    """The tables of severity, times to hazard, and metrics."""
     made = (
         severity_sheet(run.frame),
         tolerant_times_sheet(run.frame, alerts=run.folder.has_alerts),
@@ -133,7 +130,6 @@ def _spreads(run: ReportedRun) -> tuple[Sheet, ...]:
 
 
 def _noted(sheet: Sheet, note: str) -> Sheet:
-    """The sheet. If it counts alerts, the note on alerts of fault-free runs is added."""
     words = (sheet.title, *sheet.heads, *(line[0] for line in sheet.lines))
     if not note or not any("alert" in str(word).lower() for word in words):
         return sheet

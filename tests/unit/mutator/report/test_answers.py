@@ -221,8 +221,8 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
     answer = said["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were "
-        "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, longest 64.00 s. "
-        "Checks, golden runs and the equivalence check are not timed."
+        "simulated; for 1, the trigger never held, so the golden run's result was used. Median 8.00 s, "
+        "longest 64.00 s. Checks, golden runs and the equivalence check are not timed."
     )
     [first, *_] = answer.listings[0].lines
     assert first == (Link("car/steer", "kind=car%2Fsteer"), Part(64.0, 127.0, "1 min 04 s (50 %)"))
