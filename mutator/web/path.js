@@ -60,7 +60,7 @@ const Path = (() => {
     const all = (names) => names.split(";").map(label).join(" and ");
     const reached = results.text("reached"), stopped = results.text("stopped_at");
     const far = reached ? ["Farthest component that the fault reached: ", Dom.el("strong", {}, label(reached)), "."] : "The fault changed no recorded channel on its path.";
-    return Dom.el("p", {}, far, stopped ? [" Stopped at: ", Dom.el("strong", {}, all(stopped)), "."] : "");
+    return Dom.el("p", {}, far, stopped ? [" It was stopped at ", Dom.el("strong", {}, all(stopped)), "."] : "");
   }
 
   /** A component of the path. `t` is when it changed; with `by`, the latest time, inferred from what only it feeds. */

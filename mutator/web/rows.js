@@ -74,9 +74,10 @@ const Rows = (() => {
       return OF_COMPONENTS.includes(name) ? text.replace(/[^;→]+/g, (part) => this.labels[part] || part).replaceAll("→", " → ").replaceAll(";", ", ") : text;
     }
 
-    /** What a code in a column means, such as `S3` in `scenario`; null if the page does not know it. */
+    /** What a code in a column means, such as `S3` in `scenario`; null if the page knows none. Codes are separated by `;`. */
     meaning(name, code) {
-      return this.meanings[name]?.[code] ?? null;
+      const known = this.meanings[name] ?? {};
+      return String(code).split(";").map((one) => known[one]).filter(Boolean).join("; ") || null;
     }
 
     number(row, name) {

@@ -1,6 +1,7 @@
 """The first panel of a report, which answers the first questions of a reader."""
 
 import re
+from collections.abc import Mapping
 
 from markupsafe import Markup
 
@@ -9,6 +10,7 @@ from mutator.report.answer_parts import Cell, Link, Listing, Part
 from mutator.report.answers import answers_of
 from mutator.report.panel import Panel, rendered
 from mutator.report.studies import ReportedRun
+from mutator.report.words import Words, meanings_of
 
 _HTML = """\
 <div class="answers">
@@ -40,7 +42,8 @@ def answers_panel(run: ReportedRun) -> Panel:
         tables = [_table(one).as_markdown() for one in answer.listings if one.lines]
         parts += [f"## {answer.title}", answer.says, *tables]
     columns = [[one for one in made if one.wide], [one for one in made if not one.wide]]
-    html = rendered(_HTML, columns=columns, table=_html)
+    meanings = meanings_of(run)
+    html = rendered(_HTML, columns=columns, table=lambda listing: _html(listing, meanings))
     return Panel(anchor="answers", link="Answers", markdown="\n\n".join(parts), html=html)
 
 
@@ -49,11 +52,11 @@ def _table(listing: Listing) -> Table:
     return Table(heads=listing.heads, rows=rows)
 
 
-def _html(listing: Listing) -> Markup:
+def _html(listing: Listing, meanings: Words) -> Markup:
     """The table as HTML. On narrow screens, each cell shows the heading of its column."""
     rows = [
         [
-            _labelled(head, cell) if i else _cell(cell)
+            _labelled(head, cell, meanings.get(head, {})) if i else _cell(cell)
             for i, (head, cell) in enumerate(zip(listing.heads, line, strict=True))
         ]
         for line in listing.lines
@@ -61,10 +64,18 @@ def _html(listing: Listing) -> Markup:
     return Table(heads=listing.heads, rows=rows).as_html("plain")
 
 
-def _labelled(head: str, cell: Cell) -> str:
+def _labelled(head: str, cell: Cell, meanings: Mapping[str, str]) -> str:
+    shown = _explained(cell, meanings) if isinstance(cell, str) else _cell(cell)
     if isinstance(cell, str) and cell.startswith(f"{head} "):  # e.g. "severity S2"
-        return cell
-    return Markup('<span class="label">{} </span>{}').format(head, _cell(cell))
+        return shown
+    return Markup('<span class="label">{} </span>{}').format(head, shown)
+
+
+def _explained(codes: str, meanings: Mapping[str, str]) -> str:
+    """Codes such as `H1, H3` or `severity S2`, with their meanings as a tooltip."""
+    names = codes.removeprefix("severity ").split(", ")
+    about = "; ".join(meanings[name] for name in names if name in meanings)
+    return Markup('<abbr title="{}">{}</abbr>').format(about, codes) if about else codes
 
 
 def _cell(cell: Cell) -> str:
