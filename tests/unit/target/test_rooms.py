@@ -16,13 +16,11 @@ def name(file: Path) -> str:
 
 @pytest.mark.parametrize("word", [r"\bmutator\b", r"\b_fi\b", r"\bfi:", r"\bmutants?\b"])
 def test_the_target_knows_nothing_of_the_harness(word: str) -> None:
-    """No file of the target names the harness, the probe, or the tags of injected lines."""
     assert len(FILES) > 80
     assert [name(file) for file in FILES if re.search(word, file.read_text(encoding="utf-8"))] == []
 
 
 def test_the_target_reads_no_environment() -> None:
-    """A run depends only on its arguments. Only the command that compiles helpers reads CC."""
     reads = re.compile(r"\benviron\b|\bgetenv\b|\bexpanduser\b|\bPath\.home\b")
     readers = {name(file) for file in FILES if reads.search(file.read_text(encoding="utf-8"))}
     assert readers == {"sim/compile_helpers.py"}

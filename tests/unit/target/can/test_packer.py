@@ -111,7 +111,6 @@ def test_layouts_are_those_cantools_reads(path):
     ],
 )
 def test_other_layouts_are_refused(tmp_path, signal, complaint):
-    """The codec refuses a DBC with an unsupported signal layout when it reads the file."""
     dbc = tmp_path / "other.dbc"
     dbc.write_text(f'VERSION ""\nBU_: A\nBO_ 1 M: 8 A\n {signal}\n')
     with pytest.raises(ValueError, match=rf"other\.dbc:4.*{complaint}"):

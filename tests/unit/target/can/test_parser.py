@@ -48,7 +48,6 @@ def test_valid_once_every_message_has_come(parser, speed, wheels):
 
 @pytest.mark.parametrize("bit", range(64))
 def test_any_flipped_bit_is_noticed(parser, speed, bit):
-    """A frame with one flipped bit, at any position, never changes the values."""
     frame = speed.pack((50.0,), 0)
     broken = (int.from_bytes(frame.data, "big") ^ (1 << bit)).to_bytes(8, "big")
     parser.update([frame._replace(data=broken)], 0.0)
@@ -58,7 +57,6 @@ def test_any_flipped_bit_is_noticed(parser, speed, bit):
 
 @pytest.mark.parametrize("change", [{"bus": 1}, {"address": 0x999}, {"data": b"\0" * 7}])
 def test_frames_of_others_are_ignored(parser, speed, change):
-    """Frames of another bus, address or length are ignored."""
     parser.update([speed.pack((50.0,), 0)._replace(**change)], 0.0)
     assert parser.values["ENGINE_DATA"] == (-1,)
 
@@ -93,14 +91,12 @@ def test_a_stuck_counter_is_believed_four_times(parser, speed):
 
 
 def test_a_lost_frame_does_no_harm(parser, speed):
-    """A gap in the counter does not by itself reject the next frame."""
     parser.update([speed.pack((1.0,), 0)], 0.0)
     parser.update([speed.pack((2.0,), 2)], 0.02)
     assert parser.values["ENGINE_DATA"] == pytest.approx((2.0,))
 
 
 def test_counting_right_again_restores_belief(parser, speed):
-    """After too many wrong counters, one correct counter makes the message valid again."""
     for repeat in range(8):
         parser.update([speed.pack((1.0,), 0)], repeat / 100)
     for counter in range(1, 5):

@@ -13,7 +13,6 @@ class Bench:
         self.frame = 0
 
     def frames(self, button=0, **truth):
-        """Return all frames of the next step. `truth` replaces the default, a car at rest."""
         values = dict.fromkeys(GroundTruth._fields, 0.0) | truth
         frames = self.sensors.measure(GroundTruth(**values), button, self.frame)
         self.frame += 1
@@ -21,7 +20,6 @@ class Bench:
 
     @property
     def t(self):
-        """Time of the latest step."""
         return (self.frame - 1) / 100
 
 

@@ -11,8 +11,6 @@ DBC = cantools.database.load_file(CAR_DBC)
 
 
 class Rig:
-    """A car controller and the actuators that listen to it."""
-
     def __init__(self):
         self.controller = CarController()
         self.receiver = ActuatorReceiver()
@@ -88,7 +86,6 @@ def test_no_torque_while_the_eps_refuses(rig):
 
 
 def test_disabled_means_zero(rig):
-    """While the system is not engaged, no demand reaches the actuators."""
     rig.send(cycles=30, gas=0.3, brake=0.3, steer=0.3)
     taken = rig.send(enabled=False, gas=0.3, brake=0.3, steer=0.3)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)

@@ -103,7 +103,6 @@ def test_button_events(reader, bench):
 
 
 def test_setting_button(reader):
-    """The setting switch is reported separately from the cruise buttons."""
     state = reader.update([pack("SCM_BUTTONS", 0, CRUISE_SETTING=1)], 0.0)
     assert state.buttons == (ButtonEvent("setting", True),)
 

@@ -26,7 +26,6 @@ def kinds(state):
 
 
 def test_no_events_without_cause(car, bench):
-    """A car in drive without faults raises no event."""
     assert update(car, bench, v_ego=20.0).events == ()
 
 
@@ -46,14 +45,12 @@ def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
 
 @pytest.mark.parametrize("button", [CruiseButton.DECEL_SET, CruiseButton.RES_ACCEL])
 def test_engaging_happens_on_release(car, bench, button):
-    """Releasing set or resume engages. Pressing does not."""
     update(car, bench)
     assert update(car, bench, button=button).events == ()
     assert kinds(update(car, bench)) == {"button_enable": {"enable"}}
 
 
 def test_cancel_happens_on_press(car, bench):
-    """Cancel takes effect when it is pressed."""
     update(car, bench)
     assert kinds(update(car, bench, button=CruiseButton.CANCEL)) == {"button_cancel": {"user_disable"}}
     assert update(car, bench).events == ()
@@ -69,7 +66,6 @@ def test_gas_pedal(car, bench):
 
 
 def test_brake_pedal(car, bench):
-    """The brake pedal disengages while the car moves."""
     update(car, bench, v_ego=20.0)
     for counter in (1, 2):
         state = car.update([pack("POWERTRAIN_DATA", counter, BRAKE_PRESSED=1)], 0.01 * counter)
@@ -100,7 +96,6 @@ def test_conditions(car, bench, name, signals, event, kind):
 
 
 def test_interfaces_share_nothing(bench):
-    """A second interface does not depend on what the first one received."""
     used, fresh = CarInterface(), CarInterface()
     for _ in range(20):
         frames = bench.frames(v_ego=20.0)

@@ -44,7 +44,6 @@ def test_track_ends_at_255_m(radar):
 
 
 def test_fault_state(radar):
-    """Any radar state except the good one is an error."""
     state, track = frames()
     broken = state._replace(data=b"\x78" + state.data[1:])
     assert radar.update([broken, track], 0.0).errors == ("fault",)
@@ -60,5 +59,4 @@ def test_missing_state_frames(radar):
 
 
 def test_car_frames_are_not_the_radars(radar):
-    """The radar ignores frames with its addresses on the car's bus."""
     assert radar.update([frame._replace(bus=0) for frame in frames()], 0.0) is None

@@ -19,7 +19,6 @@ def test_products_are_those_of_matrices() -> None:
 
 
 def test_lengths_keep_their_axis() -> None:
-    """Lengths keep their axis, so that vectors can be divided by them."""
     vectors = np.array([[3.0, 4.0], [5.0, 12.0]])
     assert array_math.length(vectors).tolist() == [[5.0], [13.0]]
 

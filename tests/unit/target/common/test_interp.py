@@ -9,7 +9,6 @@ FP = (1.0, 2.0, 4.0)
 
 
 def test_interp_between_and_beyond_breakpoints() -> None:
-    """A table is linear between its points and constant outside them."""
     assert [interp(x, XP, FP) for x in (-1.0, 0.0, 2.5, 5.0, 7.5, 10.0, 99.0)] == [1, 1, 1.5, 2, 3, 4, 4]
 
 
@@ -25,5 +24,4 @@ def test_no_number_has_a_defined_place() -> None:
 
 
 def test_clip_limits_both_ways() -> None:
-    """A value outside the range is limited. A value inside is unchanged."""
     assert [clip(x, -1.0, 2.0) for x in (-3.0, -1.0, 0.5, 2.0, 3.0)] == [-1.0, -1.0, 0.5, 2.0, 2.0]

@@ -30,7 +30,6 @@ def test_distance_filter_learns_the_rate() -> None:
 
 
 def test_distance_filter_restart_forgets_the_rate() -> None:
-    """After a restart, the filter has the given distance and a rate of zero."""
     lead = DistanceFilter(variance=1e2, q_distance=0.5, q_rate=1.0)
     lead.update(50.0, 1.0)
     lead.predict(0.05)

@@ -7,5 +7,4 @@ from selfdrive.car.params import CarParams
 
 @pytest.fixture
 def params() -> CarParams:
-    """The Civic's."""
     return get_params()

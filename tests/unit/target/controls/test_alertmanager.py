@@ -43,7 +43,6 @@ def test_higher_priority_is_shown_and_all_are_listed() -> None:
 
 
 def test_the_newer_of_equals_is_shown() -> None:
-    """Among alerts of the same priority the one raised last is shown."""
     alerts = AlertManager()
     alerts.add("can_error_no_entry", 1.0)
     alerts.add("steer_saturated", 1.5)
@@ -79,7 +78,6 @@ def test_raising_again_prolongs() -> None:
 
 
 def test_unknown_alert_is_an_error() -> None:
-    """A name without an alert is refused when it is raised."""
     with pytest.raises(KeyError, match="no alert is named 'nonsense'"):
         AlertManager().add("nonsense", 0.0)
 
@@ -110,7 +108,6 @@ def test_every_event_has_its_alerts(event: Event) -> None:
 
 
 def test_every_alert_can_be_raised() -> None:
-    """Every alert has an event, or a place in the loop, that raises it."""
     asked = {event.name + SUFFIX[kind] for event in EVENTS for kind in event.kinds if kind in SUFFIX}
     in_the_loop = {"startup", "enable", "disable", "fcw", "steer_saturated"}
     assert set(ALERTS) - asked - in_the_loop == {"pre_driver_distracted", "driver_distracted"}
@@ -149,5 +146,4 @@ def test_priority_and_duration(name: str, priority: int, duration: float) -> Non
     ],
 )
 def test_ends_of_sound_picture_and_text(name: str, ends: tuple[float, float, float]) -> None:
-    """An alert's sound, picture and text end independently."""
     assert ALERTS[name].ends == ends

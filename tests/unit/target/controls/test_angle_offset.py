@@ -28,5 +28,4 @@ def test_learns_less_without_lines_at_low_speed_and_in_turns() -> None:
 
 
 def test_at_most_five_degrees() -> None:
-    """The offset is limited to 5 degrees."""
     assert learn(3600.0) == pytest.approx(5.0)

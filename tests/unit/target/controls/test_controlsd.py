@@ -30,8 +30,6 @@ RELEASE = (ButtonEvent("decel", False),)
 
 
 class FakeCar:
-    """Returns the given CarState and records the demands."""
-
     def __init__(self) -> None:
         self.state = CarState()
         self.asked: list[CarControl] = []
@@ -47,8 +45,6 @@ class FakeCar:
 
 
 class FreeMpc:
-    """Sees no lead."""
-
     prev_lead_status = new_lead = False
     v_mpc = v_mpc_future = 99.0
     a_mpc = 0.0
@@ -97,12 +93,10 @@ class Drive:
 
 @pytest.fixture
 def drive(params: CarParams) -> Drive:
-    """A car that is not engaged yet."""
     return Drive(params)
 
 
 def test_engaging_sets_the_speed_and_takes_over(drive: Drive) -> None:
-    """The engaging cycle already controls, with the current speed as set speed."""
     drive.engage()
     assert (drive.state.state, drive.state.enabled, drive.state.active) == ("enabled", True, True)
     assert drive.state.long_state == "pid"
@@ -181,13 +175,11 @@ def test_steer_saturation_is_told_and_control_goes_on(drive: Drive) -> None:
 
 
 def test_a_car_may_do_without_the_steering_alert(params: CarParams) -> None:
-    """If the car's parameters say so, saturated steering raises no alert."""
     drive = Drive(replace(params, steer_limit_alert=False)).engage().run(100)
     assert drive.state.steer_saturated and "steer_saturated" not in drive.state.alerts
 
 
 def test_buttons_without_engaging_set_no_speed(drive: Drive) -> None:
-    """A button that does not engage leaves the set speed at that of a car never engaged."""
     drive.run(1, buttons=(ButtonEvent("decel", False),))
     assert drive.state.v_cruise == pytest.approx(255 * KPH_TO_MS)
 
@@ -202,7 +194,6 @@ def test_without_a_driver_the_car_slows_down(drive: Drive) -> None:
 
 
 def test_warnings_and_permanent_alerts(drive: Drive) -> None:
-    """A warning shows only while engaged. A permanent fault shows also while disengaged."""
     drive.run(1, BUSY)
     assert "steer_temp_unavailable" not in drive.state.alerts
     drive.run(1, BROKEN)
@@ -212,7 +203,6 @@ def test_warnings_and_permanent_alerts(drive: Drive) -> None:
 
 
 def test_collision_warning_works_disengaged(drive: Drive) -> None:
-    """The planner's warning is shown, engaged or not, with picture and sound in the car."""
     drive.controlsd._planner._fcw_checker = SimpleNamespace(update=lambda *_: True, reset=lambda: None)
     drive.run(5)
     assert drive.state.alerts[0] == "fcw" and not drive.state.enabled
@@ -255,7 +245,6 @@ def test_angle_offset_is_learnt_while_in_control(drive: Drive) -> None:
 
 
 def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
-    """The lateral plan receives the learnt offset."""
     told = []
     drive.controlsd._lateral.mpc.update = lambda *arguments: told.append(arguments[3]) or 0.1
     drive.controlsd._angle_offset.value = 0.02
@@ -264,7 +253,6 @@ def test_the_learnt_offset_is_steered_with(drive: Drive) -> None:
 
 
 def test_frames_are_counted_and_passed_on(drive: Drive) -> None:
-    """The car is called once each cycle, with the cycle's number, and its frames are returned."""
     assert drive.car.frames == [0, 1, 2, 3, 4]
     assert drive.sent == [4]
 

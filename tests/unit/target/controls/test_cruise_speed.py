@@ -32,5 +32,4 @@ def test_released_button_moves_to_a_multiple_of_8(button: str, before: int, afte
 
 
 def test_pressing_alone_does_nothing() -> None:
-    """Only the release of a button counts."""
     assert button_v_cruise(64, [ButtonEvent("accel", True)]) == 64

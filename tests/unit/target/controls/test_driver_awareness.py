@@ -18,7 +18,6 @@ def test_first_alert_20_s_before_slowing_down_for_4_s() -> None:
 
 
 def test_slows_down_only_then() -> None:
-    """The car slows down when the time has run out and continues to do so until the driver acts."""
     awareness, _ = run(35990)
     assert not awareness.absent
     for _ in range(20):

@@ -6,12 +6,10 @@ EVENTS = (Event("door_open", (NO_ENTRY, SOFT_DISABLE)), Event("busy", (NO_ENTRY,
 
 
 def test_has_kind() -> None:
-    """`has_kind` is true if any event has the kind."""
     assert has_kind(EVENTS, WARNING)
     assert not has_kind(EVENTS[:1], WARNING)
 
 
 def test_names_of_kind_keep_their_order() -> None:
-    """The names of events of a kind keep their order. Events of other kinds are left out."""
     assert names_of_kind(EVENTS, NO_ENTRY) == ["door_open", "busy"]
     assert names_of_kind(EVENTS, SOFT_DISABLE) == ["door_open"]

@@ -37,7 +37,6 @@ def test_braking_of_a_slow_lead_counts_little() -> None:
 
 
 def test_warns_when_all_counters_are_full() -> None:
-    """FCW warns when all counters are full. The counter without blinkers, 3 s, fills last."""
     assert warnings() == [pytest.approx(3.0)]
 
 
@@ -69,7 +68,6 @@ def test_each_condition_prevents_the_warning(
 def test_a_condition_must_have_held_for_ten_cycles(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """If all other conditions hold, the warning comes after the missing one has held for ten cycles."""
     checker = FcwChecker()
     car, lead = replace(CAR, **car), replace(LEAD, **lead)
     for k in range(80):
@@ -115,13 +113,11 @@ def test_a_lead_may_have_moved_before_the_camera_saw_it() -> None:
 
 
 def test_five_seconds_between_warnings() -> None:
-    """A warning is not repeated before 5 s have passed."""
     times = warnings(cycles=300)
     assert len(times) == 3 and times[1] - times[0] == pytest.approx(5.05)
 
 
 def test_a_new_lead_counts_anew() -> None:
-    """After a reset the counters start from zero."""
     checker = FcwChecker()
     for k in range(59):
         assert not checker.update(k * 0.05, CAR, LEAD, BRAKING)

@@ -14,8 +14,6 @@ LANES = Lanes(ZERO, ZERO, ZERO, 1.0, 1.0, 3.7)
 
 
 class FixedMpc:
-    """A lateral MPC that returns the given angles one after another."""
-
     def __init__(self, *degrees: float) -> None:
         self.angles = [d * DEG_TO_RAD for d in degrees]
 
@@ -33,7 +31,6 @@ def control(params: CarParams, *degrees: float, v_ego: float = 20.0) -> tuple[La
 
 
 def test_wanted_angle_is_held_until_the_next(params: CarParams) -> None:
-    """The MPC's angle holds from its own cycle until the next angle."""
     lateral, car = control(params, 0.5, 1.0)
     held = []
     for k in range(10):

@@ -111,7 +111,6 @@ def test_moving_off_releases_the_brake_first(params: CarParams) -> None:
 
 
 def test_moving_off_may_be_given_up(params: CarParams) -> None:
-    """If the lead stops again while the brake is released, the car stops again."""
     control = stopped(params)
     follow(control, at(0.0, standstill=True), plan(0.3, future=1.0), 3)
     follow(control, at(0.0, standstill=True), plan(0.0))
@@ -119,7 +118,6 @@ def test_moving_off_may_be_given_up(params: CarParams) -> None:
 
 
 def test_reset_keeps_nothing_of_the_loop(params: CarParams) -> None:
-    """After a pause the loop starts without an integral."""
     control = LongControl(params)
     follow(control, at(20.0), plan(20.5), 300)
     control.reset(20.0)

@@ -9,8 +9,6 @@ from selfdrive.messages import RadarData
 
 
 class Log(list):
-    """Records the calls in order."""
-
     def call(self, name: str, result=None):
         def called(*arguments):
             self.append((name, *arguments))
@@ -21,7 +19,6 @@ class Log(list):
 
 @pytest.fixture
 def parts(params: CarParams) -> SimpleNamespace:
-    """Build a manager with parts that only record their calls."""
     log = Log()
     radar = SimpleNamespace(update=log.call("radar", RadarData(0.0)))
     visiond = SimpleNamespace(update=log.call("visiond"), latest="model")
@@ -38,7 +35,6 @@ def run(parts: SimpleNamespace, steps: int, view: str | None = None) -> list:
 
 
 def test_camera_then_radar_then_controls(parts: SimpleNamespace) -> None:
-    """In each step the camera is read first and the radar second. The controls use both results."""
     assert run(parts, START_STEP + 2, "view") == ["sent"]
     t = (START_STEP + 1) * 0.01
     assert parts.log[-4:] == [

@@ -31,12 +31,10 @@ def test_middle_of_a_lane_is_followed() -> None:
 
 
 def test_lane_and_path_count_alike() -> None:
-    """The path is the mean of the lane's middle and the model's path."""
     assert planned(model(path=0.6)).d_poly[3] == pytest.approx(0.3)
 
 
 def test_without_lines_the_model_path_is_followed() -> None:
-    """Lines with zero probability have no weight, so the path is the model's path."""
     planner = planned(model(path=0.6, probs=(0.0, 0.0)))
     assert planner.d_poly[3] == pytest.approx(0.6)
     assert planner.c_prob == 0.0

@@ -15,7 +15,6 @@ def test_terms_add_up() -> None:
 
 
 def test_gains_follow_speed() -> None:
-    """The gains are interpolated from their tables at the given speed."""
     pid = PIController(((0.0, 10.0), (1.0, 0.5)), ((0.0,), (0.0,)))
     assert pid.update(0.4, 0.0, speed=5.0) == pytest.approx(0.3)
 
@@ -35,7 +34,6 @@ def test_integrator_stops_at_a_limit_and_leaves_it_at_once() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_integrator_may_return_from_beyond(side: int) -> None:
-    """An integral of the opposite sign is reduced even while control exceeds its limit."""
     pid = make()
     pid.i = -0.5 * side
     pid.update(3.0 * side, 0.0, speed=0.0)
@@ -43,7 +41,6 @@ def test_integrator_may_return_from_beyond(side: int) -> None:
 
 
 def test_limits_apply_after_conversion() -> None:
-    """The limit and the anti-windup apply to the converted control value."""
     pid = make(convert=lambda control, speed: control / 10.0)
     assert pid.update(5.0, 0.0, speed=0.0) == pytest.approx(0.505)
     assert pid.i > 0.0
@@ -94,7 +91,6 @@ def test_saturation_is_forgotten_as_slowly_as_learnt() -> None:
 
 
 def test_reset_forgets() -> None:
-    """A reset clears integral and saturation."""
     pid = saturate(200)
     pid.i = 1.0
     pid.reset()

@@ -11,8 +11,6 @@ from selfdrive.messages import CarState, LeadData, LeadVision, ModelData, PathDa
 
 
 class FixedMpc:
-    """A controller that always returns the same solution, relative to the start of the plan."""
-
     def __init__(self, dv: float = 1.0, a: float = 0.0, lead: bool = False, future: float = 99.0) -> None:
         self.dv, self.a_mpc, self.prev_lead_status, self.v_mpc_future = dv, a, lead, future
         self.new_lead = False
@@ -106,7 +104,6 @@ def test_keeping_up_with_a_lead_allows_more(params: CarParams) -> None:
 
 
 def test_cruise_never_goes_backwards(params: CarParams) -> None:
-    """Cruising does not continue from a plan that ended slightly below zero."""
     drive = started(params)
     drive.planner._v_now, drive.planner._a_now = -0.005, -0.4
     drive.run(1, kph=8.0)
@@ -137,7 +134,6 @@ def test_plan_is_interpolated_and_its_start_carried_on(params: CarParams) -> Non
 
 
 def test_a_plan_that_is_not_renewed_ends(params: CarParams) -> None:
-    """Without new radar states, the plan is followed for 0.22 s and then held."""
     drive = started(params, FixedMpc(-0.1, -1.0, True))
     targets = [plan.a_target for plan in drive.run(1) + drive.run(40, radar=False)]
     assert targets[:22] == sorted(set(targets), reverse=True)
@@ -152,12 +148,10 @@ def test_future_is_the_slowest_of_all(params: CarParams) -> None:
 
 
 def test_absent_driver_slows_the_car(params: CarParams) -> None:
-    """Without a driver the car slows down, whatever the set speed."""
     assert started(params).run(200, kph=100.0, slow_down=True)[-1].a_target == pytest.approx(-0.2, abs=0.01)
 
 
 def errors(drive: Drive, plans: list[Plan]) -> dict[str, int]:
-    """Return the first cycle of each error event."""
     first: dict[str, int] = {}
     for k, plan in enumerate(plans):
         for event in plan.events:
@@ -173,13 +167,11 @@ def test_silence_of_more_than_half_a_second_is_an_error(params: CarParams) -> No
 
 
 def test_nothing_yet_is_an_error_too(params: CarParams) -> None:
-    """Before the first messages, the car does not engage."""
     plan = Planner(params, ModelFit()).update(0.1, CarState(), None, "off", 255.0, False)
     assert [event.name for event in plan.events] == ["model_error", "radar_error"]
 
 
 def test_radar_errors_are_told_at_once(params: CarParams) -> None:
-    """A fault reported by the radar is an error in the same cycle."""
     drive = Drive(params)
     drive.run(1)
     state = RadarState(0.01, LeadData(), LeadData(), ("fault",))

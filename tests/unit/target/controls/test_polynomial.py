@@ -15,7 +15,6 @@ CURVE = (1e-5, -2e-3, 0.05, 1.85)
 
 
 def test_fit_finds_the_cubic() -> None:
-    """A fit to points on a cubic returns its coefficients."""
     assert CubicFit()([value(CURVE, x) for x in range(50)]) == pytest.approx(CURVE, rel=1e-9)
 
 
@@ -53,7 +52,6 @@ def test_a_compiled_fit_has_the_same_bits(all_compiled: Path) -> None:
 
 
 def test_slope() -> None:
-    """The slope is the derivative."""
     assert slope(CURVE, 20.0) == pytest.approx((value(CURVE, 20.001) - value(CURVE, 19.999)) / 0.002)
 
 

@@ -15,14 +15,12 @@ def test_straight_on() -> None:
 
 
 def test_slanting_line() -> None:
-    """For a slanting line, the distance is the shortest one."""
     assert distance_to(model_curve((0.0, 0.0, 1.0, 0.0)), 20.0, 0.0) == pytest.approx(-20.0 / 2**0.5)
 
 
 @pytest.mark.parametrize("angle", [0.1, 0.3])
 @pytest.mark.parametrize("offset", [-1.0, 0.5])
 def test_steering_circle(angle: float, offset: float) -> None:
-    """For a steering circle, the distance is measured from the circle."""
     radius = 200.0
     x, y = (radius - offset) * sin(angle), radius - (radius - offset) * cos(angle)
     assert distance_to(steering_curve(1.0 / radius), x, y) == pytest.approx(offset, abs=1e-3)
@@ -30,7 +28,6 @@ def test_steering_circle(angle: float, offset: float) -> None:
 
 
 def test_model_curve_agrees_with_a_search() -> None:
-    """The nearest point of a curved path matches that of an exhaustive search."""
     poly = (1e-5, -5e-4, 0.02, 0.3)
     curve = model_curve(poly)
     best = min(hypot(x / 100.0 - 40.0, curve(x / 100.0)[0] - 3.0) for x in range(14000))
@@ -39,5 +36,4 @@ def test_model_curve_agrees_with_a_search() -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_sharp_steering_stays_finite(side: int) -> None:
-    """Points beyond the circle have a finite distance."""
     assert abs(distance_to(steering_curve(0.1 * side), 100.0, 0.0)) < 2000.0 * pi

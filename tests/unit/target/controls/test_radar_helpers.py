@@ -23,19 +23,16 @@ def step(
 def test_stationary_is_slower_than_4_while_the_car_is_faster(
     v_rel: float, v_ego: float, stationary: bool
 ) -> None:
-    """An object slower than 4 m/s is stationary if the car is faster than 4 m/s."""
     assert track(v_rel=v_rel, v_ego=v_ego).stationary is stationary
 
 
 def test_what_has_moved_is_never_stationary_again() -> None:
-    """A vehicle seen moving is not stationary when it stops."""
     t = track(v_rel=0.0)
     step(t, -20.0)
     assert not t.stationary
 
 
 def test_a_standing_object_may_start() -> None:
-    """A stationary object that moves off is no longer stationary."""
     t = track(v_rel=-20.0)
     step(t, -15.0)
     assert not t.stationary
@@ -116,7 +113,6 @@ def test_lead_is_on_the_path_or_cuts_in(cluster: Cluster, expected: bool) -> Non
 
 @pytest.mark.parametrize("v_rel", [-20.0, -30.0])
 def test_one_moving_track_makes_the_vehicle_a_lead(v_rel: float) -> None:
-    """A vehicle is stationary or oncoming only if all of its tracks are."""
     assert not Cluster([track(v_rel=v_rel), track(v_rel=v_rel)]).is_lead(20.0)
     assert Cluster([track(v_rel=v_rel), track()]).is_lead(20.0)
 
@@ -159,7 +155,6 @@ def test_centroids_keep_a_chain_apart() -> None:
 
 
 def test_nothing_gives_no_clusters() -> None:
-    """Without tracks there are no clusters."""
     assert cluster_tracks([]) == []
 
 

@@ -63,7 +63,6 @@ def test_lead_speed_starts_as_the_original(params: CarParams) -> None:
 
 
 def test_distance_is_from_the_bumper(params: CarParams) -> None:
-    """The published distance is the radar's, whatever the camera's position."""
     assert Drive(params).see(point(d_rel=42.5)).lead_one.d_rel == pytest.approx(42.5)
 
 
@@ -95,7 +94,6 @@ def test_disengaged_the_steering_wheel_shows_the_path(params: CarParams) -> None
 
 @pytest.mark.parametrize("steered", [False, True])
 def test_the_driver_s_steering_gives_no_lead_a_lateral_speed(params: CarParams, steered: bool) -> None:
-    """A lead that moves sideways has a lateral speed, unless the driver steers."""
     drive = Drive(params, steer_override=steered)
     for k in range(20):
         lead = drive.see(point(y_rel=0.05 * k)).lead_one
@@ -124,7 +122,6 @@ def test_twenty_fusions_make_a_lead_good_for_warnings(params: CarParams) -> None
 
 
 def test_a_lost_track_is_forgotten(params: CarParams) -> None:
-    """A track that is missing for a cycle starts again."""
     drive = Drive(params)
     drive.see(point(), cycles=30)
     assert not drive.see().lead_one.status
@@ -133,6 +130,5 @@ def test_a_lost_track_is_forgotten(params: CarParams) -> None:
 
 
 def test_errors_and_time_are_passed_on(params: CarParams) -> None:
-    """The state has the radar's time and errors."""
     state = Radard(params, ModelFit()).update(RadarData(3.5, (), ("fault",)), None, ControlsState())
     assert (state.t, state.errors) == (3.5, ("fault",))

@@ -60,7 +60,6 @@ def test_limits_are_kept_and_the_target_reached(v: float, a: float, target: floa
     once=st.floats(0.01, 30.0),
 )
 def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int, once: float) -> None:
-    """One large step reaches the same state as many small steps."""
     limits = Limits(a_min=-0.8, a_max=0.8, j_min=-0.7, j_max=0.7)
     v_far, a_far = smooth_speed(v, side * a, v + side * gain, limits, once)
     (v_near, a_near), *_ = reversed(drive(v, side * a, v + side * gain, 200, limits, once / 200))
@@ -69,6 +68,5 @@ def test_a_profile_goes_on_as_planned(v: float, a: float, gain: float, side: int
 
 
 def test_a_ceiling_below_zero_slows_down_towards_a_higher_target() -> None:
-    """With an upper acceleration limit of -0.2, the car slows down although the target is higher."""
     v, a = drive(20.0, 0.0, 30.0, 100, Limits(-0.5, -0.2, -0.5, 0.5))[-1]
     assert a == pytest.approx(-0.2) and v == pytest.approx(19.02, abs=0.05)

@@ -29,8 +29,6 @@ STRAIGHT = [PathData((y,) * 50, 1.0, 1.0) for y in (0.0, 1.85, -1.85)]
 
 
 class Cycle(NamedTuple):
-    """The results of one radar cycle."""
-
     state: RadarState
     fusions: int
     new_lead: bool

@@ -14,8 +14,6 @@ CAN = Event("can_error", (ev.NO_ENTRY, ev.IMMEDIATE_DISABLE))
 
 
 class Drive:
-    """A state machine and its alerts. Events move it from state to state."""
-
     def __init__(self, *steps: tuple[Event, ...]) -> None:
         self.machine = StateMachine()
         self.alerts = AlertManager()
@@ -54,7 +52,6 @@ def test_engaging(events: tuple[Event, ...], state: str) -> None:
 
 
 def test_refusal_says_why() -> None:
-    """Each reason that refuses entry is shown."""
     assert Drive((ENGAGE, DOOR, CAN)).alerts.active == ("door_open_no_entry", "can_error_no_entry")
 
 
@@ -80,7 +77,6 @@ def test_disengaging(first: tuple[Event, ...], event: Event, state: str, alert: 
 
 
 def test_pre_enabled_ends_with_the_gas_pedal() -> None:
-    """Actuators are controlled only once the gas pedal is released."""
     drive = Drive((ENGAGE, GAS), (GAS,))
     assert drive.machine.enabled and not drive.machine.active
     drive.step()
@@ -112,12 +108,10 @@ def test_soft_disabling_ends_with_its_reason() -> None:
 
 
 def test_a_fault_ends_soft_disabling() -> None:
-    """A reason for immediate disabling does not wait for the 3 s."""
     assert Drive((ENGAGE,), (DOOR,), (DOOR, CAN)).state == "disabled"
 
 
 def test_no_re_engaging_by_itself() -> None:
-    """After a fault the car stays disengaged until a button is released."""
     drive = Drive((ENGAGE,), (CAN,), (), ())
     assert drive.state == "disabled"
     assert drive.step(ENGAGE) and drive.state == "enabled"

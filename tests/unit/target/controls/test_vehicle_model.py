@@ -18,6 +18,5 @@ def test_understeer_needs_more_angle_when_fast(params: CarParams) -> None:
 
 
 def test_there_and_back(params: CarParams) -> None:
-    """Converting an angle to curvature and back returns the angle."""
     model = VehicleModel(params)
     assert model.steering_angle(model.curvature(0.3, 25.0), 25.0) == pytest.approx(0.3)

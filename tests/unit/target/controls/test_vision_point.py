@@ -44,7 +44,6 @@ def test_the_best_of_several() -> None:
 
 
 def test_it_is_taken_to_be_on_the_path() -> None:
-    """In a bend, the camera's lead is assumed to be on the path."""
     bend = (0.0, 0.001, 0.0, 0.0)
     off, on = track(y_rel=0.0), track(y_rel=2.5)
     assert seen().best_match([off, on], bend) is on

@@ -8,8 +8,6 @@ from selfdrive.common.camera_model import CameraModel
 
 
 class Moment(NamedTuple):
-    """The time, distance and speed that an effect knows about an image."""
-
     t: float
     position: float
     v_ego: float
@@ -17,14 +15,11 @@ class Moment(NamedTuple):
 
 @pytest.fixture(scope="session")
 def camera():
-    """The default camera."""
     return CameraModel()
 
 
 @pytest.fixture(scope="session")
 def moment():
-    """Return the n-th of 20 images a second at a speed (m/s)."""
-
     def make(number=0, speed=26.8):
         return Moment(1.5 + 0.05 * number, 40.0 + 0.05 * number * speed, speed)
 

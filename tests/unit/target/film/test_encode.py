@@ -39,7 +39,6 @@ def frames_of(path):
 
 
 def test_an_mp4_shows_the_pictures(tmp_path):
-    """The video has one frame for each image, with the image's size and brightness."""
     write_video(pictures(), tmp_path / "a.mp4")
     found = frames_of(tmp_path / "a.mp4")
     assert [picture.shape for picture in found] == [(180, 320, 3)] * 8
@@ -58,7 +57,6 @@ def test_a_gif_moves_at_the_same_speed(tmp_path):
 
 
 def test_other_formats_are_refused(tmp_path):
-    """For an unknown format, the error lists the supported names and no file is written."""
     with pytest.raises(ConfigError, match=r"\.mp4 or \.gif"):
         write_video(pictures(), tmp_path / "a.avi")
     with pytest.raises(ConfigError, match=r"\.png"):
@@ -67,7 +65,6 @@ def test_other_formats_are_refused(tmp_path):
 
 
 def test_a_place_that_cannot_be_written_is_told(tmp_path):
-    """The error names the file."""
     (tmp_path / "file").touch()
     with pytest.raises(ConfigError, match=r"a\.png"):
         write_still(next(pictures()), tmp_path / "file" / "a.png")

@@ -18,12 +18,10 @@ def outputs(folder):
 
 
 def test_a_run_is_the_same_with_a_film(drive):
-    """With ideal vision, trace and record have the same bytes with and without a film."""
     assert outputs(drive()) == outputs(drive(film=False))
 
 
 def test_a_run_with_pictures_is_the_same_with_a_film(drive, seeing):
-    """With frames, trace and record have the same bytes with and without a film."""
     assert outputs(drive(*seeing)) == outputs(drive(*seeing, film=False))
 
 
@@ -46,14 +44,12 @@ def test_what_was_seen_is_kept(drive):
 
 
 def test_pictures_are_kept_as_the_detector_had_them(drive, seeing):
-    """The stored frame is the detector's frame, apart from JPEG losses."""
     frame = read_reel(drive(*seeing) / "film").frames[0]
     own = cv2.imread(f"{seeing[2]}/0.png", cv2.IMREAD_GRAYSCALE)
     assert np.abs(frame.image().astype(int) - own).mean() < 1.0
 
 
 def test_a_free_road_has_no_lead(drive):
-    """If there is no lead, a frame has no distance."""
     assert read_reel(drive("--no-lead") / "film").frames[-1].d_rel is None
 
 
@@ -67,7 +63,6 @@ def test_a_camera_that_says_nothing_has_seen_nothing(drive, monkeypatch):
 
 
 def test_a_run_that_breaks_off_leaves_what_went_before(tmp_path, monkeypatch):
-    """A crash of the controller loses no earlier frame."""
     publish = Visiond.publish
 
     def crash(own, model):
@@ -101,7 +96,6 @@ def test_a_film_that_cannot_be_kept_any_longer(tmp_path, seeing, capsys):
 
 @pytest.mark.parametrize("text", ["", "{}\n", '{"schema": "film/1", "camera": {}}\n', "not JSON\n"])
 def test_what_is_no_film_is_told(tmp_path, text):
-    """An index with missing parts is refused, and the error names it."""
     (tmp_path / "film.jsonl").write_text(text)
     with pytest.raises(ConfigError, match=r"film\.jsonl: no film"):
         read_reel(tmp_path)

@@ -18,7 +18,6 @@ EVENTS = Events(title="a fault", outcome="hazard", active=None, marks=(), names=
 
 
 def is_drawn(picture, colour):
-    """Whether a pixel of the image has almost this colour."""
     return bool((np.abs(picture.astype(int) - colour).max(axis=-1) <= 40).any())
 
 
@@ -38,7 +37,6 @@ def test_lines_lie_on_the_paint(frame):
 
 
 def test_a_bend_moves_road_and_lines_alike(frame):
-    """In a left-hand bend, the seen line covers the painted one."""
     bend = tuple(0.001 * x * x for x in range(0, 50, 7))
     lines = {"left": SeenLine(y=tuple(1.85 + y for y in bend), prob=1.0)}
     pane = CameraPane(CameraModel(), *PANE)
@@ -84,14 +82,12 @@ def test_hazards_and_alerts_show_on_the_side_where_they_are(reel):
 
 
 def test_alerts_that_do_not_count_are_not_shown(reel):
-    """The reminder at the start does not count as a warning."""
     plain, reminded = reel({}), reel({"alerts": ("startup",), "text": "Hands on the wheel"})
     sheet = Sheet(plain, reminded, EVENTS).draw(0)
     assert (pane_of(sheet, "faulty")[-60:] == pane_of(sheet, "golden")[-60:]).all()
 
 
 def test_the_fault_is_said_to_be_active_while_it_is(reel):
-    """The faulty side shows the fault as active between its first and its last activation."""
     events = Events(title="", outcome="sdc", active=(0.05, 0.05), marks=(), names={})
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), events)
     corners = [pane_of(sheet.draw(i), "faulty")[9:11, -100:-10] for i in range(3)]
@@ -107,7 +103,6 @@ def test_a_run_that_broke_off_stands_still(reel):
 
 
 def test_a_moment_is_found(reel):
-    """The frame nearest to a time is found, even after the end of the film."""
     sheet = Sheet(reel({}, {}, {}), reel({}, {}, {}), EVENTS)
     assert [sheet.nearest(t) for t in (-1.0, 0.06, 99.0)] == [0, 1, 2]
 
@@ -142,7 +137,6 @@ def test_what_comes_after_the_end_of_the_drive_is_grey(reel):
 
 
 def test_pictures_of_another_shape_fit(reel, tmp_path, frame):
-    """A wide camera's frame fills the width of its pane and leaves space above."""
     cv2.imwrite(str(tmp_path / "a.jpg"), np.full((720, 1280), 128, np.uint8))
     model = CameraModel.from_view(width=1280, rows=720, horizon=300.0, focal=1000.0, height=1.4)
     wide = replace(reel({"picture": tmp_path / "a.jpg", "d_rel": None}), camera=model)

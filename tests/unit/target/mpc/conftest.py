@@ -9,13 +9,11 @@ from selfdrive.messages import LeadData
 
 @pytest.fixture(scope="session")
 def long_solver():
-    """One longitudinal solver, built once."""
     return LongitudinalMpc(1).solver
 
 
 @pytest.fixture
 def make_long(long_solver):
-    """Build a longitudinal MPC in its initial state."""
     return lambda: LongitudinalMpc(1, long_solver)
 
 
@@ -31,15 +29,12 @@ def _lateral_mpc():
 
 @pytest.fixture
 def lateral_mpc(_lateral_mpc):
-    """A lateral MPC, reset."""
     _lateral_mpc.reset()
     return _lateral_mpc
 
 
 @pytest.fixture
 def lead():
-    """Build a lead vehicle."""
-
     def make(d_rel, v_lead, a_lead=0.0):
         return LeadData(status=True, d_rel=d_rel, v_lead=v_lead, a_lead_k=a_lead)
 

@@ -35,7 +35,6 @@ pytestmark = pytest.mark.skipif(not compiler(), reason="there is no C compiler")
 
 @pytest.fixture
 def use(all_compiled: Path) -> Iterator[None]:
-    """Enable compiled code during a test."""
     compiled.use(all_compiled)
     yield
     compiled.use(None)
@@ -43,12 +42,10 @@ def use(all_compiled: Path) -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def references() -> dict[str, Solver]:
-    """CasADi's solvers, built once."""
     return {name: build() for name, build in REFERENCES.items()}
 
 
 def number(draw: random.Random, scale: float) -> float:
-    """None, or a number of about that size."""
     return draw.choice((0.0, draw.uniform(-scale, scale), draw.gauss(0.0, scale)))
 
 

@@ -25,7 +25,6 @@ def flattest(cost, controls, scale):
 
 
 def long_cost(jerks, v, a, x_lead, v_lead):
-    """The longitudinal cost of a plan behind a lead at constant speed."""
     steps = [0.2] * 5 + [0.6] * 15
     x, xs = 0.0, []
     for k in range(21):
@@ -67,7 +66,6 @@ FACTOR, SPEED = 0.24, 15.0
 
 
 def lateral_cost(rates, delta):
-    """The lateral cost of a plan along ROAD at SPEED."""
     z, nodes = np.array([0.1 * SPEED, 0.0, 0.0, delta]), []
     for k in range(21):
         nodes.append(z)
@@ -93,8 +91,6 @@ def lateral_cost(rates, delta):
 
 
 def rk4(z, rate):
-    """One Runge-Kutta step of 0.05 s."""
-
     def f(z):
         return np.array(
             [SPEED * math.cos(z[2]), SPEED * math.sin(z[2]), SPEED * z[3] * FACTOR, rate], dtype=float

@@ -13,7 +13,6 @@ CURVATURE_FACTOR = 0.24  # 1/m
 
 
 def drive(mpc, lanes, times=1, v=V, angle=0.0, offset=0.0):
-    """Update `times` times with the same input."""
     for _ in range(times):
         mpc.update(lanes, v, angle, offset, CURVATURE_FACTOR)
 
@@ -32,14 +31,12 @@ def results(mpc):
 
 
 def test_middle_of_a_straight_lane_needs_no_steering(lateral_mpc, lanes):
-    """In the middle of the lane the plan is straight ahead."""
     settle(lateral_mpc, lanes())
     assert lateral_mpc.angle_desired == pytest.approx(0.0, abs=1e-6)
 
 
 @pytest.mark.parametrize("side", [1, -1])
 def test_steers_towards_the_path(lateral_mpc, lanes, side):
-    """A path to the left (positive) is followed by steering left, and the mirrored case to the right."""
     settle(lateral_mpc, lanes(0.5))
     left = list(lateral_mpc.delta_plan)
     assert left[1] > 1e-4
@@ -58,7 +55,6 @@ def test_curve_ends_in_the_curves_wheel_angle(lateral_mpc):
 
 
 def test_without_lanes_the_models_path_counts(lateral_mpc, lanes):
-    """Lines that are not seen have no influence."""
     nowhere = lanes(0.5, left_prob=0.0, right_prob=0.0)
     nowhere.left_poly, nowhere.right_poly = (0.0, 0.0, 0.3, 9.0), (0.0, 0.0, -0.3, 9.0)
     settle(lateral_mpc, nowhere)
@@ -172,7 +168,6 @@ def test_reset_forgets_everything(lateral_mpc, lanes):
 
 
 def test_any_input_is_answered(lateral_mpc, lanes):
-    """Extreme but finite input never raises."""
     rng = random.Random(2)
     for _ in range(300):
         road = lanes(rng.gauss(0, 30), rng.gauss(0, 1), rng.random(), rng.random())

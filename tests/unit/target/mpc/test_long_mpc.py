@@ -18,7 +18,6 @@ HORIZON = 0.2  # s, of v_mpc and a_mpc
 
 
 def drive(mpc, v, a, lead, times):
-    """Update `times` times at the same state."""
     for _ in range(times):
         mpc.set_cur_state(v, a)
         mpc.update(v, a, lead)
@@ -84,14 +83,12 @@ def test_steady_gap(long_mpc, lead, v):
 
 @pytest.mark.parametrize(("gap", "sign"), [(30.0, -1), (60.0, 1)])
 def test_plan_closes_the_error_of_the_gap(long_mpc, lead, gap, sign):
-    """The plan brakes if the gap is too small and accelerates if it is too large."""
     drive(long_mpc, 20.0, 0.0, lead(gap, 20.0), 20)
     assert long_mpc.a_mpc * sign > 0.01
     assert (long_mpc.v_mpc_future - 20.0) * sign > 0.1
 
 
 def test_no_lead_never_limits(long_mpc):
-    """Without a lead the plan accelerates and never limits."""
     drive(long_mpc, 20.0, 0.0, None, 20)
     assert not long_mpc.prev_lead_status
     assert long_mpc.v_mpc_future > 20.0
@@ -176,7 +173,6 @@ def test_plan_through_the_lead_is_thrown_away(long_mpc, lead):
 
 
 def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
-    """A planned speed below -0.01 m/s discards the plan, but only if there is a lead."""
     drive(long_mpc, -0.02, 0.0, None, 1)
     assert long_mpc.resets == 0
     drive(long_mpc, -0.009, 0.0, lead(10.0, 0.0), 1)
@@ -189,7 +185,6 @@ def test_plan_backwards_is_thrown_away_only_with_a_lead(long_mpc, lead):
 @pytest.mark.parametrize("a", [-3.0, -0.5, 0.0])
 @pytest.mark.parametrize("d_rel", [0.0, 3.0, 6.0])
 def test_standstill_is_feasible(long_mpc, lead, v, a, d_rel):
-    """Braking at standstill has a solution that does not go backwards after its first node."""
     drive(long_mpc, v, a, lead(d_rel, 0.0), 10)
     assert long_mpc.unsolved == long_mpc.resets == 0
     assert min(long_mpc.v_plan[1:]) > -1e-5
@@ -220,7 +215,6 @@ def test_solution_that_is_no_number_is_thrown_away(long_mpc, lead):
 
 
 def test_any_input_is_answered(make_long, lead):
-    """Extreme but finite input never raises, and gives finite results."""
     rng = random.Random(1)
     mpc = make_long()
     for _ in range(500):
@@ -258,7 +252,6 @@ def test_thrown_away_is_forgotten(make_long, lead):
 
 
 def test_shared_solver_carries_no_state(long_solver, lead):
-    """Two instances that share a solver and are called alternately compute the same as each alone."""
     together = [LongitudinalMpc(i, long_solver) for i in (1, 2)]
     alone = [LongitudinalMpc(i) for i in (1, 2)]
     leads = (lead(30.0, 15.0), lead(60.0, 25.0, -1.0))

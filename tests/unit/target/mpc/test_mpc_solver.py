@@ -123,7 +123,6 @@ def test_equal_input_gives_equal_bytes(case):
 
 
 def test_infeasible_program_keeps_the_controls():
-    """Infeasible bounds leave the controls unchanged, and the failure is counted."""
     ocp, _, param, _ = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     beyond = (0.0, 0.0, 0.0, math.radians(60.0))
@@ -135,7 +134,6 @@ def test_infeasible_program_keeps_the_controls():
 
 
 def test_shift_moves_the_guess_by_one_interval():
-    """The next guess is the shifted solution, with the last control repeated in its last interval."""
     ocp, start, param, control = CASES["lateral"]
     iteration = Iteration(build_solver(ocp))
     iteration.restart(control=control)
@@ -148,7 +146,6 @@ def test_shift_moves_the_guess_by_one_interval():
 
 
 def test_guess_is_kept_where_nothing_shifts():
-    """Without a shift the next iteration starts from the solution itself."""
     ocp, start, param, _ = CASES["longitudinal"]
     iteration = Iteration(build_solver(ocp))
     iteration.restart()
