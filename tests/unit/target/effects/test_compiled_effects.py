@@ -55,12 +55,10 @@ pytestmark = pytest.mark.skipif(not compile_helpers.compiler(), reason="there is
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder with the effects' helpers."""
     return compile_effects(tmp_path_factory.mktemp("compiled"))
 
 
 def compile_effects(folder, *options):
-    """Compile the effects' drawing code into a folder."""
     for source in C_SOURCES:
         made = folder / compiled.file_name(source)
         words = [*compile_helpers.compiler(), *options, source, "-o", made, *compile_helpers.OPTIONS]
@@ -219,7 +217,6 @@ def test_a_camera_of_numpys_numbers_is_left_to_python(folder):
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.PaperRain, effects.PaperSnow, effects.Rain, effects.Snow])
 def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    """The record and trace of closed-loop runs have the same bytes with and without compiled code."""
     same_runs(folder, tmp_path, monkeypatch, kind, PAPER)
 
 
@@ -231,7 +228,6 @@ def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypa
 
 
 def same_runs(folder, tmp_path, monkeypatch, kind, detector):
-    """Run a scenario in medium weather twice, with and without compiled code."""
     look, scenario = PictureCamera.look, load_scenario(SCENARIO)
     amount = LEVELS[kind][4]
 

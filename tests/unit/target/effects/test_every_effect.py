@@ -47,7 +47,6 @@ def test_levels_name_every_exported_effect():
 
 @every
 def test_any_order_gives_the_same_pictures(effect, camera, moment, road):
-    """An image depends on its moment, not on earlier images."""
     one, other = strongest(effect, camera), fresh(effect, camera)
     forwards = [one.apply(road, moment(number)) for number in range(4)]
     backwards = [other.apply(road, moment(number)) for number in reversed(range(4))][::-1]
@@ -67,7 +66,6 @@ def test_input_stays_and_output_is_new(effect, camera, moment, road):
 
 @every
 def test_results_stay_as_later_pictures_are_made(effect, camera, moment, road):
-    """An effect never overwrites an earlier result."""
     made = strongest(effect, camera)
     first = made.apply(road, moment())
     kept = first.copy()
@@ -121,14 +119,12 @@ def test_seed_decides_what_is_random(effect, camera, moment, road):
 
 @pytest.mark.parametrize("effect", STILL)
 def test_still_effects_do_not_move(effect, camera, moment, road):
-    """An effect that is fixed to the lens or does not move is the same at any time and speed."""
     made = strongest(effect, camera)
     assert np.array_equal(made.apply(road, moment()), made.apply(road, moment(17, speed=5.0)))
 
 
 @pytest.mark.parametrize("effect", MOVING)
 def test_moving_effects_move(effect, camera, moment, road):
-    """The next image of a moving effect differs."""
     made = strongest(effect, camera)
     assert not np.array_equal(made.apply(road, moment()), made.apply(road, moment(1)))
 
@@ -146,14 +142,12 @@ def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, leve
 
 @every
 def test_bigger_frames_work(effect, moment):
-    """An effect works for the size of its camera."""
     picture = np.full((HD.rows, HD.width), 95, dtype=np.uint8)
     assert strongest(effect, HD).apply(picture, moment()).shape == picture.shape
 
 
 @pytest.mark.parametrize("effect", [effects.Rain, effects.Snow, effects.PaperRain, effects.Fog])
 def test_odd_sizes_work(effect, camera, moment):
-    """No size needs to be even."""
     odd = replace(camera, width=321, rows=243, cx=160.0, cy=130.0)
     picture = np.full((odd.rows, odd.width), 95, dtype=np.uint8)
     assert strongest(effect, odd).apply(picture, moment()).shape == picture.shape
@@ -184,7 +178,6 @@ def test_kernels_with_a_middle_are_odd(effect, camera):
 @every
 @pytest.mark.parametrize("seed", [-1, 1.5])
 def test_wrong_seeds_are_refused(effect, camera, seed):
-    """A seed must be an integer of at least 0."""
     with pytest.raises(ConfigError, match="seed"):
         effect(LEVELS[effect][0], seed, camera)
 
@@ -207,7 +200,6 @@ def test_pictures_of_another_camera_are_refused(camera, moment, picture):
 
 @every
 def test_severity_grows_with_the_level(effect, camera, moment, road):
-    """A higher level changes the image more."""
     amounts = LEVELS[effect]
     chosen = sorted({0, len(amounts) // 2, len(amounts) - 1})
     errors = []

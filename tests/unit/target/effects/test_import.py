@@ -14,7 +14,6 @@ print([name for name in sys.modules if "sim.effects" in name])
 
 
 def test_pristine_runs_do_not_import_effects():
-    """The simulator, cameras and detectors do not import the package."""
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT], cwd=TARGET, capture_output=True, text=True, check=True
     )

@@ -16,6 +16,5 @@ def test_mud_covers_its_share(coverage, camera, moment):
 
 
 def test_more_mud_holds_all_of_less(camera, moment):
-    """A higher level of the same seed contains the mud of the lower ones."""
     less, more = (LensMud(coverage, 0, camera).ready()._open.astype(int) for coverage in (0.1, 0.4))
     assert (more <= less).all()

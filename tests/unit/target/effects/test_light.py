@@ -55,7 +55,6 @@ def test_darkness_comes_where_gain_ends(camera, moment, road):
 
 
 def test_noise_is_new_in_every_picture(camera, moment):
-    """The noise of two moments is independent."""
     flat = np.full((camera.rows, camera.width), 128, np.uint8)
     low = LowLight(20.0, 0, camera)
     first, second = (low.apply(flat, moment(number)).astype(float).ravel() for number in (0, 1))

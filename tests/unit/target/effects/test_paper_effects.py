@@ -59,7 +59,6 @@ def test_drops_fall(effect, camera, moment):
 
 
 def test_more_rain_holds_all_of_less(camera, moment):
-    """With the same seed, a higher level only adds drops."""
     less, more = (PaperSnow(level, 0, camera)._blocks(np.random.default_rng(1), 0) for level in (2, 6))
     assert (more >= less).all() and more.sum() > 2 * less.sum()
 

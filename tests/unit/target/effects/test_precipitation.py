@@ -10,7 +10,6 @@ from selfdrive.sim.picture import whole
 
 
 def alone(camera, *, size=0.004, speed=0.0, reach=8.0, number=400):
-    """Return particles of one kind only."""
     boxes = [Box(reach, np.full(number, size), np.full(number, speed))]
     return Particles(np.random.default_rng(2), camera, boxes)
 
@@ -90,7 +89,6 @@ def test_streaks_are_the_way_in_the_exposure(camera, moment):
 
 
 def test_boxes_repeat_without_gaps(camera, moment):
-    """The number of particles in view is about the same at any time and place."""
     particles = alone(camera, speed=7.0, number=3000)
     counts = [particles.streaks(moment(number), 0.001).width.size for number in range(0, 600, 40)]
     assert min(counts) > 0.7 * max(counts)
@@ -119,7 +117,6 @@ def test_particles_show_the_sky(camera, moment):
 
 
 def test_standing_car_sees_longer_lived_drops(camera, moment, road):
-    """At rest, snow hardly moves between frames. At speed it moves."""
     snow = Snow(4.0, 0, camera)
 
     def change(speed):

@@ -15,7 +15,6 @@ REFERENCE = Path(__file__).parents[4] / "docs" / "reference"
 
 @pytest.fixture
 def gauge(camera):
-    """Return a gauge that measures the plain road."""
     return RoadGauge(camera, ((1.85, 0.0), (-1.85, 0.0)))
 
 

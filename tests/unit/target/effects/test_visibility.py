@@ -35,7 +35,6 @@ def test_so_many_flakes_look_as_large_as_a_block(camera):
 
 
 def test_worse_weather_is_seen_less_far(camera):
-    """At each higher level, rain and snow are heavier and the range is shorter."""
     for kind in (rain, snow):
         weather = [kind(level, camera) for level in range(1, 11)]
         assert all(a.rate < b.rate and a.range > b.range for a, b in pairwise(weather))

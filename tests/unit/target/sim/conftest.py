@@ -24,8 +24,6 @@ def fault_free():
 
 @pytest.fixture
 def truth():
-    """Build a ground truth: a car at rest in the middle of the lane, with the given changes."""
-
     def make(**values):
         return GroundTruth(**(dict.fromkeys(GroundTruth._fields, 0.0) | {"free_road": False} | values))
 

@@ -16,7 +16,6 @@ MEASURED = {
 
 @pytest.mark.parametrize("name", MEASURED)
 def test_longitudinal_control_is_the_original(fault_free, name):
-    """Headway, distance, pedals and speeds agree with the original."""
     close_at, headway, distance, brake, gas, speeds = MEASURED[name]
     trace = fault_free(name).trace
     assert trace["t"][np.argmax(trace["hwt"] <= 2.0)] == pytest.approx(close_at, abs=0.011)

@@ -46,8 +46,6 @@ def test_fault_free(fault_free, name, rows):
 
 
 def no_frames_from(t, bus):
-    """Drop all frames of a bus, or of both buses for None."""
-
     def change(simulator):
         inner = simulator.manager.step
         simulator.manager.step = lambda now, frames, view: inner(
@@ -166,7 +164,6 @@ def test_a_bend_of_500_m(s1):
 
 
 def test_a_grade_is_climbed(s1):
-    """On a slope that takes 1 m/s^2, the car gives more gas and keeps its speed."""
     slope = replace(s1, lead=None, grade=((0.0, 10.0, 11.0), (0.0, 0.0, 1.0)))
     trace = drive(slope).trace
     assert trace["gas"][2500:].mean() > trace["gas"][700:900].mean() + 0.1

@@ -32,7 +32,6 @@ def _none_afterwards():
 
 @pytest.fixture
 def helpers(all_compiled, tmp_path):
-    """A copy of the folder with all helpers, for one test."""
     return shutil.copytree(all_compiled, tmp_path / "own")
 
 
@@ -64,7 +63,6 @@ def test_a_library_is_found_only_for_what_it_stands_for(helpers, monkeypatch, tm
 @needs_compiler
 @pytest.mark.parametrize("keep", [0, 10, 5000, -1])
 def test_a_library_that_is_damaged_is_none(helpers, keep):
-    """If a library is damaged, the Python code computes instead."""
     (helpers / NAME).write_bytes((helpers / NAME).read_bytes()[:keep])
     compiled.use(helpers)
     assert compiled.library(C_SOURCE) is None
@@ -83,7 +81,6 @@ def test_a_changed_constant_of_a_library_is_noticed(helpers):
 
 @pytest.mark.parametrize("folder", ["none", "x" * 300, "empty"])
 def test_a_folder_without_libraries_is_no_error(tmp_path, folder):
-    """A missing, unreadable or incomplete folder is not an error."""
     (tmp_path / "empty").mkdir()
     compiled.use(tmp_path / folder)
     assert compiled.library(C_SOURCE) is None

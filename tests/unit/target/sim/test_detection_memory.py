@@ -15,7 +15,6 @@ NUMBERS = (1.5, -0.0, float("inf"), 5e-324)
 
 
 def key(number: int, bucket: int = 7) -> bytes:
-    """Return one of many keys of the same bucket."""
     return bucket.to_bytes(8, "little") + number.to_bytes(8, "big")
 
 
@@ -71,7 +70,6 @@ def test_a_short_or_strange_file_is_taken_over(tmp_path):
 
 
 def test_without_a_file_nothing_is_remembered(tmp_path):
-    """If the table cannot be created, lookups find nothing."""
     (tmp_path / FILE).mkdir()
     memory = DetectionMemory(tmp_path)
     memory.keep(key(1), NUMBERS)
@@ -112,7 +110,6 @@ def test_processes_share_it_at_once(tmp_path):
 
 
 def test_a_forked_child_shares_it(tmp_path):
-    """The parent recalls what a child stores in a table that the parent opened."""
     code = (
         "import os, sys; from pathlib import Path\n"
         "from selfdrive.sim.detection_memory import DetectionMemory\n"

@@ -12,7 +12,6 @@ def first(truth, *rows):
 
 
 def test_none_in_ordinary_driving(truth):
-    """Following a lead in the middle of the lane is no hazard."""
     assert first(truth, {}, {}) == {"H1": None, "H2": None, "H3": None}
 
 
@@ -41,7 +40,6 @@ def test_h2(truth, v_ego, d_rel, free_road, hit):
 
 
 def test_h2_needs_a_car_that_has_moved(truth):
-    """H2 does not count before the car has moved for the first time."""
     rest = {"v_ego": 0.0, "d_rel": 150.0}
     assert first(truth, rest, rest)["H2"] is None
     assert first(truth, rest, {"v_ego": 0.3}, rest)["H2"] == 2.0
@@ -54,6 +52,5 @@ def test_h3(truth, offset, hit):
 
 
 def test_only_the_first_time_counts(truth):
-    """If a hazard ends and comes back, its first time remains."""
     out = {"lateral_offset": 2.0}
     assert first(truth, {}, out, {}, out)["H3"] == 1.0

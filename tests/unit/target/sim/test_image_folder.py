@@ -69,7 +69,6 @@ def test_a_folder_becomes_a_library(folder, tmp_path):
 
 
 def test_the_digest_follows_every_byte(folder, tmp_path):
-    """If a pixel of a frame or a number of the calibration changes, the library's digest changes."""
     digests = {ImageFolder(folder).digest}
     cv2.imwrite(str(folder / "7.png"), np.full((48, 64), 71, np.uint8))
     digests.add(ImageFolder(folder).digest)
@@ -87,7 +86,6 @@ def test_a_full_calibration_gives_that_camera(folder):
 
 
 def test_frames_are_made_smaller_with_their_camera(folder):
-    """In a resized frame, each road point is where the resized camera has it."""
     full = ImageFolder(folder).model
     (folder / "camera.yaml").write_text(VIEW + "resize_width: 32\n")
     half = ImageFolder(folder)
@@ -97,7 +95,6 @@ def test_frames_are_made_smaller_with_their_camera(folder):
 
 
 def error(folder):
-    """Return the error for an unusable folder."""
     with pytest.raises(ConfigError) as caught:
         list(ImageFolder(folder).read())
     return str(caught.value)
@@ -111,7 +108,6 @@ def test_a_frame_of_another_size_is_named(folder):
 
 @pytest.mark.parametrize("content", [b"", b"no picture", b"\x89PNG\r\n\x1a\n truncated"])
 def test_an_unreadable_frame_is_named(folder, content):
-    """For a file that is not an image, the error names the file and says what to do."""
     (folder / "7.png").write_bytes(content)
     assert error(folder).startswith(f"{folder}/7.png: not readable as a picture, expected ")
 
@@ -151,7 +147,6 @@ def test_colour_depth_and_transparency_do_not_matter(folder):
 
 
 def test_a_missing_frame_is_named(folder):
-    """A gap in the numbers counts as a missing frame."""
     (folder / "7.png").unlink()
     assert error(folder).startswith(f"{folder}/7.png: missing, expected ")
 
@@ -207,7 +202,6 @@ def test_a_wrong_calibration_is_explained(folder, old, new, message):
 
 
 def test_a_camera_that_sees_no_road_is_refused(folder):
-    """A calibration with its horizon below the frame is refused."""
     (folder / "camera.yaml").write_text(CALTECH.replace("cy_px: 256.5", "cy_px: 600"))
     assert "pitch_deg: '14', expected road in the picture" in error(folder)
 

@@ -21,17 +21,14 @@ DIGEST = "ab" * 32
 
 
 def noise(seed=1):
-    """Return frames of that shape with noise."""
     return iter(np.random.default_rng(seed).integers(0, 256, SHAPE, dtype=np.uint8))
 
 
 def refuse():
-    """Fail if frames are built again."""
     raise AssertionError("made again")
 
 
 def library(**given):
-    """A library of five frames, each filled with its number."""
     frames = np.zeros(SHAPE, np.uint8) + np.arange(5, dtype=np.uint8)[:, None, None]
     fields = {
         "name": "n",
@@ -105,7 +102,6 @@ def test_frames_are_made_once(tmp_path):
     ],
 )
 def test_a_damaged_file_is_noticed_and_made_anew(tmp_path, harm):
-    """A changed cache file is replaced by a valid one."""
     cached(tmp_path, DIGEST, SHAPE, noise)
     (path,) = tmp_path.iterdir()
     path.write_bytes(harm(path.read_bytes()))
@@ -139,8 +135,6 @@ def test_a_disk_that_gives_back_something_else_is_not_used(tmp_path, monkeypatch
 
 
 def test_a_failure_while_frames_are_made_leaves_nothing(tmp_path):
-    """If building fails, an incomplete set of frames never appears in the cache."""
-
     def break_off():
         yield from list(noise())[:2]
         raise ConfigError("unreadable", where="0002.png", expected="a picture", remedy="replace it")

@@ -18,21 +18,18 @@ def run(car, seconds, torque, speed, curvature=0.0):
 
 
 def hold(car, seconds, angle, speed, curvature=0.0):
-    """Simulate with the wheel held at an angle."""
     for _ in range(round(seconds * 100)):
         car.steer_angle, car.steer_rate = angle, 0.0
         car._move(speed)
 
 
 def test_nothing_moves_without_torque(car):
-    """A straight car on a straight road stays exactly where it is."""
     run(car, 30.0, 0.0, 26.8)
     assert (car.offset, car.heading, car.steer_angle, car.yaw_rate) == (0.0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_left_is_positive_all_the_way(car, sign):
-    """Torque to one side turns the wheel, the car and the path to that side."""
     run(car, 1.0, 0.2 * sign, 20.0)
     assert car.steer_angle * sign > 0 and car.yaw_rate * sign > 0
     assert car.heading * sign > 0 and car.offset * sign > 0

@@ -35,7 +35,6 @@ def drive(scenarios):
 
 
 def settling(trace, start, band):
-    """Return the seconds from `start` until the car stays within `band` m of the middle."""
     outside = np.flatnonzero(np.abs(trace["lateral_offset"]) > band)
     return trace["t"][outside[-1]] - start
 

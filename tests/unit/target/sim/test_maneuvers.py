@@ -20,7 +20,6 @@ lead: {{gap_m: 20, speed_mps: 0}}
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder with two short scenarios and a reference for the first."""
     for name in ("A", "B"):
         (tmp_path / f"{name}.yaml").write_text(BRIEF.format(name=name))
     arguments = ["--references", str(tmp_path / "kept"), "--scenarios", str(tmp_path), "--update-references"]
@@ -52,7 +51,6 @@ def test_page(folder):
 
 
 def test_page_is_the_same_again(folder):
-    """The same scenarios give the same bytes."""
     assert show(folder, "A") == show(folder, "A")
 
 

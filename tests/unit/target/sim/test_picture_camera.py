@@ -20,7 +20,6 @@ CAMERAS = pytest.mark.parametrize("model", [CALTECH, UDACITY])
 
 
 def camera(model, translation=GROUND, frames=12):
-    """A camera with a few frames of a rendered road, and the renderer."""
     renderer = RoadRenderer(model, "dashed", 3, periods=2)
     pictures = np.stack([renderer.grey(k * SPACING) for k in range(frames)])
     pictures.flags.writeable = False
@@ -81,7 +80,6 @@ def test_poses_that_round_to_the_same_give_the_same_bytes(truth):
 
 
 def test_the_rounding_is_finer_than_a_pixel(truth):
-    """Half a step of the pose moves a line by less than half a pixel, even right in front of the car."""
     row = CALTECH.rows - 1
     assert 0.5 * OFFSET_STEP / CALTECH.metres_per_pixel(row) < 0.5
     assert 0.5 * HEADING_STEP * CALTECH.fx < 0.5
@@ -147,7 +145,6 @@ def test_pictures_show_no_curves():
 @pytest.mark.parametrize("translation", [GROUND, SHIFT, CODED])
 @CAMERAS
 def test_a_part_is_that_of_the_whole_view(model, translation, truth):
-    """Any slice of a moved frame has the same bytes as in the whole frame."""
     looking, _ = camera(model, translation, frames=1)
     random = np.random.default_rng(4)
     for _ in range(60):

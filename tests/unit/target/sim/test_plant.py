@@ -58,7 +58,6 @@ def test_creep():
 
 
 def test_the_car_never_drives_backwards(plant):
-    """A car that brakes to a stop stays there, with zero speed and acceleration and no further distance."""
     car = plant(1.0)
     for _ in range(200):
         car.step(Actuators(brake=1.0), 0.0, 0.0)

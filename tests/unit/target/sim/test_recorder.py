@@ -11,7 +11,6 @@ TRUTH = ("t", "v_ego", "a_ego", "d_rel", "v_lead", "hwt", "steer_angle", "latera
 
 
 def driven(rows: int) -> tuple[Recorder, np.ndarray]:
-    """Return a recorder with that many rows, and the time and heading of each row."""
     state = SimpleNamespace(
         **{"alerts": (), "enabled": True, "long_state": "pid", "angle_desired": 0.5},
         **dict.fromkeys(("v_ego", "a_ego", "v_cruise", "v_pid"), 1.5),
@@ -27,7 +26,6 @@ def driven(rows: int) -> tuple[Recorder, np.ndarray]:
 
 @pytest.mark.parametrize("rows", [0, 1, 63, 64, 65, 129, 4096, 4097, 8300])
 def test_every_row_is_in_the_trace(rows):
-    """The trace has every row in its place, for any number of rows."""
     recorder, values = driven(rows)
     trace = recorder.trace()
     assert tuple(trace) == CHANNELS
@@ -38,7 +36,6 @@ def test_every_row_is_in_the_trace(rows):
 
 
 def test_later_rows_do_not_change_a_trace():
-    """Adding rows does not change an earlier trace."""
     recorder, values = driven(100)
     trace = recorder.trace()
     others, _ = driven(100)

@@ -54,7 +54,6 @@ def test_only_every_fifth_step_moves_the_car():
 
 
 def test_nothing_turns_the_wheel_back():
-    """Without torque the wheel stays turned and the car keeps its line."""
     lateral = CrudeLateral()
     for torque in [1.0] * 100 + [0.0] * 500:
         lateral.step(torque, 30.0, 0.0)
@@ -168,7 +167,6 @@ def test_the_command_line_chooses_it(scenarios, tmp_path, capsys):
 
 
 def test_both_plants_in_one_simulator(s1):
-    """A run on one plant does not affect the next run on the other. Each record names its plant."""
     simulator, results = Simulator(), []
     for scenario in (s1, replace(s1, plant="standard"), s1):
         simulator.reset(replace(scenario, steps=200), 0)

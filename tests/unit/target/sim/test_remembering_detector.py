@@ -31,7 +31,6 @@ MODEL = CameraModel()
 
 @pytest.fixture(scope="module")
 def frames():
-    """Three frames of a rendered road."""
     renderer = RoadRenderer(MODEL, "dashed", 3, periods=1)
     return np.stack([renderer.grey(k * SPACING) for k in range(3)])
 
@@ -51,14 +50,11 @@ def look(frames, truth):
 
 
 def view(picture):
-    """Return a view with only this image."""
     nan = float("nan")
     return CameraView(nan, nan, nan, (), nan, picture)
 
 
 class Counting:
-    """A detector that counts its calls."""
-
     def __init__(self):
         self.asked, self.state = 0, ()
         self._detector = PaperDetector(MODEL)

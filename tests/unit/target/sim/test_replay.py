@@ -70,7 +70,6 @@ def replay(reference, runs, *arguments):
 
 
 def test_written_and_read_back(trace, reference):
-    """A reference has every fifth row of the trace, to six digits."""
     assert list(reference.steps) == list(range(0, STEPS, 5))
     for column in COLUMNS:
         if column.channel != "fcw":
@@ -92,7 +91,6 @@ def test_rms_and_largest_difference(trace, reference):
 
 @pytest.mark.parametrize("late", [0, 3, 50, -20])
 def test_lag(trace, late):
-    """A wave that follows its reference by some steps has that lag. If it leads, the lag is negative."""
     steps = np.arange(0, STEPS, 5)
     wave = 3.0 * np.sin((np.arange(STEPS) - late) / 100)
     assert time_lag(steps, 3.0 * np.sin(steps / 100), wave) == pytest.approx(late / 100, abs=0.011)
@@ -140,13 +138,11 @@ def test_lead_compared_while_both_see_one(trace, reference):
 
 
 def test_no_number_is_beyond_any_limit(trace, reference):
-    """A channel that becomes NaN has an infinite difference."""
     trace["v_ego"] = np.where(np.arange(STEPS) == 500, np.nan, trace["v_ego"])
     assert channel(compare(reference, trace, NO_LIMITS), "v_ego").rms == np.inf
 
 
 def test_free_road_has_no_lead_to_compare(trace, reference):
-    """On a free road, the speed of the missing lead is not compared."""
     with_lead = {result.column.channel for result in compare(reference, trace, NO_LIMITS).channels}
     without = {
         result.column.channel for result in compare(reference, trace, NO_LIMITS, free_road=True).channels
@@ -216,7 +212,6 @@ def test_beyond_tolerance(reference, finished, trace, capsys):
     ("limits", "code"), [("{max: 0.9}", 1), ("{max: 1.1}", 0), ("{lag_s: 0.2}", 0), ("{lag_s: 0.1}", 1)]
 )
 def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code):
-    """The largest difference and the lag have separate limits."""
     late = np.interp(trace["t"] - 0.15, trace["t"], trace["v_ego"])
     changed = late if "lag" in limits else trace["v_ego"] + (np.arange(STEPS) == 500)
     table = tmp_path / "table.yaml"
@@ -225,7 +220,6 @@ def test_limits_of_a_channel(reference, finished, trace, tmp_path, limits, code)
 
 
 def test_beyond_in_a_key_figure(reference, finished, trace, capsys):
-    """A different set speed alone fails the comparison."""
     assert replay(reference, finished(v_cruise=np.full(STEPS, 96 * KPH_TO_MS))) == 1
     assert "difference 1.000, limit 0  <-- beyond" in capsys.readouterr().out
 

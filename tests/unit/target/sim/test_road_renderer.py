@@ -28,7 +28,6 @@ BARE = Look(
 
 
 def finer(model, times):
-    """Return the same camera with that many times the pixels in each direction."""
     return replace(
         model,
         width=model.width * times,
@@ -114,13 +113,11 @@ def test_dashes_have_us_dimensions():
 
 
 def test_the_road_closes_on_itself():
-    """After the length of the strip, the same frame repeats."""
     renderer = RoadRenderer(CALTECH, "dashed", 3, periods=2)
     assert np.array_equal(renderer.grey(4.0, 0.2, 0.01), renderer.grey(4.0 + 2 * DASH_PERIOD, 0.2, 0.01))
 
 
 def test_equal_seeds_give_equal_bytes_in_any_order(standard):
-    """A frame depends only on model, look, seed and pose, not on earlier frames."""
     again = RoadRenderer(CALTECH, standard_look("dashed"), 3, periods=2)
     poses = [(0.0, 0.0, 0.0), (7.7, 0.3, -0.01), (19.0, -0.5, 0.02)]
     forth = [standard.grey(*pose) for pose in poses]
@@ -129,7 +126,6 @@ def test_equal_seeds_give_equal_bytes_in_any_order(standard):
 
 
 def test_another_seed_gives_another_road(standard):
-    """The texture depends on the seed."""
     assert not np.array_equal(standard.grey(0.0), RoadRenderer(CALTECH, "dashed", 4, periods=2).grey(0.0))
 
 
@@ -147,13 +143,11 @@ def test_the_standard_road_has_the_tones_of_a_road():
 
 
 def test_unknown_marks_are_refused():
-    """Marks other than solid and dashed are refused."""
     with pytest.raises(ValueError, match="dotted"):
         RoadRenderer(CALTECH, "dotted", 0)
 
 
 def test_every_part_of_a_look_shows():
-    """Each property of a road's look changes the image."""
     base = replace(BARE, far_left=FRESH, far_right=FRESH)
     plain = RoadRenderer(UDACITY, base, 1, periods=1).grey(0.0)
     changes = {

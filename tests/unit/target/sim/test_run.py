@@ -12,8 +12,6 @@ from selfdrive.sim.run import main
 
 @pytest.fixture
 def run(scenarios, tmp_path):
-    """Run S1 for some steps and return the folder."""
-
     def go(name, *arguments, scenario="S1", steps=150):
         folder = tmp_path / name
         path = str(scenarios / f"{scenario}.yaml")
@@ -45,7 +43,6 @@ def test_what_is_written(run, scenarios):
 
 
 def test_same_bytes_whatever_ran_before(run):
-    """Two equal runs in one process, with another scenario in between, give the same bytes."""
     first = contents(run("a"))
     run("other", "--no-lead", scenario="S2")
     assert contents(run("b")) == first
@@ -98,7 +95,6 @@ def test_a_wrong_scenario_is_answered(tmp_path, capsys):
 
 
 def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
-    """If the output path is a file, the error names it."""
     (tmp_path / "file").write_text("")
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--max-steps", "1"]
     assert main([*arguments, "--out", str(tmp_path / "file" / "out")]) == 2
@@ -106,7 +102,6 @@ def test_a_folder_that_cannot_be_written(scenarios, tmp_path, capsys):
 
 
 def test_frames_without_pictures(scenarios, tmp_path, capsys):
-    """A folder of frames without the option for frames is an error."""
     arguments = ["--scenario", str(scenarios / "S1.yaml"), "--out", str(tmp_path / "o"), "--max-steps", "1"]
     assert main([*arguments, "--frames", "mine"]) == 2
     assert "--frames mine, expected --pictures" in capsys.readouterr().err

@@ -52,7 +52,6 @@ def test_everything_arrives_in_si_units():
 
 
 def test_buttons_are_down_from_press_to_release():
-    """The button is down from the step of the press until just before the step of the release."""
     scenario = parse(GOOD)
     assert [scenario.button(k) for k in (119, 120, 129, 130, 505)] == [0, 3, 3, 0, 2]
 
@@ -129,7 +128,6 @@ def test_a_number_is_what_it_looks_like():
 
 
 def test_files_that_cannot_be_read(tmp_path):
-    """For a missing file, a file that is not text, and endless nesting, the error names the file."""
     (tmp_path / "deep.yaml").write_text("a: " + 5000 * "[")
     with pytest.raises(ConfigError, match=r"deep\.yaml: bottomless nesting, expected valid YAML"):
         load_scenario(tmp_path / "deep.yaml")

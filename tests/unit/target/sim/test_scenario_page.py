@@ -17,7 +17,6 @@ SCENARIOS = sorted((CLONE / "fault_library" / "scenarios").glob("*.yaml"))
 
 
 def accepted(data: dict[str, Any]) -> tuple[bool, bool]:
-    """Whether the schema and the parser accept a scenario."""
     try:
         parse_scenario(yaml.safe_dump(data), "test", "")
     except ConfigError:
@@ -36,7 +35,6 @@ def test_page_and_schema_are_up_to_date() -> None:
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
 def test_the_library_follows_the_schema(path: Path) -> None:
-    """The parser and the schema accept every scenario of the library."""
     assert accepted(yaml.safe_load(path.read_text())) == (True, True)
 
 
@@ -50,7 +48,6 @@ def _sections(data: dict[str, Any]) -> dict[str, dict[str, Any]]:
 
 
 def full() -> dict[str, Any]:
-    """A scenario that has every section."""
     return {
         "schema": "scenario/1",
         "name": "full",
@@ -65,7 +62,6 @@ def full() -> dict[str, Any]:
 
 
 def test_a_full_one_is_taken() -> None:
-    """The scenario that the next test breaks is valid."""
     assert accepted(full()) == (True, True)
 
 

@@ -150,7 +150,6 @@ def test_a_fault_in_what_sees_acts_whatever_was_seen_before(drive: Drive) -> Non
 @pytest.mark.slow
 @pytest.mark.skipif(not any(compile_helpers.FOLDER.glob("mark_windows-*")), reason="nothing is compiled")
 def test_a_fault_in_code_that_was_compiled_acts(drive: Drive) -> None:
-    """Compiled helpers do not replace mutated code."""
     place = ("selfdrive/visiond/hog.py", "Hog._votes", "votes")
     acted = drive(place, 0.3)
     assert '"count": 14' in acted[1] and acted == drive(place, 0.3, independent=True)

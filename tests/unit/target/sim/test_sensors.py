@@ -41,7 +41,6 @@ def test_speed_reads_zero_below_its_threshold(truth, speed, shown):
 
 
 def test_every_message_has_its_period_and_counter(truth):
-    """Each message has its own period, and its counter advances by one each time."""
     sensors, seen = CarSensors(), {}
     for frame in range(100):
         for name, values in read(CAR, sensors.measure(truth(v_ego=0.1 * frame), 0, frame)).items():

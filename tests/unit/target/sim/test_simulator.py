@@ -74,7 +74,6 @@ def test_what_the_controller_is_given(s1):
 
 
 def test_buttons_reach_the_bus(s1):
-    """The set button is down from step 120 until step 130."""
     script = Script()
     drive(s1, script, 140)
     down = [
@@ -96,7 +95,6 @@ def test_truth_of_a_coasting_run(s1):
 
 
 def test_hwt_at_standstill_is_infinite(s1):
-    """A standing car has infinite headway time."""
     trace = drive(replace(s1, speed=0.0), Script(lambda step: (0, 255, 0)), 5).result().trace
     assert trace["v_ego"][-1] == 0.0
     assert np.isinf(trace["hwt"][-1])
@@ -159,7 +157,6 @@ def test_trace_channels(s1):
 
 
 def test_a_result_may_be_taken_on_the_way(s1):
-    """Reading the result during a run does not disturb the run."""
     simulator = drive(s1, Script(), 10)
     early = simulator.result()
     simulator.step()

@@ -60,5 +60,4 @@ def test_it_is_the_stock_maneuver(scenarios, name):
 
 
 def test_all_twenty_are_there(scenarios):
-    """The scenarios are exactly O01 to O20."""
     assert sorted(path.stem for path in scenarios.glob("O*.yaml")) == sorted(MANEUVERS)

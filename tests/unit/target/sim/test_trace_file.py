@@ -24,7 +24,6 @@ def test_the_bytes_are_those_of_savez(rows):
 
 
 def test_a_trace_without_channels_is_an_empty_archive():
-    """A trace without channels gives the same file as NumPy's."""
     expected = io.BytesIO()
     np.savez(expected)
     assert b"".join(pieces({})) == expected.getvalue()

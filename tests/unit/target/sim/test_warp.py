@@ -22,7 +22,6 @@ SHAPE = 308, 640
 
 @pytest.fixture(scope="module")
 def library(all_compiled):
-    """The compiled warp."""
     compiled.use(all_compiled)
     yield compiled.library(compiled_warp.C_SOURCE)
     compiled.use(None)
@@ -42,7 +41,6 @@ def moves(random):
 
 
 def sources(random):
-    """Noise, one-pixel stripes, black and white."""
     stripes = np.tile(np.array([0, 255], np.uint8), SHAPE[0] * SHAPE[1] // 2).reshape(SHAPE)
     return random.integers(0, 256, SHAPE, np.uint8), stripes, np.full(SHAPE, 255, np.uint8)
 
@@ -130,7 +128,6 @@ def test_another_opencv_is_left_alone(library, monkeypatch):
 
 @needs_compiler
 def test_without_a_library_opencv_warps(library):
-    """Without a library, OpenCV warps and the run names no library."""
     assert isinstance(library.code, ctypes.CDLL)
     folder, compiled._folder = compiled._folder, None
     assert build_warp() == (warp, "")

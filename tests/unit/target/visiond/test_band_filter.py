@@ -34,7 +34,6 @@ def test_a_mark_s_middle_is_found_in_every_row(width, brighter):
 
 
 def test_a_double_line_is_found_as_one():
-    """Two lines with a gap of their own width are found as one line, between their outer edges."""
     picture = road((100, 3, 80.0), (106, 3, 80.0))
     assert support(picture, 100, 109) > 0.5
 
@@ -51,7 +50,6 @@ def test_what_is_not_a_bright_narrow_band_is_not_found(bands):
 
 @pytest.mark.parametrize("light", [0.3, 0.6, 1.5])
 def test_light_does_not_matter(light):
-    """At half or one and a half times the brightness, the detections stay in place."""
     bright = road((60, 3, 50.0), (180, 4, 70.0))
     picture = (bright * light).clip(0, 255).astype(np.uint8)
     assert support(picture, 58, 65) > 0.9 * support(bright, 58, 65)

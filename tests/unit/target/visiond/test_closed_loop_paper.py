@@ -18,7 +18,6 @@ def cache(tmp_path_factory) -> Path:
 
 
 def drive(name: str, marks: str, cache: Path):
-    """Run the scenario on a road with these marks and return the result."""
     simulator = Simulator()
     pictures = Pictures(detector="paper", marks=marks, cache=cache)
     simulator.reset(load_scenario(SCENARIOS / f"{name}.yaml"), 0, pictures)

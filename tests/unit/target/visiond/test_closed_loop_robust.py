@@ -15,7 +15,6 @@ SCENARIOS = Path(__file__).resolve().parents[4] / "fault_library" / "scenarios"
 @pytest.mark.parametrize("marks", ["solid", "dashed"])
 @pytest.mark.parametrize("seed", [0, 2**40])
 def test_the_lane_is_kept(marks, seed, tmp_path):
-    """In S1 to S5 the car raises no hazard or steering limit alert and stays within 0.3 m of the middle."""
     for name in ("S1", "S2", "S3", "S4", "S5"):
         pictures = Pictures(detector=ROBUST, marks=marks, cache=tmp_path)
         result = simulate(load_scenario(SCENARIOS / f"{name}.yaml"), seed, pictures)

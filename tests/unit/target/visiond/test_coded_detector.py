@@ -81,7 +81,6 @@ def test_a_cluster_needs_30_points(points: int, column: int) -> None:
 
 
 def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
-    """A frame without edges leaves the lines where they were."""
     detector = CodedDetector(CALTECH)
     before = seen(detector, road.grey(4.0, 0.3))
     assert seen(detector, np.full((480, 640), 97, np.uint8)) == before
@@ -90,7 +89,6 @@ def test_without_an_edge_lines_stay_where_they_were(road: RoadRenderer) -> None:
 
 
 def test_state_is_all_it_remembers(road: RoadRenderer) -> None:
-    """A detector that takes over another detector's state returns the same lines."""
     one, other = CodedDetector(CALTECH), CodedDetector(CALTECH)
     seen(one, road.grey(4.0, 0.3))
     other.state = one.state

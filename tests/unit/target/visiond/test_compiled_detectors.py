@@ -85,7 +85,6 @@ def pictures():
 
 
 def view(picture) -> CameraView:
-    """A view with only a valid image."""
     return CameraView(
         left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture
     )

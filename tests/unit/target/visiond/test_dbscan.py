@@ -10,12 +10,10 @@ from sklearn.cluster import DBSCAN
 
 
 def labels(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """Return our labels of the mask's pixels."""
     return dbscan(np.flatnonzero(mask), mask.shape, eps, min_samples).tolist()
 
 
 def expected(mask: np.ndarray, eps: int, min_samples: int) -> list[int]:
-    """Return scikit-learn's labels of the mask's pixels."""
     points = np.argwhere(mask)
     if not len(points):
         return []

@@ -33,7 +33,6 @@ def seen(*strips: tuple[float, float, int], slope: float = 0.0):
 
 @pytest.mark.parametrize("slope", [-0.05, 0.0, 0.05])
 def test_bright_strips_are_lines(slope):
-    """Each of two painted strips is found at its middle."""
     left, right = seen((1.9, 1.78, 200), (-1.6, -1.72, 200), slope=slope)
     assert (left.y, left.slope) == pytest.approx((1.84, slope), abs=0.02)
     assert (right.y, right.slope) == pytest.approx((-1.66, slope), abs=0.02)
@@ -53,7 +52,6 @@ def test_a_step_and_a_dark_strip_are_none(strip):
 
 
 def test_paint_behind_such_a_step_is_found():
-    """The line beyond a shadow's edge is found."""
     left, _ = seen((9.0, 0.9, 60), (1.9, 1.78, 160))
     assert left.y == pytest.approx(1.84, abs=0.03)
 

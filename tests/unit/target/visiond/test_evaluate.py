@@ -12,7 +12,6 @@ from selfdrive.visiond.evaluate import SOURCES, TUSIMPLE, UDACITY, canonical, ma
 
 @cache
 def _road(model):
-    """A road, painted once."""
     return RoadRenderer(model, "solid", 1, periods=2)
 
 
@@ -80,7 +79,6 @@ def test_a_line_that_was_not_seen_is_a_miss(frames, capsys):
 
 
 def test_lines_win_over_centres(frames, capsys):
-    """If an entry has lines and centres, the lines count."""
     lines = _lines(frames)
     lines["p1_one"]["gt"] = {"L": 1.0, "R": 2.0}
     _write(frames, lines)
@@ -158,14 +156,12 @@ def test_a_wrong_truth_is_named(frames, capsys, lines, words):
 
 
 def test_an_unreadable_frame_is_named(frames, capsys):
-    """A file that is no image is an error that names it."""
     (frames / "frames" / "one.png").write_bytes(b"no picture")
     assert _run(frames) == 2
     assert "one.png" in capsys.readouterr().err
 
 
 def test_a_missing_truth_file_is_named(frames, capsys):
-    """A missing truth file is an error that names it."""
     (frames / "truth.json").unlink()
     assert _run(frames) == 2
     assert "truth.json" in capsys.readouterr().err

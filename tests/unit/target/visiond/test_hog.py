@@ -45,7 +45,6 @@ def test_a_window_has_the_features_of_its_own_part_of_the_picture():
 
 
 def test_turning_the_light_up_changes_no_feature():
-    """Doubled contrast and another brightness leave every block unchanged."""
     picture = np.random.default_rng(3).integers(0, 100, (64, 96)).astype(np.uint8)
     brighter = 2 * picture + 37
     tables = Hog(64, 96)

@@ -23,7 +23,6 @@ POSES = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.2, -0.03), (-0.3, 0.04))  # off
 
 
 def view(picture: np.ndarray) -> CameraView:
-    """A view with only a valid image."""
     return CameraView(
         left_lane_y=9.0, right_lane_y=9.0, path_y=9.0, bend=(), lead_d_rel=50.0, picture=picture
     )
@@ -55,7 +54,6 @@ def test_both_lines_are_found_where_they_are(road, offset, heading):
 
 
 def test_no_picture_is_remembered():
-    """A detector that has seen other images finds the same lines as a new one, to the last bit."""
     road = RoadRenderer(CALTECH, "dashed", 3, periods=3)
     detector, picture = PaperDetector(CALTECH), road.grey(7.0, 0.3)
     expected = PaperDetector(CALTECH).detect(view(picture))
@@ -106,7 +104,6 @@ def test_shadows_and_seams_beside_the_middle_are_not_lines():
 
 
 def test_real_edges_get_the_clusters_of_scikit_learn():
-    """On the edges of rendered roads, the labels agree with scikit-learn's."""
     region = RoadRegion(CALTECH)
     for look in (Look(), Look(shadows=0.5, shadow_depth=0.6, cracks=20.0, grain=9.0)):
         part = RoadRenderer(CALTECH, look, 2, periods=3).grey(3.0)[region.part]
@@ -118,7 +115,6 @@ def test_real_edges_get_the_clusters_of_scikit_learn():
 
 
 def test_what_is_seen_does_not_depend_on_the_number_of_threads():
-    """The net's sums have the same bits with one thread and with two threads."""
     features = np.random.default_rng(0).random((192, 1764), dtype=np.float32)
     net = LaneNet.load()
     with threadpool_limits(1):

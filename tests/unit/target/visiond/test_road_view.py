@@ -47,7 +47,6 @@ def test_the_map_s_rows_stand_for_the_picture_s(name):
 
 
 def test_near_rows_are_means_of_many_pixels():
-    """In the map's nearest rows, pixel noise is much weaker than in the image."""
     model = CameraModel()
     picture = (
         np.random.default_rng(1).normal(128, 30, (model.rows, model.width)).clip(0, 255).astype(np.uint8)

@@ -23,12 +23,10 @@ STEP = 1.342  # m between frames
 
 @cache
 def renderer(camera: str = "steep", marks: str = "solid") -> RoadRenderer:
-    """A road, painted once."""
     return RoadRenderer(CAMERAS[camera], marks, 5, periods=4)
 
 
 def see(detector: RobustDetector, picture: np.ndarray) -> LaneLines:
-    """Return the detector's result for an image. The view's geometry is invalid."""
     nan = float("nan")
     return detector.detect(
         CameraView(left_lane_y=nan, right_lane_y=nan, path_y=nan, bend=(), lead_d_rel=nan, picture=picture)
@@ -36,7 +34,6 @@ def see(detector: RobustDetector, picture: np.ndarray) -> LaneLines:
 
 
 def errors(lines: LaneLines, truth: tuple) -> list[float]:
-    """Return the error of each line's y at the car (m)."""
     return [abs(line.y - y) for line, (y, _) in zip((lines.left, lines.right), truth, strict=True)]
 
 

@@ -9,7 +9,6 @@ from selfdrive.visiond.training_windows import EACH, labelled_windows
 
 @pytest.fixture(scope="module")
 def sample() -> tuple[np.ndarray, np.ndarray]:
-    """Windows of two roads that the shipped net was not trained on."""
     return labelled_windows(2, np.random.default_rng(99))
 
 

@@ -15,7 +15,6 @@ from selfdrive.visiond.under_effects import HEADS, IN_A_ROW, main
 
 @pytest.fixture(scope="module")
 def frames(tmp_path_factory):
-    """A folder with one frame, and its truth."""
     folder = tmp_path_factory.mktemp("frames")
     road = RoadRenderer(UDACITY, "solid", 1, periods=2)
     down = SOURCES["p1"].vanishing_row * 640 / 960 - 200
@@ -42,7 +41,6 @@ def test_misses_are_counted_by_level(frames, tmp_path, capsys):
 
 
 def test_a_line_that_cannot_be_seen_is_missed(frames, tmp_path):
-    """Heavier weather has more misses."""
     assert main([*frames, "--effect", "PaperRain", "--seeds", "2", "--csv", str(tmp_path / "found.csv")]) == 0
     with (tmp_path / "found.csv").open() as file:
         missed = [int(row["missed_paper"]) for row in csv.DictReader(file)]
@@ -60,6 +58,5 @@ def test_strips_show_all_levels(frames, tmp_path):
 
 
 def test_missing_frames_are_told(frames, tmp_path, capsys):
-    """Missing frames are reported in one line that says what to do."""
     assert main([str(tmp_path), frames[1]]) == EXIT_INPUT
     assert "p1_one" in capsys.readouterr().err

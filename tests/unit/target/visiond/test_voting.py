@@ -27,7 +27,6 @@ def points_on(pose: Pose, lines: str = "LR", chance: int = 0, seed: int = 0) -> 
 
 
 def solve(points: Points, belief: Belief) -> Pose:
-    """Return the result of both steps for the points."""
     voters = Voters(VIEW, points, float(VIEW.share.sum()))
     return fit(elect(voters, belief), voters, belief)
 
@@ -56,7 +55,6 @@ def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
 
 
 def test_without_points_the_belief_stands():
-    """Without points, the result is the expected lane and nothing is seen."""
     found = solve(
         points_on(Pose(0.0, 0.0, 1.85, -1.85), lines=""), Belief(middle=(0.3, 0.1), width=(3.6, 0.1))
     )
@@ -66,7 +64,6 @@ def test_without_points_the_belief_stands():
 
 @pytest.mark.parametrize("seed", range(5))
 def test_belief_keeps_the_lines_among_many_chance_points(seed):
-    """With a known lane position, ten times as many random points as line points do not move the lane."""
     true = Pose(4.0, 0.0, 1.95, -1.75)
     points = points_on(true, chance=1500, seed=seed)
     belief = Belief(middle=(0.15, 0.1), width=(3.7, 0.1), left=(0.0, 4.0), dip=(0.0, 1.5))
