@@ -1,6 +1,6 @@
-"""When a fault is first active, found by evaluating its trigger on the golden run's observations.
+"""Find when a fault is first active, by evaluating its trigger on the golden run's observations.
 
-Until then a mutant's run equals the golden run, so its probe observes exactly the same values.
+Until then a mutant's run equals the golden run, so its probe observes the same values.
 """
 
 import ast
@@ -35,7 +35,7 @@ class Observed:
         return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
-        """The step in which this observation was made. None is made before the first step."""
+        """Return the step in which this observation was made. None is made before the first step."""
         return bisect_right(self.before, observation) - 1
 
 
@@ -53,7 +53,7 @@ class Start:
 
 
 def first_active(own: str, seen: Observed) -> Start | None:
-    """The point where a mutant leaves the golden run; None if its trigger never holds.
+    """Return the point where a mutant leaves the golden run; None if its trigger never holds.
 
     `own` is the source of the probe's own part (see `probe.parts_of`).
     """
@@ -80,9 +80,7 @@ def _first_active(armed_t: float, condition: str, seen: Observed) -> Start | Non
 
 
 def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
-    """Whether a probe's condition holds in each observation. The arithmetic on numpy's doubles equals
-    Python's.
-    """
+    """Evaluate a condition for each observation. The arithmetic on numpy's doubles equals Python's."""
     with np.errstate(all="ignore"):
         for node in function.body:
             if isinstance(node, ast.Assign):
@@ -94,7 +92,7 @@ def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """The value of an expression made by `conditions.to_code`: an array, or one value for all."""
+    """Return the value of an expression made by `conditions.to_code`: an array, or one value for all."""
 
     def of(node: ast.expr) -> Any:
         return _value(node, values)

@@ -1,4 +1,4 @@
-"""The pristine tree that runs link their files from. Copying it instead takes up to a tenth of a run."""
+"""The pristine tree to which the trees of runs are linked, because copying takes up to a tenth of a run."""
 
 import os
 import shutil
@@ -22,7 +22,6 @@ class BaseTree:
         self._stamps = self._look()
 
     def lay_out(self, tree: Path, *, linked: bool) -> None:
-        """Create the folder `tree` with this tree's files, linked or copied."""
         if linked:
             shutil.copytree(self._folder, tree, copy_function=_link_or_copy)
             return
@@ -32,9 +31,7 @@ class BaseTree:
             place.write_bytes(data)
 
     def was_changed(self) -> bool:
-        """Restore changed files; return whether a file was changed since the last call, or another process
-        restored one.
-        """
+        """Restore changed files; return whether a file was changed or restored since the last call."""
         if (stamps := self._look()) == self._stamps:
             return False
         for path in self._files:

@@ -1,7 +1,7 @@
-"""Write trees with bytecode that cannot be stale: each .pyc stores its source's hash, which imports check.
+"""Write trees with bytecode that cannot be stale: imports compare each .pyc with the hash of its source.
 
-Python trusts a usual .pyc if size and modification time match the source. A copied __pycache__ next to a
-changed file of equal size could therefore run the pristine code.
+A usual .pyc is trusted if size and modification time match, so a changed file of equal size could run the
+pristine code.
 """
 
 from collections.abc import Mapping
@@ -11,7 +11,7 @@ from py_compile import PycInvalidationMode, PyCompileError, compile
 
 
 def write_compiled(files: Mapping[str, bytes], dest: Path) -> None:
-    """Write `tree` (relative path -> content) to `dest`, with the bytecode of its Python files."""
+    """Write files (relative path -> content) to `dest`, with the bytecode of its Python files."""
     for name, data in files.items():
         path = dest / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -32,7 +32,7 @@ def put(files: Mapping[str, bytes], tree: Path) -> None:
 
 
 def _compile(path: Path, name: str) -> None:
-    """Compile a file. On failure do nothing, because importing the file reports the error."""
+    """Compile a file. Errors are ignored, because importing the file reports them."""
     try:
         compile(str(path), dfile=name, doraise=True, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
     except PyCompileError:

@@ -1,8 +1,7 @@
 """Find the functions of a loaded program that a mutant changes, and check whether their code can be swapped.
 
-No function of the target is active between two steps of a run, so code can be swapped in place. Until the
-trigger first holds, the changed program acts like the pristine one: the probe guards every inserted
-statement, and no mutant changes the meaning of a name.
+No function of the target is active between two steps of a run. Until the trigger first holds, the changed
+program acts like the pristine one, because the probe guards every inserted statement.
 """
 
 import re
@@ -24,12 +23,12 @@ _IMPORT = re.compile(rb"\s*(?:from ([\w.]+) import|import ([\w.]+))")
 
 
 class NotSwappable(Exception):
-    """The mutant cannot be put into a running program. The text says why."""
+    """The mutant cannot be put into a running program; the text says why."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FunctionSwap:
-    """A function of `module` with its code before and after; `path` has the names that lead to it (class,
+    """A function of `module` with its code before and after; `path`: the names that lead to it (class,
     method).
     """
 
@@ -44,9 +43,9 @@ class CodeSwap:
     """Everything that turns a loaded pristine program into the mutant.
 
     The parts of `probe` run in order; `own` is the source of the first (`probe.parts_of`). `imports` are the
-    modules that injected lines import; they may be loaded early. `settings` has modules and the code of their
-    lines that set values in the probe. These modules must already be loaded, because loading one runs those
-    lines with its own constants.
+    modules that injected lines import. `settings` has modules and the code of their lines that set values in
+    the probe. These modules must already be loaded, because loading one runs those lines with its own
+    constants.
     """
 
     functions: tuple[FunctionSwap, ...]
@@ -57,7 +56,7 @@ class CodeSwap:
 
 
 def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -> CodeSwap:
-    """What turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
+    """Return what turns the pristine program, loaded from the folder `tree`, into the mutant with `files`.
 
     Raises NotSwappable if the result might differ from a mutant that is started alone.
     """
@@ -91,7 +90,6 @@ def plan_swap(manifest: TargetManifest, files: Mapping[str, bytes], tree: str) -
 def _in_file(
     path: str, pristine: bytes, mutated: bytes, filename: str
 ) -> tuple[tuple[FunctionSwap, ...], tuple[str, ...]]:
-    """The changed functions of a file, and the modules that its injected lines import."""
     if unsplice(mutated) != pristine:
         raise NotSwappable(f"{path} differs by more than inserted lines")
     imports = _guarded_imports(path, mutated.splitlines())
@@ -104,7 +102,6 @@ def _in_file(
 
 
 def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeType]]:
-    """A file's module and the code of its lines that set values in the probe; empty if there are none."""
     if not sets_values(mutated):
         return []
     lines = _only(mutated, sets=True)
@@ -112,7 +109,7 @@ def _settings(path: str, mutated: bytes, filename: str) -> list[tuple[str, CodeT
 
 
 def _only(mutated: bytes, *, sets: bool) -> bytes:
-    """Only a file's lines that set values in the probe, or only the others; line numbers stay."""
+    """Keep only a file's lines that set values in the probe, or only the others; line numbers stay."""
     if not sets and not sets_values(mutated):
         return mutated
     lines = mutated.splitlines(keepends=True)
@@ -130,7 +127,7 @@ def _compiled(data: bytes, filename: str) -> CodeType:
 
 
 def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
-    """The modules that injected lines import. NotSwappable if a block does not ask the probe first."""
+    """Return the modules that injected lines import. NotSwappable if a block does not ask the probe first."""
     imports: list[str] = []
     before, margin = "", 0
     tags = [tag for line in lines if (tag := tag_of(line)) and tag.was is not None]
@@ -156,9 +153,10 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
 def changed_functions(
     old: CodeType, new: CodeType, path: str, names: tuple[str, ...] = ()
 ) -> Iterator[tuple[tuple[str, ...], CodeType, CodeType]]:
-    """Names, old code and new code of the functions that differ in a module, or in its class `names`.
+    """Yield names, old code and new code of the functions that differ between two bodies, of a module or of
+    its class `names`.
 
-    `old` and `new` are the bodies to compare. Raises NotSwappable if anything except functions differs.
+    Raises NotSwappable if anything except functions differs.
     """
     before, after = _inner(old), _inner(new)
     if [code.co_name for code in before] != [code.co_name for code in after]:
@@ -179,7 +177,7 @@ def changed_functions(
 
 
 def _check(old: CodeType, new: CodeType, name: str) -> None:
-    """Raise NotSwappable unless the function with `new` code acts as with `old` until a trigger holds."""
+    """Raise NotSwappable unless the new code acts like the old until a trigger holds."""
     if old.co_name.startswith("<"):
         raise NotSwappable(f"{name} is a function without a name")
     if new.co_flags & _SUSPENDED:
@@ -188,7 +186,7 @@ def _check(old: CodeType, new: CodeType, name: str) -> None:
         raise NotSwappable(f"{name} has another signature, or other variables of an outer function")
     before = _inner(old)
     if len(before) > sum(any(same(one, other) for other in _inner(new)) for one in before):
-        raise NotSwappable(f"{name} has a function in it that is changed")
+        raise NotSwappable(f"a function inside {name} is changed")
 
 
 def _signature(code: CodeType) -> tuple[object, ...]:
@@ -202,17 +200,16 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def same(one: CodeType, other: CodeType) -> bool:
-    """Whether two functions do the same, regardless of their line numbers."""
+    """Return whether two functions do the same, regardless of their line numbers."""
     return essence(one) == essence(other)
 
 
 def essence(code: CodeType) -> tuple[object, ...]:
-    """A key of what the code and its nested code do; equal for functions that do the same."""
+    """Return a key of what the code and its nested code do; equal for functions that do the same."""
     return (*_essence(code), *map(essence, _inner(code)))
 
 
 def _essence(code: CodeType) -> tuple[object, ...]:
-    """What the code does, without its line numbers and nested functions."""
     values = tuple((type(c), None if isinstance(c, CodeType) else repr(c)) for c in code.co_consts)
     names = (code.co_name, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars)
     return (*names, _signature(code), code.co_code, code.co_exceptiontable, values)

@@ -1,8 +1,8 @@
 """The fork engine: each mutant is a fork of its golden run, made just before its fault is first active.
 
 Results equal the reference engine's byte for byte. The reference engine runs mutants that cannot be forked,
-and reruns those that crash. The `warm` engine forks before the first step. This engine does the same if a run
-stops at its first terminal hazard and the golden run has one, too.
+and reruns those that crash. The `warm` engine forks before the first step. So does this engine if a run stops
+at its first terminal hazard and the golden run has one, too.
 """
 
 import marshal
@@ -90,7 +90,7 @@ class ForkEngine:
             return _lost(str(why), folder)
 
     def refusal(self, job: Job) -> Refused | None:
-        """Why a job's golden run cannot be forked up to its last step; None if it can."""
+        """Return why a job's golden run cannot be forked up to its last step; None if it can."""
         assert job.golden is not None
         try:
             if self._unfit:
@@ -129,7 +129,6 @@ class ForkEngine:
         return self._become(self._at(job, start.step, swap), job, folder, swap, start)
 
     def _from_the_start(self, job: Job, folder: Path, swap: CodeSwap) -> Execution:
-        """Run the whole job in a fork of the loaded target."""
         first = self._running().first
         first.load(_needed(swap), self._patience_s)
         return self._become(first, job, folder, swap, _FROM_THE_START)
@@ -201,7 +200,7 @@ class ForkEngine:
         return replace(self._judged(job, folder, ended), start=start.step)
 
     def _judged(self, job: Job, folder: Path, ended: Ended) -> Execution:
-        """The result of a child; Refused if the reference engine must rerun the job."""
+        """Return the result of a child; Refused if the reference engine must rerun the job."""
         report = read_report(folder / "report.json", threads=list)
         if report is not None:
             self._check(job, report)
@@ -224,9 +223,7 @@ class ForkEngine:
         )
 
     def _check(self, job: Job, report: dict[str, Any]) -> None:
-        """Raise Refused unless the child ran this job's mutant and can be trusted: no other sources, no other
-        threads.
-        """
+        """Raise Refused if another program ran, or if threads are left."""
         if report["ended"] == "swap refused":
             raise Refused(str(report.get("why")))
         if report["outside"]:
@@ -238,7 +235,7 @@ class ForkEngine:
             raise Refused(problem)
 
     def _observed(self, job: Job, golden: Path) -> Observed:
-        """What a probe observes in a job's golden run. The first call runs it."""
+        """Return what a probe observes in a job's golden run. The first call runs it."""
         key = _key(job)
         if key not in self._seen:
             try:
@@ -269,7 +266,7 @@ class ForkEngine:
                 raise Refused(f"its golden run ended as {execution.status.value}: {execution.detail}")
             for name in self._manifest.outputs:
                 if no_pipe(execution.out / name).read_bytes() != (golden / name).read_bytes():
-                    raise Refused(f"its {name} is another one when it is driven step by step")
+                    raise Refused(f"its {name} differs when it is driven step by step")
             report = read_report(folder / "report.json")
             assert report is not None
             found = (
@@ -291,7 +288,6 @@ _FROM_THE_START = Start(step=0, observed=0, began=None, t=None)
 
 
 def _needed(swap: CodeSwap) -> list[str]:
-    """Modules to load before the mutant is made: those that it changes and those that it imports."""
     return [*dict.fromkeys(function.module for function in swap.functions), *swap.imports]
 
 
@@ -305,7 +301,6 @@ def _resolved(scenario: Path) -> str:
 
 
 def _golden(job: Job, golden: Path) -> Execution:
-    """The result of a mutant whose trigger never holds, which is the golden run's."""
     return Execution(
         status=Status.OK,
         detail="",
@@ -330,7 +325,6 @@ def _lost(why: str, folder: Path) -> Execution:
 
 
 def make_fork(setting: Setting) -> ForkEngine:
-    """Make the fork engine of a campaign."""
     return _make(setting, warm=False)
 
 

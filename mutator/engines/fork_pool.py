@@ -47,7 +47,7 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: its key, and a function that returns the arguments to begin it with."""
+    """A golden run: its key, and a function that returns its arguments."""
 
     key: Hashable
     arguments: Callable[[], list[str]]
@@ -87,7 +87,7 @@ class Waiting:
         return reply, handles
 
     def load(self, modules: Sequence[str], patience_s: float) -> None:
-        """Load what mutants will import, so that each fork finds it loaded."""
+        """Import modules now, so that each fork finds them loaded."""
         if new := [name for name in modules if name not in self.loaded]:
             self.ask({"do": "load", "modules": new}, patience_s)
             self.loaded.update(new)
@@ -168,7 +168,7 @@ class Pool:
             raise Lost("the tree of the fork server is not the pristine one")
 
     def before(self, step: int, golden: Golden, modules: Sequence[str], patience_s: float) -> Waiting:
-        """A process that waits before `step` of the golden run, with these modules loaded."""
+        """Return a process that waits before `step` of the golden run, with these modules loaded."""
         if self._process.poll() is not None:
             raise Lost("the fork server is gone")
         mine = [w for w in self._waiting if w.key == golden.key and w.step <= step]
@@ -207,7 +207,6 @@ class Pool:
         return made
 
     def close(self) -> None:
-        """End all processes of the server."""
         for waiting in (self.first, *self._waiting):
             waiting.close()
         end(self._process)

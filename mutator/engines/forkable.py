@@ -1,4 +1,4 @@
-"""What a forking engine can run: targets that can be loaded, and faults whose code fits a loaded program."""
+"""What a forking engine can run: loadable targets, and faults whose code fits a loaded program."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,7 +15,7 @@ from mutator.triggers.kinds import always
 
 
 def unfit(manifest: TargetManifest) -> Refused | None:
-    """Why the target cannot be forked here, as far as known without loading it."""
+    """Return why the target cannot be forked here, as far as known without loading it."""
     why = not_forkable(manifest)
     stepwise = (
         "" if manifest.stepwise else f"name a function that makes a run in steps in {manifest.path.name}"
@@ -24,7 +24,7 @@ def unfit(manifest: TargetManifest) -> Refused | None:
 
 
 def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
-    """Why the target cannot be forked once it is loaded, found by trying; None if it can.
+    """Load the target to find out why it cannot be forked; None if it can.
 
     `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
     """
@@ -40,7 +40,9 @@ def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | 
 
 
 def not_forked(manifest: TargetManifest, models: FaultModels, faults: Iterable[Fault]) -> dict[str, str]:
-    """Variants that only the reference engine can run, with the reason, found by trying one fault of each."""
+    """Return the variants that only the reference engine can run, with the reason. One fault of each is
+    tried.
+    """
     variants = {fault.spec: fault for fault in faults}
     if why := not_forkable(manifest):
         return dict.fromkeys(variants, why)

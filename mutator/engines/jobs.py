@@ -13,7 +13,7 @@ from mutator.targets.manifest import TargetManifest
 
 
 class RunMode(StrEnum):
-    """How a run was done: in a fresh interpreter, as a fork, or as the golden run itself."""
+    """How a run was done."""
 
     REFERENCE = "reference"
     WARM = "warm"
@@ -45,7 +45,7 @@ class Job:
     lines: bool = False  # note which lines of the tree run from the first observation on
 
     def problem_of(self, report: object) -> str:
-        """The problem with the probe's report; empty if there is none, or no probe."""
+        """Return the problem with the probe's report; empty if there is none, or no probe."""
         return "" if self.mutant is None else report_problem(report, self.mutant, self.injections)
 
 
@@ -55,9 +55,9 @@ Stack = tuple[tuple[str, int, int], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Raised:
-    """The exception that ended a run: its type, its text, and where it left the tree.
+    """The exception that ended a run.
 
-    `stacks[0]` is the exception's own stack. The others are those of its causes and of the exceptions in it.
+    `stacks[0]` is its own stack. The others are those of its causes and of the exceptions in it.
     """
 
     kind: str
@@ -71,7 +71,6 @@ class Raised:
 
     @property
     def text(self) -> str:
-        """Type, text and place, for messages."""
         if self.kind == SystemExit.__name__:
             what = f"exit status {self.message}"
         else:
@@ -84,12 +83,12 @@ class Execution:
     """The result of a job. `out` holds the target's trace and record if `status` is OK.
 
     * `status`: how the run ended; `outcomes.blame` decides what caused it
-    * `raised`: the exception that ended it; `active`: whether an injection was active
-    * `probe`: the probe's report; `log`: the tail of what the run printed
-    * `mode`: how the run was done; `why`: why another engine did it; `start`: the step where it left golden
+    * `active`: whether an injection was active
+    * `log`: the tail of what the run printed
+    * `why`: why another engine did it; `start`: the step where it left golden
     * `stopped`: whether a terminal hazard ended it early
     * `modules`: the third-party top-level modules that it imported
-    * `watched`, `seen`, `lines` (from 1, by file): notes of the reference engine
+    * `watched`, `lines` (from 1, by file): notes of the reference engine
     """
 
     status: Status

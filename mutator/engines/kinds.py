@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EngineKind:
-    """An engine: its name, a description of its runs, and the function that makes one from a `Setting`.
+    """An engine.
 
-    `factory` is `module:function`, imported when the engine is made. `forks` says that the engine needs a
-    forkable target.
+    `factory` is `module:function`, imported when the engine is made from a `Setting`. `forks`: the engine
+    needs a forkable target.
     """
 
     name: str

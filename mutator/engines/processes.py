@@ -60,14 +60,13 @@ def check_limits(limits: Limits) -> None:
                 resource.setrlimit(number, (soft, least))  # as for runs by root
             except ValueError:
                 raise MutatorError(
-                    f"a limit of {hard} here (`{command}`), and runs may take {least} ({name})",
-                    expected="a limit that is no lower than that of the runs",
+                    f"a limit of {hard} here (`{command}`), but runs may use {least} ({name})",
+                    expected="a limit at least as high as that of the runs",
                     remedy=f"raise it, or lower {name} in the limits of the campaign",
                 ) from None
 
 
 def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[Status, str]:
-    """Status and detail of a run on the right tree, from its ending and its report."""
     if stopped := _judge_stopped(limits, ended):
         return stopped
     if report is not None:
@@ -78,7 +77,7 @@ def judge(limits: Limits, ended: Ended, report: dict[str, Any] | None) -> tuple[
 
 
 def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
-    """Status and detail of a run that a limit or an outside signal stopped, even after its report."""
+    """Judge a run that a limit or an outside signal stopped, even after its report."""
     killed = signal.Signals(-ended.code) if ended.code < 0 else None
     if ended.stopped == LOST:
         return Status.HARNESS_ERROR, f"the process that guarded the run is gone (exit code {ended.code})"
@@ -94,7 +93,6 @@ def _judge_stopped(limits: Limits, ended: Ended) -> tuple[Status, str] | None:
 
 
 def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
-    """Status and detail of a run that reported its ending."""
     if report["ended"] == "steps":
         return Status.TIMEOUT, f"limit of {limits.steps} simulation steps"
     if raised := raised_in(report):
@@ -103,7 +101,6 @@ def _judge_report(limits: Limits, report: dict[str, Any]) -> tuple[Status, str]:
 
 
 def raised_in(report: dict[str, Any]) -> Raised | None:
-    """The exception in a report, if any."""
     error = report["error"]
     if error is None:
         return None
@@ -116,9 +113,7 @@ def raised_in(report: dict[str, Any]) -> Raised | None:
 
 
 def environment(hash_seed: int, folder: Path, more: Mapping[str, str] | None = None) -> dict[str, str]:
-    """The complete environment of a run: what Python needs to start, and `more`; nothing else from the
-    user's.
-    """
+    """Return the complete environment of a run. Only what Python needs to start comes from the user's."""
     kept = {name: os.environ[name] for name in KEPT if name in os.environ}
     own = {**FIXED, "PYTHONHASHSEED": str(hash_seed), "TMPDIR": str(folder)}
     return {**kept, **(more or {}), **own}
@@ -134,7 +129,7 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
 
 
 def tail(path: Path) -> str:
-    """The end of what a run printed; empty if the run deleted its log."""
+    """Return the end of what a run printed; empty if the run deleted its log."""
     if not path.is_file():
         return ""
     with path.open("rb") as file:
@@ -143,10 +138,10 @@ def tail(path: Path) -> str:
 
 
 def read_report(path: Path, **more: type) -> dict[str, Any] | None:
-    """The child's report; None if it is missing, incomplete or invalid.
+    """Return the child's report; None if it is missing, incomplete or invalid.
 
-    A run may write anything to this file and exit, so each field is checked. `more` are the fields of one
-    engine only.
+    Each field is checked, because a run may write anything to this file. `more` are the fields of one engine
+    only.
     """
     try:
         report: dict[str, Any] = json.loads(no_pipe(path).read_bytes())
@@ -159,17 +154,16 @@ def read_report(path: Path, **more: type) -> dict[str, Any] | None:
 
 
 def inactive(folder: Path) -> Path:
-    """The file in a run's folder that the first activation deletes."""
+    """Return the file in a run's folder that the first activation deletes."""
     return folder / "inactive"
 
 
 def was_active(folder: Path) -> bool:
-    """Whether an injection was active in the run in this folder."""
     return not inactive(folder).exists()
 
 
 def is_full(work: Path, report: dict[str, Any] | None) -> bool:
-    """Whether a failed run lacked space on the disk or in a quota."""
+    """Return whether a failed run lacked space on the disk or in a quota."""
     if report is not None and report["disk_full"]:
         return True
     state = os.statvfs(work)
@@ -184,7 +178,7 @@ def is_full(work: Path, report: dict[str, Any] | None) -> bool:
 
 
 def steady(detail: str, folder: Path) -> str:
-    """The text without parts that differ between runs (scratch paths, addresses), printable and short."""
+    """Remove what differs between runs (scratch paths, addresses); keep the text printable and short."""
     text = detail.replace(str(folder / "tree") + os.sep, "").replace(str(folder), "...")
     text = re.sub(r"0x[0-9a-fA-F]{4,}", "0x...", text)[:500]
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -47,10 +47,8 @@ class ReferenceEngine:
     """Runs each job in a fresh interpreter on its own tree; nothing else of the package can be imported
     there.
 
-    `base` is a pristine tree made by `prepare_base`, and never written to. `work` is an existing scratch
-    folder. If `parent` is a process id, the engine exits once that process is no longer its parent. Runs of
-    an `independent` engine use nothing that other runs left, if the manifest supports this. The same holds
-    for mutants of files that decide what runs leave.
+    Parameters as in `Setting`. If `independent` or if a mutant changes files that decide what runs leave,
+    runs use nothing that other runs left, provided that the manifest supports this.
     """
 
     def __init__(
@@ -82,7 +80,7 @@ class ReferenceEngine:
                 remove_folder(folder)
 
     def close(self) -> None:
-        """Do nothing: no process is kept between jobs."""
+        """Do nothing, because no process is kept between jobs."""
 
     def execute(self, job: Job, folder: Path) -> Execution:
         """Run one job in the new scratch folder `folder`, which the caller deletes."""
@@ -153,13 +151,13 @@ class ReferenceEngine:
         return path
 
     def _observation(self) -> tuple[str, list[int]]:
-        """The observing file, and the lines (from 1) of its observing statement."""
+        """Return the observing file, and the lines (from 1) of its observing statement."""
         location = self.manifest.observation.location
         first, last = parsed(self.manifest.tree, location.path).span(location)
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed(self) -> tuple[str, list[str]]:
-        """The object in which the probe keeps its observations, and the names of the observed values."""
+        """Return the object in which the probe keeps its observations, and the observed values' names."""
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 
@@ -189,7 +187,9 @@ class ReferenceEngine:
         return Ended(**json.loads(told))
 
     def _told(self, connection: socket.socket, deadline: float) -> bytes:
-        """The guard's JSON report; empty if none arrives in time. Exits if this process's parent is gone."""
+        """Return the guard's JSON report; empty if none arrives in time. Exit if this process's parent is
+        gone.
+        """
         connection.settimeout(_LOOK_UP_S)
         while time.monotonic() < deadline:
             try:
@@ -209,7 +209,7 @@ class ReferenceEngine:
         return (Status.HARNESS_ERROR, problem) if problem else (status, detail)
 
     def _wrong_tree(self, job: Job, report: dict[str, Any]) -> str:
-        """The problem with the tree that ran; empty if it was the job's."""
+        """Return the problem with the tree that ran; empty if it was the job's."""
         if report["outside"]:
             return f"the target was also imported from {', '.join(report['outside'])}"
         expected = self._pristine | {path: digest(data) for path, data in job.files.items()}
@@ -222,7 +222,7 @@ class ReferenceEngine:
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:
-    """The exception with reproducible texts, because a run may use any names."""
+    """Remove what differs between runs from the exception's texts."""
     stacks = tuple(
         tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
     )
@@ -230,12 +230,11 @@ def _steady(raised: Raised, folder: Path) -> Raised:
 
 
 def make_reference(setting: Setting) -> ReferenceEngine:
-    """Make the reference engine of a campaign."""
     return ReferenceEngine(setting.manifest, setting.base, setting.work, setting.limits, setting.parent)
 
 
 def prepare_base(manifest: TargetManifest, dest: Path) -> Path:
-    """Make the pristine tree with its bytecode in the folder `dest`, unless it is complete; return it."""
+    """Make the pristine tree with its bytecode in the folder `dest`, unless it exists; return it."""
     if not dest.is_dir():
         half = dest.with_name(f"{dest.name}.{os.getpid()}")
         with raising_disk_full(dest):

@@ -13,7 +13,7 @@ WORTH_IT = 40  # with fewer experiments, the equivalence check would rerun most 
 
 
 def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int) -> str:
-    """The name of the engine for this many experiments: the requested one, or the fastest that pays off.
+    """Return the name of the requested engine, or of the fastest that pays off for this many experiments.
 
     Raises MutatorError if the requested engine is unknown or cannot run this target here.
     """
@@ -28,19 +28,18 @@ def choose_engine(asked: str | None, manifest: TargetManifest, experiments: int)
 
 
 def make_engine(name: str, setting: Setting) -> Engine:
-    """Make the engine with this name."""
     engine: Engine = resolve_name(ENGINES[name].factory)(setting)
     return engine
 
 
 def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
-    """Why this many experiments are not forked unless requested; empty if they are."""
+    """Return why this many experiments are not forked unless requested; empty if they are."""
     few = f"that pays off from {WORTH_IT} experiments on" if experiments < WORTH_IT else ""
     return not_forkable(manifest) or few
 
 
 def not_forkable(manifest: TargetManifest) -> str:
-    """Why this target cannot be forked here; empty if it can."""
+    """Return why this target cannot be forked here; empty if it can."""
     if manifest.stepwise is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":

@@ -1,4 +1,4 @@
-"""Threads that prevent forking: their names, and how to turn them off."""
+"""Messages about threads that prevent forking."""
 
 from collections.abc import Sequence
 
@@ -23,14 +23,13 @@ _OTHER = ("", "start it after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:
-    """The message about a process that has these threads in addition to its main one."""
+    """Return the message about a process that has these threads besides its main one."""
     told = [*dict.fromkeys(map(_told, others))]
     listed = ", ".join([*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])])
     return f"it has {len(others) + 1} threads, and only one can be forked: besides the main one, {listed}"
 
 
 def turned_off(others: Sequence[str]) -> str:
-    """How to turn off these threads."""
     return "; ".join(dict.fromkeys(_about(name)[1] for name in others))
 
 
@@ -40,7 +39,7 @@ def _told(name: str) -> str:
 
 
 def _about(name: str) -> tuple[str, str]:
-    """What the thread is, and how to turn it off."""
+    """Return what the thread is, and how to turn it off."""
     if not name:
         return _UNNAMED
     return next(((what, remedy) for begin, what, remedy in _KNOWN if name.startswith(begin)), _OTHER)

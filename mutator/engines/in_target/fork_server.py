@@ -2,8 +2,8 @@
 
 Each process waits between two steps of a golden run; the first waits before any run. It answers on its own
 socket with marshalled dicts, each preceded by its length. While it has only one thread, it forks on request:
-a mutant, or a process that waits at a later step. It ends when its socket is closed at the other end, or when
-the first process ends (guard.py).
+a mutant, or a process that waits at a later step. It ends when the other end closes its socket, or when the
+first process ends (guard.py).
 """
 
 import array
@@ -42,7 +42,6 @@ def main(connection: int, start_file: str) -> int:
 
 
 def serve_first(connection: int, start: dict[str, Any]) -> None:
-    """Load the target, and wait before any run."""
     os.chdir(start["home"])
     sys.path.insert(0, start["tree"])
     sys.meta_path.insert(0, child.Harness)
@@ -114,7 +113,8 @@ class Process:
         return data
 
     def branch(self, step: int, args: list[str] | None = None) -> None:
-        """Fork a process that waits before `step` of this golden run, or of a new one begun with `args`.
+        """Fork a process that waits before `step` of this golden run, or of a new one with the arguments
+        `args`.
 
         The reply carries its socket.
         """
@@ -166,7 +166,8 @@ class Process:
     def mutant(self, job: bytes, home: str, wall_s: float, disk_mb: int) -> dict[str, Any]:
         """Fork and guard a child that continues as a mutant; return how it ended.
 
-        Only the child unmarshals the job: memory that this process writes to must be copied after each fork.
+        Only the child unmarshals the job, because memory that this process writes to must be copied after
+        each fork.
         """
         if others := threads.others():
             return {"threads": others}
@@ -193,23 +194,21 @@ class Process:
         report["outside"] = self.outside + self.elsewhere(child.imported_since(job["probe_name"]))
         report["threads"] = threads.others()
         Path(job["report"]).write_text(json.dumps(report), encoding="utf-8")
-        if not report["threads"]:  # with other threads, the result does not count
+        if not report["threads"]:  # with other threads, the result is not used
             end()
         os._exit(0)
 
     def elsewhere(self, names: Iterable[str]) -> Any:
-        """Files outside the tree from which modules of these names were imported."""
+        """Return the files outside the tree from which modules of these names were imported."""
         return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)
 
     def touched(self) -> bool:
-        """Whether the tree has changed."""
         try:
             return bool(child.stamp(self.places) != self.stamp)
         except OSError:
             return True
 
     def finish(self, job: dict[str, Any]) -> dict[str, Any]:
-        """Finish the run as the mutant; return its report."""
         report: dict[str, Any] = {"ended": "ok", "error": None, "disk_full": False, "probe": None}
         watch = job["watch"]
         probe, known = None, set() if watch is None else set(sys.modules)
@@ -219,7 +218,7 @@ class Process:
             swap.run_settings(job["settings"], probe)
             probe.limit(job["steps"])
             child.note_activation(probe, job["inactive"])
-            # the state that the probe would have if it had been there from the start
+            # the state of a probe that was there from the start
             holder, state = job["probe_state"]
             for name, value in state.items():
                 setattr(getattr(probe, holder), name, value)
@@ -241,7 +240,6 @@ class Process:
 
 
 def get_ready() -> None:
-    """Prepare for a fork: flush output, and exclude existing objects from garbage collection."""
     for stream in (sys.stdout, sys.stderr):
         stream.flush()
     gc.freeze()
@@ -264,7 +262,6 @@ def end() -> None:
 
 
 def reap() -> None:
-    """Reap children that have ended."""
     with suppress(ChildProcessError):
         while os.waitpid(-1, os.WNOHANG)[0]:
             pass

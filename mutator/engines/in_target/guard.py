@@ -28,7 +28,7 @@ _libc = ctypes.CDLL(None)
 
 
 class Space:
-    """Limit of `disk_mb` MiB on what the folder `home` may use in addition to what it uses now."""
+    """Limit of `disk_mb` MiB on what the folder `home` may use in addition to its present content."""
 
     def __init__(self, home: str, disk_mb: int) -> None:
         self._home = home
@@ -44,9 +44,9 @@ def fork(
     """Fork. Return None in the child, which leads its own session and dies with its parent.
 
     The parent waits until the child ends, a limit stops it, or the other end of `caller` (a pipe or socket)
-    is closed. It then kills everything that the child left. If the caller closes its end, the parent asks the
-    child to end and gives it `patience_s` to do so. The parent returns `code` (negative for a signal),
-    `cpu_s`, `wall_s`, and `stopped`: WALL, DISK, ABANDONED or "".
+    is closed. It then kills everything that the child left. If the caller closes its end, the child has
+    `patience_s` to end by itself. The parent returns `code` (negative for a signal), `cpu_s`, `wall_s`, and
+    `stopped`: WALL, DISK, ABANDONED or "".
     """
     _prctl(_PR_SET_CHILD_SUBREAPER, 1)
     began, parent, pid = time.monotonic(), os.getpid(), os.fork()
@@ -82,14 +82,14 @@ def _mind_signals() -> None:
 
 
 def die_with_parent(parent: int) -> None:
-    """Make the kernel kill this process when `parent` dies. Exit now if `parent` is no longer the parent."""
+    """Make the kernel kill this process when `parent` dies. Exit now if it is no longer the parent."""
     _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
 
 
 def used(folder: str) -> int:
-    """Bytes that a folder's readable content takes on the disk."""
+    """Return the bytes that a folder's readable content takes on the disk."""
     total, folders = 0, [folder]
     while folders:
         with suppress(OSError), os.scandir(folders.pop()) as entries:
@@ -128,7 +128,6 @@ def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
 
 
 def _ask_to_end(pid: int, patience_s: float) -> None:
-    """Tell an unreaped child to end, and wait up to `patience_s` seconds."""
     os.kill(pid, signal.SIGTERM)
     handle = os.pidfd_open(pid)
     try:
@@ -139,8 +138,7 @@ def _ask_to_end(pid: int, patience_s: float) -> None:
 
 def _end_what_is_left() -> None:
     """Kill and reap children in other sessions, with all their descendants."""
-    # processes that may not be killed: those of root, if this process is not root's
-    session, spared = os.getsid(0), set[int]()
+    session, spared = os.getsid(0), set[int]()  # spared: root's, which may not be killed
     while left := [pid for pid in _children(os.getpid()) if os.getsid(pid) != session and pid not in spared]:
         for pid in _with_descendants(left):
             try:
@@ -161,7 +159,7 @@ def _with_descendants(pids: Iterable[int]) -> list[int]:
 
 
 def _children(pid: int) -> list[int]:
-    """Children of `pid`, including dead ones that are not reaped."""
+    """Return the children of `pid`, including dead ones that are not reaped."""
     found: list[int] = []
     with suppress(OSError), os.scandir(f"/proc/{pid}/task") as threads:  # the process may end meanwhile
         for thread in threads:

@@ -1,7 +1,7 @@
 """Note which lines of a tree run from the first observation on. Standard library only.
 
 From Python 3.12 on, `sys.monitoring` reports each line once. Older versions trace the tree's functions, which
-is slower. Neither changes what the target does. Lines run by other threads are noted only from 3.12 on.
+is slower and misses other threads.
 """
 
 import os
@@ -47,7 +47,7 @@ class Lines:
         return files
 
     def _note(self, file: str, line: int) -> bool:
-        """Note a line of the tree; return whether it is the first observation, where noting starts again."""
+        """Note a line of the tree. At the first observation, start again and return True."""
         first = not self._begun and file == self._path and line in self._since
         if first:
             self._begun = True

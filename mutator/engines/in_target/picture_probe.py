@@ -1,8 +1,8 @@
-"""Stands in for the probe in a tree that is run for its pictures. Standard library and numpy only.
+"""A replacement of the probe in a tree that is run for its pictures. Standard library and numpy only.
 
-When the run comes to the place of an image effect, the lines of every effect in ASKED are executed on the
-variables of that place, one effect after the other, each on the same picture. The pictures before and after
-are written to the run's folder, and the run ends.
+At the place of an image effect, the lines of every effect in ASKED are executed on the variables of that
+place, each on the same picture. The pictures before and after are written to the run's folder, and the run
+ends.
 """
 
 import json
@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects: what `review.pictures` fills in
+ASKED: dict[str, Any] = json.loads("{}")  # file, picture, effects; filled in by `review.pictures`
 FILE = "pictures.npz"
 
 _folder = Path.cwd()
@@ -29,7 +29,7 @@ def limit(max_steps: int) -> None:
 
 
 def observe(**values: float) -> None:
-    """Count a step; the run is over when the pictures are drawn, or when it takes too long."""
+    """Count a step; end the run when the pictures are drawn, or after too many steps."""
     global _left
     _left -= 1
     if _drawn or _left < 0:
@@ -37,22 +37,19 @@ def observe(**values: float) -> None:
 
 
 def on() -> bool:
-    """Whether the fault is active: it always is."""
     return True
 
 
 def call(fi: str, number: int) -> bool:
-    """Whether this execution counts: each does."""
     return True
 
 
 def every(fi: str, number: int) -> bool:
-    """Whether this execution counts: each does."""
     return True
 
 
 def active(fi: str) -> bool:
-    """Draw the pictures where it is first asked, and end the run."""
+    """Draw the pictures at the first call, and end the run."""
     global _drawn
     if not _drawn:
         frame: FrameType | None = sys._getframe()
@@ -66,7 +63,6 @@ def active(fi: str) -> bool:
 
 
 def _draw(names: dict[str, Any]) -> None:
-    """Write the pictures; `names` are the variables of the place."""
     before = _picture(names)
     after = []
     for lines in ASKED["effects"]:
@@ -82,7 +78,7 @@ def _picture(names: dict[str, Any]) -> Any:
     shape = tuple(getattr(picture, "shape", ()))
     kind = str(getattr(picture, "dtype", type(picture).__name__))
     if kind != "uint8" or len(shape) not in (2, 3) or shape[2:] not in ((), (3,)):
-        raise TypeError(f"{ASKED['picture']} is {kind} of shape {shape}, and no grey or RGB picture of bytes")
+        raise TypeError(f"{ASKED['picture']} is {kind} of shape {shape}, not a grey or RGB picture of bytes")
     return np.array(picture)
 
 
@@ -91,10 +87,8 @@ def _yes(fi: str) -> bool:
 
 
 def _made(fi: str, make: Callable[[], Any]) -> Any:
-    """What the effect keeps for a run: it is made for this picture alone."""
     return make()
 
 
 def report() -> dict[str, Any]:
-    """What a probe tells of its run, as far as it is read."""
     return {"mutant": ASKED["mutant"], "triggered": None, "injections": {}}

@@ -1,9 +1,8 @@
 """Run a target once in a fresh interpreter: `python -P -s run_once.py job.json SOCKET`.
 
-Standard library only, because the harness must not change what the target does. The script forks first. The
-parent guards the run (see guard.py) and sends the ending over the socket. The child limits itself, puts the
-tree first on sys.path and runs the entry module as `__main__`. It writes report.json: how the run ended,
-digests of the tree's files, imports of its packages from elsewhere, and the probe's counts.
+Standard library only, because the harness must not change what the target does. The script forks. The parent
+guards the run (see guard.py) and sends the ending over the socket. The child limits itself, puts the tree
+first on sys.path, runs the entry module as `__main__`, and writes report.json.
 """
 
 import errno
@@ -30,7 +29,7 @@ _MOST_ERRORS = 50  # exceptions stored: the one raised and those behind it
 
 
 def beside(name: str) -> Any:
-    """Load the module of this name from this file's folder, which is not on sys.path."""
+    """Load a module from this file's folder, which is not on sys.path."""
     spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
     assert spec and spec.loader
     module = importlib.util.module_from_spec(spec)
@@ -44,7 +43,7 @@ guard = beside("guard")
 class Harness:
     """Import hook that finds `mutator`, which the target's glue imports, next to this file.
 
-    It ignores any other installed version.
+    Other installed versions are ignored.
     """
 
     package = Path(__file__).resolve().parents[2]
@@ -74,7 +73,6 @@ def main(job_file: str, connection: int) -> int:
 
 
 def run(job: dict[str, Any]) -> None:
-    """Run the target as the job says, and write the report."""
     limit_resources(job)
     os.chdir(job["out"])
     sys.path.insert(0, job["tree"])
@@ -134,7 +132,7 @@ def run_module(module: str, args: list[str]) -> None:
 
 
 def run_until(job: dict[str, Any]) -> bool:
-    """Run to the end or the first terminal hazard; write the results; return whether it was stopped."""
+    """Run to the end or the first terminal hazard; write the results; return whether the run was stopped."""
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
@@ -144,7 +142,7 @@ def run_until(job: dict[str, Any]) -> bool:
 
 
 def note_activation(probe: Any, inactive: str) -> None:
-    """Make the first activation delete the file `inactive`, so that it shows however the run ends."""
+    """Let the first activation delete the file `inactive`, so that it is known however the run ends."""
     active = probe.active
 
     def first_active(fi: str) -> Any:
@@ -159,7 +157,7 @@ def note_activation(probe: Any, inactive: str) -> None:
 
 
 def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
-    """The report of the probe `name`. If the probe fails, its error becomes the run's ending."""
+    """Return the report of the probe `name`. If the probe fails, its error becomes the run's ending."""
     try:
         said = probe.report()
     except BaseException as err:
@@ -172,7 +170,7 @@ def asked(probe: Any, tree: str, name: str) -> dict[str, Any]:
 
 
 def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]:
-    """How a run failed, in a reproducible text. `probe` is the name of the probe's module."""
+    """Return how a run failed, in a reproducible text. `probe` is the name of the probe's module."""
     kind = type(err)
     if probe and (kind.__module__, kind.__name__) == (probe, "StepLimit"):
         return {"ended": "steps"}
@@ -183,7 +181,7 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """An object as text. Any conversion may fail for the target's classes."""
+    """Convert an object to text. This may fail for the target's classes."""
     try:
         return str(thing)
     except BaseException as why:
@@ -191,12 +189,12 @@ def text(thing: object) -> str:
 
 
 def of_full_disk(err: BaseException) -> bool:
-    """Whether an error reports a full disk or quota, also if a library raised it."""
+    """Return whether an error reports a full disk or quota, also if a library raised it."""
     return getattr(err, "errno", None) in _NO_SPACE or any(os.strerror(n) in text(err) for n in _NO_SPACE)
 
 
 def origins(err: BaseException) -> list[BaseException]:
-    """The exception, its causes, and the exceptions in it, without duplicates."""
+    """Return the exception, its causes, and the exceptions in it, without duplicates."""
     found: dict[int, BaseException] = {}
     todo: list[BaseException | None] = [err]
     while todo and len(found) < _MOST_ERRORS:
@@ -209,9 +207,7 @@ def origins(err: BaseException) -> list[BaseException]:
 
 
 def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
-    """Where the exception passed through the tree: file, line and column, innermost first, without
-    duplicates.
-    """
+    """Return where the exception passed through the tree: file, line and column, innermost first."""
     places = []
     trace = err.__traceback__
     while trace is not None:
@@ -226,14 +222,14 @@ def passed(err: BaseException, tree: str) -> list[tuple[str, int, int]]:
 
 
 def column(trace: types.TracebackType) -> int:
-    """The byte at which the failing or called expression starts in its line; -1 if unknown."""
+    """Return the byte at which the failing or called expression starts in its line; -1 if unknown."""
     positions = trace.tb_frame.f_code.co_positions()
     *_, begins, _ = next(itertools.islice(positions, trace.tb_lasti // 2, None), (None,) * 4)
     return -1 if begins is None else begins
 
 
 def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str]) -> list[str]:
-    """Files outside the tree from which the packages were imported, searched among modules of these names."""
+    """Return the files outside the tree from which these modules of the packages were imported."""
     found = []
     for name in sorted(name for name in names if name.partition(".")[0] in packages):
         file = getattr(sys.modules[name], "__file__", None)
@@ -243,7 +239,7 @@ def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str])
 
 
 def imported_since(name: str) -> list[str]:
-    """Module `name` and the modules imported after it, newest first."""
+    """Return module `name` and the modules imported after it, newest first."""
     names = []
     for newer in reversed(sys.modules):
         names.append(newer)
@@ -253,14 +249,12 @@ def imported_since(name: str) -> list[str]:
 
 
 def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Modules imported since the `known` ones, in order, without modules of the packages."""
+    """Return the modules imported since the `known` ones, in order, without those of the packages."""
     return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
 
 
 def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Top-level names of third-party modules imported since the `known` ones, or with a shared library in
-    use.
-    """
+    """Return the third-party top-level modules imported since the `known` ones or mapped into memory."""
     own = {*sys.stdlib_module_names, Harness.package.name, *packages, *known}
     return sorted({name.partition(".")[0] for name in (*libraries(known, packages), *mapped())} - own)
 
@@ -279,7 +273,6 @@ def mapped() -> Iterator[str]:
 
 
 def tree_files(tree: str) -> dict[str, str]:
-    """Digest of each file in the tree except bytecode, by path."""
     files = {}
     for folder, _, names in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -290,7 +283,7 @@ def tree_files(tree: str) -> dict[str, str]:
 
 
 def places(tree: str) -> list[str]:
-    """Every folder and file in the tree except bytecode, which Python checks against its source."""
+    """List every folder and file in the tree except bytecode, which Python checks against its source."""
     found = []
     for folder, _, files in os.walk(tree):
         if Path(folder).name != "__pycache__":
@@ -299,7 +292,7 @@ def places(tree: str) -> list[str]:
 
 
 def stamp(places: list[str]) -> list[tuple[int, int, int]]:
-    """A value that changes when a file or folder is written to, added or removed."""
+    """Return a value that changes when a file or folder is written to, added or removed."""
     states = map(os.stat, places)
     return [(state.st_mtime_ns, state.st_size, state.st_ino) for state in states]
 

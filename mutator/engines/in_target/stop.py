@@ -1,4 +1,4 @@
-"""Run to the end, or to the first terminal hazard. Standard library only."""
+"""Run a target to its end, or to the first terminal hazard. Standard library only."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -8,7 +8,7 @@ from typing import Any
 def drive(run: Any, source: str | None) -> bool:
     """Make the steps of a run; return whether it was stopped.
 
-    `source` defines the function that says after each step whether to stop; None: run to the end.
+    `source` defines a function that decides after each step whether to stop; None: run to the end.
     """
     if source is None:
         while not run.done:
@@ -24,7 +24,6 @@ def drive(run: Any, source: str | None) -> bool:
 
 
 def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
-    """The function `over` defined in `source`."""
     names = {"abs": abs, "min": least, "max": greatest, "float": float}
     space: dict[str, Any] = {"__builtins__": names, "math": math}
     exec(source, space)
@@ -33,10 +32,9 @@ def compiled(source: str) -> Callable[[Mapping[str, float]], bool]:
 
 
 def least(*values: float) -> float:
-    """The smallest number; NaN if any is NaN, as in a trace. Python's `min` depends on the order."""
+    """Return the smallest number; NaN if any is NaN, as in a trace. Python's `min` depends on the order."""
     return math.nan if any(map(math.isnan, values)) else min(values)
 
 
 def greatest(*values: float) -> float:
-    """The largest number; NaN if any is NaN."""
     return math.nan if any(map(math.isnan, values)) else max(values)

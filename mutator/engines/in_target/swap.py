@@ -1,7 +1,7 @@
 """Put a mutant's code into the loaded modules of this process. Standard library only.
 
-Only the target's process imports this module. `mutator.engines.code_swap` decides what may be swapped; this
-module checks that the loaded program is the one that was analysed.
+`mutator.engines.code_swap` decides what may be swapped; this module checks that the loaded program is the one
+that was analysed.
 """
 
 import sys
@@ -15,7 +15,7 @@ _OWN_REFERENCES = 3  # to a code object: from its function, a local, an argument
 
 
 class SwapRefused(Exception):
-    """The loaded program is not the one that the swap was made for."""
+    """The loaded program is not the one for which the swap was made."""
 
 
 def install(name: str, parts: Sequence[types.CodeType]) -> Any:
@@ -41,7 +41,6 @@ def swap_code(functions: Sequence[Sequence[Any]], probe: types.ModuleType) -> No
 
 
 def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> None:
-    """Run the lines of modules (module, code) that set values in the probe, each in its module."""
     name = probe.__name__.rpartition(".")[2]
     for module, code in settings:
         if module not in sys.modules:
@@ -52,7 +51,7 @@ def run_settings(settings: Sequence[Sequence[Any]], probe: types.ModuleType) -> 
 
 
 def live_function(module: str, path: Sequence[str], code: types.CodeType) -> types.FunctionType:
-    """The only function at `path` with this code. SwapRefused if there is none, or if it is running."""
+    """Return the only function at `path` with this code. SwapRefused if it is missing or running."""
     where = ".".join((module, *path))
     if module not in sys.modules:
         raise SwapRefused(f"{module} is not loaded")
@@ -68,12 +67,14 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
     (live,) = found.values()
     own = live.__code__
     if sys.getrefcount(own) > _OWN_REFERENCES:
-        raise SwapRefused(f"{where} is at work, or there are several of it")
+        raise SwapRefused(f"{where} is running, or exists more than once")
     return live
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """The functions behind a name: the function itself, those of a method or property, and wrapped ones."""
+    """Yield the functions behind a name: the function itself, those of a method or property, and wrapped
+    ones.
+    """
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):
@@ -82,13 +83,13 @@ def _functions(named: Any) -> Iterator[types.FunctionType]:
 
 
 def _mangled(holder: Any, name: str) -> str:
-    """The name as a class's dict has it."""
+    """Return the name as it is in the class's dict."""
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 
 
 def keep_observations(probe: Any, holder: str, names: Sequence[str]) -> list[tuple[float, ...]]:
-    """Make the probe keep its observations; return the list that they go to: the time, then `names`.
+    """Make the probe keep its observations; return their list: the time, then `names`.
 
     `holder` is the name of the object in which the probe keeps the time.
     """

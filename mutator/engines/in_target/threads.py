@@ -10,7 +10,8 @@ _TASKS = Path("/proc/self/task")
 
 
 def others() -> list[str]:
-    """Names of all threads except the main one, including those of libraries; "" for threads without a name.
+    """Return the names of all threads except the main one, including those of libraries; "" if a thread has
+    no name.
 
     Python's threads have their names in the program, others those in the system.
     """

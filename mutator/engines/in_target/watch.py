@@ -1,8 +1,8 @@
 """Note lines of a tree that read a clock, draw without a seed, or start a thread.
 
-Standard library and numpy only. Replaces functions before the target imports them, so results of watched runs
-do not count. The line noted is the innermost one of the tree on the stack, even if a library made the call.
-Calls made while that library is imported are ignored.
+Standard library and numpy only. Functions are replaced before the target imports them, so results of watched
+runs are not used. The noted line is the innermost one of the tree on the stack, even if a library made the
+call. Calls made while that library is imported are ignored.
 """
 
 import builtins
@@ -35,7 +35,7 @@ _INSTALLED = f"{os.sep}site-packages{os.sep}"
 
 
 class Watcher:
-    """Watches the tree at `tree`, starting with `begin`."""
+    """Watches the tree at `tree` after `begin`."""
 
     def __init__(self, tree: str) -> None:
         self._tree = tree + os.sep
@@ -67,8 +67,8 @@ class Watcher:
         self._watch_seed(random.Random)
 
     def note(self, kind: str, what: str, *, direct: bool = False) -> None:
-        """Note the innermost line of the tree on the stack. With `direct`, only if this line itself made the
-        call.
+        """Note the innermost line of the tree on the stack; with `direct`, only if it made the call
+        itself.
         """
         frame: FrameType | None = sys._getframe()
         here, via = sys._getframe().f_code.co_filename, ""
@@ -90,7 +90,7 @@ class Watcher:
         self.noted.setdefault(place, told | {"what": what, "via": via})
 
     def look_for_threads(self, probe: Any, seen: list[Any]) -> None:
-        """Look for threads at observations 1, 2, 4, 8 and so on, counted by the length of `seen`."""
+        """Look for threads at observations 1, 2, 4, 8 and so on."""
         observe = probe.observe
 
         def observe_and_look(**values: Any) -> None:
@@ -101,7 +101,7 @@ class Watcher:
         probe.observe = observe_and_look
 
     def found(self) -> dict[str, Any]:
-        """The notes in order of first appearance, and the threads except the main one."""
+        """Return the notes in order of first appearance, and the threads except the main one."""
         names = sorted(self._threads.union(threads.others()))
         return {"noted": list(self.noted.values()), "threads": names}
 
@@ -215,7 +215,7 @@ class Watcher:
         def make(generator: Any, seed: Any = None) -> None:
             if seed is None:
                 self.note(DRAW, what)
-            self._quiet = True  # it asks for a seed even if it has one
+            self._quiet = True  # the constructor draws a seed even if it has one
             try:
                 kind.__init__(generator, seed)
             finally:
@@ -232,7 +232,7 @@ class _Watched:
     """A function with an action before each call.
 
     Like the built-in functions that it replaces, it does not become a method as a class attribute, and
-    copying it returns the same object.
+    copying returns the same object.
     """
 
     def __init__(self, original: Callable[..., Any], before: Callable[..., None]) -> None:
@@ -248,7 +248,7 @@ class _Watched:
 
 
 class _Like(type):
-    """Metaclass that makes a replacement class behave like the original."""
+    """Metaclass of a replacement class that behaves like the original."""
 
     like: type
 
@@ -260,10 +260,10 @@ class _Like(type):
 
 
 def _is_salted(thing: object) -> bool:
-    """Whether an object's hash may depend on PYTHONHASHSEED."""
+    """Return whether an object's hash may depend on PYTHONHASHSEED."""
     return not isinstance(thing, int | float)
 
 
 def _without_time(*args: Any, **_: Any) -> bool:
-    """Whether `time.localtime` or a similar function is called without a time."""
+    """Return whether `time.localtime` or a similar function is called without a time."""
     return not any(isinstance(one, int | float | tuple | time.struct_time) for one in args)

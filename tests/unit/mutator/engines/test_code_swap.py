@@ -86,7 +86,7 @@ def test_imports_of_injected_lines(changes: Changes) -> None:
         ("return [value", GUARDED + "\nelse:\n    y = 2.0", "does not ask the probe first"),
         ("return [value", GUARDED + "\ny = 2.0", "does not ask the probe first"),
         ("yield self.speed", 'if _fi.active("abc"):\n    self.speed = 0.0', "may be suspended"),
-        ("return y", GUARDED, "has a function in it that is changed"),
+        ("return y", GUARDED, "a function inside"),
         ("limit = 3.0", 'if _fi.active("abc"):\n    limit = 0.0', None),
     ],
 )

@@ -140,7 +140,7 @@ def test_chance_does_not_turn_neighbours_round() -> None:
 @pytest.mark.parametrize(
     ("picture", "said"),
     [
-        ("7.0", r"picture is float of shape \(\), and no grey or RGB picture of bytes"),
+        ("7.0", r"picture is float of shape \(\), not a grey or RGB picture of bytes"),
         ("1 / 0", "no image of toycar/sensing.py Sensor.sense: ZeroDivisionError"),
     ],
 )
