@@ -153,8 +153,8 @@ def _guarded_imports(path: str, lines: list[bytes]) -> tuple[str, ...]:
 def changed_functions(
     old: CodeType, new: CodeType, path: str, names: tuple[str, ...] = ()
 ) -> Iterator[tuple[tuple[str, ...], CodeType, CodeType]]:
-    """Yield names, old code and new code of the functions that differ between two bodies, of a module or of
-    its class `names`.
+    """Yield names, old code and new code of the functions that differ between two bodies of a module or
+    class.
 
     Raises NotSwappable if anything except functions differs.
     """
@@ -200,7 +200,6 @@ def _inner(code: CodeType) -> list[CodeType]:
 
 
 def same(one: CodeType, other: CodeType) -> bool:
-    """Return whether two functions do the same, regardless of their line numbers."""
     return essence(one) == essence(other)
 
 

@@ -78,7 +78,6 @@ class ForkEngine:
                 remove_folder(folder)
 
     def execute(self, job: Job, folder: Path) -> Execution:
-        """Run one job in the new scratch folder `folder`, which the caller deletes."""
         try:
             with raising_disk_full(self._work):
                 return self._execute(job, folder)

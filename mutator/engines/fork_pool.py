@@ -69,7 +69,6 @@ class Waiting:
         connection.settimeout(_LOOK_UP_S)
 
     def ask(self, request: dict[str, Any], patience_s: float) -> tuple[dict[str, Any], list[int]]:
-        """Send a request; return the reply and the file descriptors sent with it."""
         data = marshal.dumps(request)
         self._connection.settimeout(patience_s)
         try:

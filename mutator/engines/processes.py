@@ -129,7 +129,6 @@ def end(guarding: subprocess.Popen[bytes]) -> None:
 
 
 def tail(path: Path) -> str:
-    """Return the end of what a run printed; empty if the run deleted its log."""
     if not path.is_file():
         return ""
     with path.open("rb") as file:

@@ -47,8 +47,8 @@ class ReferenceEngine:
     """Runs each job in a fresh interpreter on its own tree; nothing else of the package can be imported
     there.
 
-    Parameters as in `Setting`. If `independent` or if a mutant changes files that decide what runs leave,
-    runs use nothing that other runs left, provided that the manifest supports this.
+    Parameters as in `Setting`. If the manifest supports it, runs of an `independent` engine use nothing that
+    other runs left. The same holds for mutants of files that decide what runs leave.
     """
 
     def __init__(
@@ -112,7 +112,6 @@ class ReferenceEngine:
         )
 
     def _prepare(self, job: Job, folder: Path, *, linked: bool = True) -> Path:
-        """Write a job's tree and request; return the path of the request."""
         tree, out = folder / "tree", folder / "out"
         self._base_tree.lay_out(tree, linked=linked)
         bytecode.put(job.files, tree)
@@ -222,7 +221,6 @@ class ReferenceEngine:
 
 
 def _steady(raised: Raised, folder: Path) -> Raised:
-    """Remove what differs between runs from the exception's texts."""
     stacks = tuple(
         tuple((steady(path, folder), line, column) for path, line, column in stack) for stack in raised.stacks
     )

@@ -1,5 +1,4 @@
-"""Files of checksummed blocks of bytes; each file has one process that appends. They hold patches, and series
-during a run.
+"""Files of checksummed blocks of bytes, each with one process that appends. They hold patches and series.
 
 A block consists of a head of 19 bytes, a key (text) and the content. The head is little-endian: the mark
 `FIB1`, a kind (1 byte), the length of the key (2) and of the content (4), and the first 8 bytes of the
@@ -33,9 +32,9 @@ class Block:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Blocks:
-    """The content of a block file: the intact blocks, and whether any are damaged.
+    """The content of a block file.
 
-    A last block that a kill cut short does not count as damage.
+    A last block that a kill cut short is not damage.
     """
 
     path: Path
@@ -57,7 +56,6 @@ class BlockWriter:
             self._fd = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
 
     def append(self, kind: int, key: str, data: bytes) -> None:
-        """Append one block."""
         self.extend(as_block(kind, key, data))
         if self._unsynced >= _BATCH:
             self.sync()
@@ -99,14 +97,12 @@ def as_block(kind: int, key: str, data: bytes) -> bytes:
 
 
 def read_blocks(path: Path) -> Blocks:
-    """Read a file and verify its blocks."""
     found = list(_verified(path.read_bytes()))
     blocks = tuple(block for block in found if block is not None)
     return Blocks(path=path, blocks=blocks, damaged=len(blocks) < len(found))
 
 
 def intact_blocks(path: Path) -> Iterator[Block]:
-    """Yield the intact blocks of a file."""
     yield from (block for block in _verified(path.read_bytes()) if block is not None)
 
 
@@ -126,7 +122,6 @@ def _verified(data: bytes) -> Iterator[Block | None]:
 
 
 def _block_at(data: bytes, at: int) -> Block | None:
-    """The intact block that begins at this offset, or None."""
     begin = at + _HEAD.size + _CHECK
     if begin > len(data):
         return None
@@ -150,7 +145,7 @@ def _intact(data: bytes, at: int) -> Iterator[int]:
 
 
 def _is_cut(data: bytes, at: int) -> bool:
-    """Whether the block that begins at this offset is cut off by the end of the file."""
+    """Return whether the block that begins at this offset is cut off by the end of the file."""
     rest = data[at:]
     if len(rest) < _HEAD.size + _CHECK:
         return _MARK.startswith(rest[: len(_MARK)])

@@ -11,7 +11,7 @@ FILE = "checks.json"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CheckResult:
-    """The result of one check: `golden S1`, `null mutant S1`, `canary`, `anchors`; `detail` describes it."""
+    """The result of one check: `golden S1`, `null mutant S1`, `canary`, `anchors`."""
 
     name: str
     passed: bool
@@ -19,13 +19,13 @@ class CheckResult:
 
 
 def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
-    """The packages that the golden runs loaded; empty before they have run."""
+    """Return the packages that the golden runs loaded; empty before they have run."""
     path = folder.path / FILE
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
-    """The mean CPU time of the golden runs in s; None before they have run."""
+    """Return the mean CPU time of the golden runs in s; None before they have run."""
     path = folder.path / FILE
     found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
     return found if isinstance(found, int | float) else None

@@ -36,7 +36,7 @@ def clear(path: Path) -> None:
 
 
 def finish_deletion(path: Path) -> bool:
-    """Wait for a command that may be deleting the run folder, then delete what was written in the meantime.
+    """Wait for a command that may be deleting the run folder, then delete what was written meanwhile.
 
     Return whether the folder is gone.
     """
@@ -64,7 +64,7 @@ def _delete(path: Path, files: Iterable[Path]) -> None:
 
 
 def check(path: Path) -> list[Path]:
-    """List the files of a run folder; MutatorError for a link, any other folder, or unknown content."""
+    """List the files of a run folder; MutatorError for a link, another folder, or unknown content."""
     if path.is_symlink():
         raise MutatorError(
             f"a link to {path.readlink()}",
@@ -85,24 +85,21 @@ def check(path: Path) -> list[Path]:
         names = [str(entry.relative_to(path)) for entry in sorted(strangers)]
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
         raise MutatorError(
-            f"holds what no run writes: {', '.join(names[:_SHOWN])}{more}",
+            f"contains files that no run writes: {', '.join(names[:_SHOWN])}{more}",
             where=path,
             expected="only files that a run writes",
-            remedy="move that elsewhere, or delete the folder yourself",
+            remedy="move them elsewhere, or delete the folder yourself",
         )
     return ours
 
 
 def _is_known(name: str) -> bool:
-    """Whether a run writes a file with that name, or may leave it half written."""
     whole = Path(name).with_name(complete(Path(name).name)).as_posix()
     return any(fnmatchcase(whole, pattern) for pattern in CONTENT)
 
 
 def _sorted_out(path: Path) -> tuple[list[Path], list[Path]]:
-    """Separate the files below `path` that a run wrote from everything else. Folders are left out, and links
-    are not followed.
-    """
+    """Separate the files below `path` that a run wrote from other entries. Links are not followed."""
     ours: list[Path] = []
     strangers: list[Path] = []
     for folder, folders, files in os.walk(path):

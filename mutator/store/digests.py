@@ -1,4 +1,4 @@
-"""`digests.json`: size and SHA-256 of every file of a run folder that counts, used to detect changes.
+"""`digests.json`: size and SHA-256 of every verified file of a run folder, used to detect changes.
 
 Only the folder's owner writes it. Before a file is rewritten, its old and new digest are announced;
 afterwards they are confirmed. If the process is killed in between, each file matches one of the two.
@@ -45,7 +45,7 @@ class Digest:
 
     @classmethod
     def of_file(cls, path: Path) -> "Digest | None":
-        """Compute the digest of a file; None if the file is missing."""
+        """Compute the digest of a file; None if it is missing."""
         if not path.is_file():  # never block on a pipe
             return None
         try:
@@ -60,12 +60,11 @@ class Digest:
             return None
 
     def is_of(self, found: "Digest | None") -> bool:
-        """Whether a file's current digest matches this one."""
         return found is not None and (found.size, found.sha256) == (self.size, self.sha256)
 
 
 def of_files(paths: Sequence[Path]) -> list[Digest | None]:
-    """The digest of each file, computed in parallel, because hashing releases the interpreter lock."""
+    """Compute the digest of each file in parallel, because hashing releases the interpreter lock."""
     sizes = [path.stat().st_size if path.is_file() else 0 for path in paths]
     if sum(sizes) < _WORTH_THREADS:
         return [Digest.of_file(path) for path in paths]
@@ -90,12 +89,11 @@ class DigestingFile:
 
     @property
     def digest(self) -> Digest:
-        """The digest of everything written so far."""
         return Digest(size=self._size, sha256=self._hash.hexdigest())
 
 
 def sha256(path: Path) -> str:
-    """The SHA-256 of a file, which may be larger than memory; '' if the file is missing."""
+    """Return the SHA-256 of a file, which may be larger than memory; '' if it is missing."""
     found = Digest.of_file(path)
     return found.sha256 if found else ""
 
@@ -105,7 +103,7 @@ class Ledger:
     """The content of `digests.json`.
 
     `files` by their names in the run folder; `rewriting`: files that are being rewritten, with their new
-    digests (None: deleted); `finished`: whether every experiment has a record that counts.
+    digests (None: deleted); `finished`: whether every experiment has a final record.
     """
 
     files: Mapping[str, Digest]
@@ -113,7 +111,7 @@ class Ledger:
     finished: bool = False
 
     def accepts(self, name: str, found: Digest | None) -> bool:
-        """Whether a file may have this digest. A file that is being rewritten may be old, new or missing."""
+        """Return whether a file may have this digest. A file being rewritten may be old, new or missing."""
         known = self.files.get(name)
         if name not in self.rewriting:
             return known.is_of(found) if known else found is None
@@ -122,7 +120,6 @@ class Ledger:
 
     @property
     def names(self) -> list[str]:
-        """The names of all files that are known or announced."""
         return [*self.files, *(name for name in self.rewriting if name not in self.files)]
 
 
@@ -135,7 +132,7 @@ def read(run: Path) -> Ledger:
     data = read_json(path, SCHEMA)
     as_written = path.read_bytes() == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
-        raise MutatorError("not as it was written", where=path, expected="its own checksum", remedy=remedy)
+        raise MutatorError("changed since it was written", where=path, expected="its own checksum", remedy=remedy)
     try:
         return Ledger(
             files={name: Digest(**value) for name, value in data["files"].items()},
@@ -143,11 +140,10 @@ def read(run: Path) -> Ledger:
             finished=data["finished"],
         )
     except (KeyError, TypeError, AttributeError) as err:
-        raise MutatorError(f"no ledger ({err})", where=path, remedy=remedy) from None
+        raise MutatorError(f"not a ledger ({err})", where=path, remedy=remedy) from None
 
 
 def write(run: Path, ledger: Ledger) -> None:
-    """Write the ledger atomically."""
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "finished": ledger.finished,
@@ -168,7 +164,7 @@ def rewriting(
     """Announce that the block changes these files (None: deletes them), and confirm the changes at the end.
 
     If the process is killed within the block, the folder still opens, and the files can be rewritten.
-    `finished` is as in `close_segments`, but counts from the start of the block.
+    `finished` is as in `close_segments`, but applies from the start of the block.
     """
     before = settled(run)
     before = replace(before, finished=before.finished if finished is None else finished)
@@ -179,13 +175,12 @@ def rewriting(
 
 
 def rewrite(run: Path, name: str, data: bytes) -> None:
-    """Rewrite a file of a run folder and its digest."""
     with rewriting(run, {name: Digest.of(data)}):
         write_atomic(run / name, data)
 
 
 def settled(run: Path) -> Ledger:
-    """The ledger without announcements. The files that a killed command left are taken as they are."""
+    """Return the ledger without announcements. Files that a killed command left are accepted."""
     known = read(run)
     files = dict(known.files)
     for name, coming in known.rewriting.items():
@@ -198,9 +193,9 @@ def settled(run: Path) -> Ledger:
 
 
 def close_segments(run: Path, *, finished: bool | None = None) -> None:
-    """Enter the complete segments into the ledger; a torn last line is not counted.
+    """Enter the complete segments into the ledger, without a torn last line.
 
-    `finished` says whether the run is finished from now on; None: as before. MutatorError for a damaged line.
+    `finished`: whether the run is finished from now on; None: as before. MutatorError for a damaged line.
     """
     before = settled(run)
     files = dict(before.files)
@@ -213,7 +208,6 @@ def close_segments(run: Path, *, finished: bool | None = None) -> None:
 
 
 def segments(run: Path) -> list[str]:
-    """The names of the segments in a run folder."""
     return sorted(f"{kind}/{path.name}" for kind in SEGMENTS for path in (run / kind).glob("*.jsonl"))
 
 

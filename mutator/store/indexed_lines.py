@@ -1,5 +1,4 @@
-"""Lines of checksummed files, indexed by experiment. All lines are verified together; each is parsed when it
-is read.
+"""Lines of checksummed files, indexed by experiment. All are verified together; each is parsed when read.
 
 For a million experiments this takes some 200 MB; their records as objects would take 5 GB.
 """
@@ -26,8 +25,8 @@ T = TypeVar("T")
 class IndexedLines(Mapping[str, T], Generic[T]):
     """Map each experiment to the object that `made` creates from its line, in order of first appearance.
 
-    `replaces(line, known)` decides whether a second line of an experiment counts, and may raise. MutatorError
-    for a damaged line; reading a line with unexpected content raises MutatorError, too.
+    `replaces(line, known)` decides whether a second line of an experiment replaces the first, and may raise.
+    MutatorError for a damaged line or unexpected content.
     """
 
     def __init__(
@@ -42,7 +41,7 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         self._made, self._checksums = made, checksums
         self._files = Files(list(paths))
         self._index: dict[str, int] = {}
-        self._last: tuple[str, T] | None = None  # the last object is kept, because some callers read it twice
+        self._last: tuple[str, T] | None = None  # kept, because some callers read it twice
         self._file, self._number, self._offset, self._length = (array(code) for code in "HLQL")
         for file, path in enumerate(self._files.paths):
             self._read(file, path, schema, replaces)
@@ -62,7 +61,6 @@ class IndexedLines(Mapping[str, T], Generic[T]):
             self._offset[known], self._length[known] = offset, len(data)
 
     def line(self, name: str) -> "Line":
-        """The line of an experiment."""
         at = self._index[name]
         file = self._file[at]
         data = self._files.read(file, self._offset[at], self._length[at])
@@ -91,7 +89,6 @@ class IndexedLines(Mapping[str, T], Generic[T]):
         return len(self._index)
 
     def problem(self, line: "Line") -> MutatorError:
-        """Return the error about an unexpected line."""
         return self._problem(line.path, line.number)
 
     def _problem(self, path: Path, number: int) -> MutatorError:
@@ -99,13 +96,11 @@ class IndexedLines(Mapping[str, T], Generic[T]):
 
 
 class Line:
-    """A line of a file."""
-
     def __init__(self, path: Path, number: int, data: bytes) -> None:
         self.path, self.number, self.data = path, number, data
 
     def content(self) -> dict[str, Any]:
-        """The object on the line; ValueError if the line is not a JSON object."""
+        """Return the object on the line; ValueError if the line is not a JSON object."""
         value = from_json(self.data)
         if not isinstance(value, dict):
             raise ValueError("no object")

@@ -31,7 +31,7 @@ def problems(
 ) -> Iterator[MutatorError]:
     """Yield every problem of a run folder that runs `shard`.
 
-    For a finished run that this machine has verified before, only the file bytes are compared, unless `anew`.
+    For a finished run that this machine has verified before, only file bytes are compared, unless `anew`.
     """
     key = ""
     if ledger is not None:
@@ -43,7 +43,7 @@ def problems(
                 MutatorError(
                     f"not named in {digests.FILE}",
                     where=path,
-                    expected="only what the finished run wrote",
+                    expected="only files that the finished run wrote",
                     remedy=_remedy(run, ""),
                 )
                 for path in strangers(run, ledger)
@@ -67,7 +67,7 @@ def problems(
 
 
 def content_key(run: Path) -> str:
-    """A key that identifies everything that counts in a finished run folder (`verified_runs`).
+    """Return a key of everything in a finished run folder that is verified (`verified_runs`).
 
     It is empty if the run is not finished or does not match its digests.
     """
@@ -78,20 +78,20 @@ def content_key(run: Path) -> str:
 
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
-    """The digests of all files that count, by their names in the run folder."""
+    """Return the digests of all verified files, by their names in the run folder."""
     names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
     return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
 
 
 def key_of(run: Path, found: Mapping[str, Digest | None]) -> str:
-    """The `verified_runs.key_of` of these files and the list of required files."""
+    """Return the `verified_runs.key_of` of these files and the list of required files."""
     ledger = Digest.of_file(run / digests.FILE)
     told = {**found, digests.FILE: ledger}
     return verified_runs.key_of({name: one.sha256 if one else None for name, one in told.items()})
 
 
 def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
-    """The ids and positions of the experiments that a run folder runs, in plan order.
+    """Return the ids and positions of the experiments that a run folder runs, in plan order.
 
     MutatorError if the plan has a duplicate, or if its length does not match its chunks.
     """
@@ -107,7 +107,7 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
         raise MutatorError(
             f"{len(places)} experiments",
             where=path,
-            expected=f"{sum(counts)}, as the chunks of {HEAD} have",
+            expected=f"{sum(counts)}, the total of the chunks in {HEAD}",
             remedy=_remedy(run, HEAD),
         )
     if shard is None:
@@ -119,21 +119,22 @@ def share(run: Path, head: Head, shard: Shard | None) -> dict[str, int]:
 def file_problems(
     run: Path, ledger: Ledger, digests_found: Mapping[str, Digest | None]
 ) -> Iterator[MutatorError]:
-    """Yield files that are missing or changed."""
     for name in ledger.names:
         found = digests_found[name]
         if ledger.accepts(name, found):
             continue
         if found is None:
             yield MutatorError(
-                "missing", where=run / name, expected=f"as {digests.FILE} has it", remedy=_remedy(run, name)
+                "missing",
+                where=run / name,
+                expected=f"the file named in {digests.FILE}",
+                remedy=_remedy(run, name),
             )
         else:
             yield from _changed(run, name, ledger.files[name], found)
 
 
 def _changed(run: Path, name: str, known: Digest, found: Digest) -> Iterator[MutatorError]:
-    """Yield the problems of a changed file: its damaged lines, if it consists of lines."""
     path = run / name
     if known.lines is not None:
         segment = read_segment(path)
@@ -161,7 +162,7 @@ def _told(one: Digest) -> str:
 
 def _remedy(run: Path, name: str) -> str:
     if name in WHOLE:
-        return "take it from a copy of the run folder, or run into a new one"
+        return "take it from a copy of the run folder, or use a new one"
     return f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
 
 
@@ -178,7 +179,7 @@ def _open_segments(run: Path, ledger: Ledger) -> Iterator[MutatorError]:
 
 
 def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
-    """Yield files that the ledger of a finished run does not name, in folders where it must name all."""
+    """Yield files that a finished run's ledger does not name, in folders where it must name all."""
     known = {*ledger.files, *ledger.rewriting}
     paths = [run / name for name in TOP]
     paths += [path for folder in SEALED for path in sorted((run / folder).rglob("*"))]
@@ -191,7 +192,7 @@ def strangers(run: Path, ledger: Ledger) -> Iterator[Path]:
 def id_problems(
     run: Path, head: Head, ledger: Ledger | None, planned: Collection[str]
 ) -> Iterator[MutatorError]:
-    """Yield unplanned, duplicate and missing records."""
+    """Yield a problem for each unplanned, duplicate or missing record."""
     patches = Patches(run) if ledger is not None else None
     stored = dict(patches.digests()) if patches is not None else {}
     for kind in digests.SEGMENTS:
@@ -249,9 +250,7 @@ def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[Mutato
 def _counted(
     segment: Segment, lines: _Lines, planned: Collection[str]
 ) -> Iterator[tuple[int, str | MutatorError, str, int]]:
-    """Yield line number, experiment, patch and hash of each record that counts in a segment, or a line's
-    problem.
-    """
+    """Yield line number, experiment, patch and hash of each final record, or a line's problem."""
     for number, line in lines:
         try:
             ending = ending_on(line)
@@ -263,7 +262,7 @@ def _counted(
                 f"a record of {ending.experiment_id}, which is not planned for this run",
                 where=segment.path,
                 line=number,
-                expected=f"experiments of {plan_file.EXPERIMENTS}, those of this shard",
+                expected=f"experiments of {plan_file.EXPERIMENTS} that belong to this shard",
                 remedy=_remedy(segment.path.parent.parent, ""),
             )
             yield number, problem, "", 0
@@ -274,9 +273,7 @@ def _counted(
 def patch_problems(
     patches: Patches, experiment_id: str, known: str, worker: str = ""
 ) -> Iterator[MutatorError]:
-    """Yield a problem if a stored patch is missing, or if its digest is not the record's `known` (empty: no
-    mutant).
-    """
+    """Yield a problem if a stored patch does not have the record's digest `known` (empty: no mutant)."""
     if not known:
         return
     data = patches.read(experiment_id)

@@ -1,9 +1,8 @@
-"""Files of checksummed lines; each file has one process that appends. Raw bytes are verified before any line
-is parsed.
+"""Files of checksummed lines, each with one process that appends. Bytes are verified before they are parsed.
 
-A line is a JSON object that begins with its checksum, `{"sum":"<16 hex>",...}`. The checksum is a shortened
-SHA-256 of the previous line's checksum and of all bytes after its own checksum. A changed, missing, duplicate
-or moved line is therefore detected by its number, and the lines after it can still be verified.
+A line is a JSON object that begins with its checksum, `{"sum":"<16 hex>",...}`: a shortened SHA-256 of the
+previous line's checksum and of all bytes after its own checksum. A changed, missing, duplicate or moved line
+is therefore detected by its number, and the lines after it can still be verified.
 """
 
 import json
@@ -29,9 +28,9 @@ _BODY = len(_KEY) + _WIDTH + len(_AFTER)
 class LineWriter:
     """Append checksummed JSON lines to a new file, synced in batches.
 
-    The first line is `head`, which has the schema; the file's name is added to it. `first` is called before
-    each sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed
-    again, and DiskFull is raised.
+    The first line is `head`, which has the schema, with the file's name added. `first` is called before each
+    sync, to sync the data to which the lines refer. If a line does not fit on the disk, it is removed again,
+    and DiskFull is raised.
     """
 
     def __init__(self, path: Path, head: Mapping[str, Any], first: Callable[[], None] = lambda: None) -> None:
@@ -103,7 +102,6 @@ class Segment:
     end: int
 
     def problem(self, number: int) -> MutatorError:
-        """Return the error about a damaged line."""
         run = self.path.parent.parent
         mend = f"`mutator verify {run} --repair` puts it aside; the same `mutator run` then fills the gap"
         return MutatorError(
@@ -115,7 +113,7 @@ class Segment:
         )
 
     def content(self, number: int) -> dict[str, Any]:
-        """The object on a line, without its checksum; MutatorError if the line is not an object."""
+        """Return the object on a line, without its checksum; MutatorError if the line is not an object."""
         try:
             value = json.loads(self.lines[number])
         except (ValueError, RecursionError):
@@ -126,14 +124,14 @@ class Segment:
         return value
 
     def body(self, number: int) -> bytes:
-        """A line without its checksum. This part is the same in every file."""
+        """Return a line without its checksum."""
         return self.body_of(self.lines[number])
 
     def body_of(self, line: bytes) -> bytes:
         return line[_BODY if self.checksums else 0 :]
 
     def check_head(self, schema: str) -> None:
-        """Raise MutatorError for a file with another schema, or one that was written under another name."""
+        """Raise MutatorError for another schema, or a file that was written under another name."""
         if 1 not in self.lines:
             return
         head = self.content(1)
@@ -145,12 +143,13 @@ class Segment:
                 f"was written as {head.get('file')}",
                 where=self.path,
                 line=1,
-                remedy="give it that name again, or put it back where it came from",
+                remedy="restore its name or its folder",
             )
 
     def objects(self, schema: str) -> Iterator[tuple[int, dict[str, Any]]]:
-        """Yield the number and content of each line after the head; MutatorError for damage, or another
-        schema or file name.
+        """Yield the number and content of each line after the head.
+
+        MutatorError for damage, or another schema or file name.
         """
         if self.damaged:
             raise self.problem(self.damaged[0])
@@ -161,7 +160,7 @@ class Segment:
 def read_segment(path: Path, data: bytes | None = None, *, checksums: bool = True) -> Segment:
     """Verify the lines of a file, whose bytes are `data` if already read.
 
-    Without `checksums` (an old run folder), every complete line counts as intact. MutatorError if the file is
+    Without `checksums` (an old run folder), every complete line is intact. MutatorError if the file is
     missing.
     """
     data = _read(path) if data is None else data
@@ -211,12 +210,10 @@ def intact_lines(path: Path, *, checksums: bool) -> Iterator[tuple[int, bytes]]:
 
 
 def bare_segment(path: Path, lines: Mapping[int, bytes] | None = None, *, checksums: bool) -> Segment:
-    """A segment that contains only these lines."""
     return Segment(path=path, checksums=checksums, lines=lines or {}, damaged=(), end=0)
 
 
 def _is_intact(last: bytes, line: bytes) -> bool:
-    """Whether a line matches its checksum, given the previous line's checksum `last`."""
     found = sha256(last + line[_BODY:]).hexdigest()[:_WIDTH].encode()
     return line[:_BODY] == b"".join((_KEY, found, _AFTER))
 
@@ -237,7 +234,7 @@ def _no_pipe(path: Path) -> Path:
 
 
 def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, Any]]) -> bytes:
-    """The bytes that a file at `path` would have after `values` were appended."""
+    """Return the bytes of a file at `path` after `values` were appended."""
     lines = [b""]
     for value in (_head(path, head), *values):
         lines.append(_line(lines[-1][_SUM], canonical(value).encode()[1:]))
@@ -245,7 +242,7 @@ def written(path: Path, head: Mapping[str, Any], values: Iterable[Mapping[str, A
 
 
 def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> None:
-    """Write a file that has a new head, then lines of other files, with new checksums."""
+    """Write a file with a new head, then lines of other files, with new checksums."""
     first = _line(b"", canonical(_head(path, head)).encode()[1:])
     with writing_atomic(path) as file:
         file.write(first)
@@ -257,7 +254,7 @@ def write_copy(path: Path, head: Mapping[str, Any], lines: Iterable[bytes]) -> N
 
 
 def _line(last: bytes, body: bytes) -> bytes:
-    """A line: its checksum, computed from `last` and `body`, then `body`, an object without its brace."""
+    """Make a line of its checksum and `body`, an object without its opening brace."""
     checksum = sha256(last + body).hexdigest()[:_WIDTH].encode()
     return b"".join((_KEY, checksum, _AFTER, body, b"\n"))
 
@@ -267,5 +264,4 @@ def _head(path: Path, head: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _name(path: Path) -> str:
-    """The file's name in its run folder: `records/0001-gw0.jsonl`."""
     return f"{path.parent.name}/{path.name}"

@@ -1,7 +1,7 @@
 """The patches of a run folder, packed. Most are stored as a difference from another patch.
 
 Each worker appends to its own file, `patches/<session>-<worker>.blocks`. Folders of earlier schemas have one
-file per patch, `patches/<xx>/<experiment>.patch`. The digest in a record identifies the patch that was run.
+file per patch, `patches/<xx>/<experiment>.patch`.
 """
 
 import zlib
@@ -29,7 +29,7 @@ class _Packer:
         self._whole = b""
 
     def block(self, data: bytes) -> tuple[int, bytes]:
-        """The kind and content of the block for the next patch."""
+        """Return the kind and content of the block for the next patch."""
         is_whole = self._count % _RUN == 0
         self._count += 1
         if is_whole:
@@ -60,7 +60,6 @@ class PatchWriter:
         self._blocks.extend(blocks)
 
     def sync(self) -> None:
-        """Sync the file, so that appended patches survive a power cut."""
         if self._blocks is not None:
             self._blocks.sync()
 
@@ -82,7 +81,7 @@ class _Whole:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """The place of a patch: its block, and the complete patch that it depends on or is itself."""
+    """A patch's file, its block, and the complete patch that it depends on or is itself."""
 
     path: Path
     block: Block
@@ -90,7 +89,7 @@ class _Place:
 
 
 def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
-    """The patch in a block; None if the complete patch on which it depends is lost."""
+    """Return the patch in a block; None if the complete patch on which it depends is lost."""
     try:
         if block.kind == WHOLE or whole is None:
             return whole.data if whole is not None and block.kind == WHOLE else zlib.decompress(block.data)
@@ -107,12 +106,11 @@ class Patches:
         self.run = run
 
     def __iter__(self) -> Iterator[str]:
-        """Yield every experiment that has a stored patch."""
         old = (path.stem for path in (self.run / FOLDER).glob("*/*.patch"))
         return iter(sorted({*self._places, *old}))
 
     def read(self, experiment_id: str) -> bytes | None:
-        """The newest patch of an experiment; None if it is missing or damaged."""
+        """Return the newest patch of an experiment; None if it is missing or damaged."""
         place = self._places.get(experiment_id)
         if place is None:
             path = self.old_file(experiment_id)
@@ -120,9 +118,7 @@ class Patches:
         return _unpacked(place.block, place.whole)
 
     def digests(self) -> Iterator[tuple[str, str]]:
-        """Yield each experiment that has a packed patch, and the patch's SHA-256 (empty if damaged). Newer
-        patches come later.
-        """
+        """Yield each experiment that has a packed patch, and its SHA-256 (empty if damaged), oldest first."""
         for path in filter(Path.is_file, self.files()):
             whole: _Whole | None = None
             for block in intact_blocks(path):
@@ -131,9 +127,9 @@ class Patches:
                 yield block.key, "" if data is None else digest(data)
 
     def file(self, experiment_id: str, worker: str = "") -> Path:
-        """The file that contains, or should contain, an experiment's patch.
+        """Return the file that contains, or should contain, an experiment's patch.
 
-        This is a file in which the patch is damaged; if there is none, the file of the `worker` in its
+        Without a stored patch, this is a damaged file; if there is none, the file of the `worker` in the
         record, if known.
         """
         place = self._places.get(experiment_id)
@@ -147,11 +143,10 @@ class Patches:
         return next(damaged, lost)
 
     def old_file(self, experiment_id: str) -> Path:
-        """The patch file of an experiment, in folders of earlier schemas."""
         return self.run / FOLDER / experiment_id[:2] / f"{experiment_id}.patch"
 
     def files(self) -> list[Path]:
-        """The block files, oldest session first, and anything else with the suffix of one."""
+        """Return the block files, oldest session first. A folder with such a name is included."""
         return sorted((self.run / FOLDER).glob(f"*{SUFFIX}"))
 
     @cached_property
@@ -172,7 +167,7 @@ def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
 
 
 def packed_patches(patches: Iterable[tuple[str, bytes]]) -> bytes:
-    """The blocks of patches that do not depend on earlier ones: a whole file or a part of one."""
+    """Return the blocks of patches that do not depend on earlier ones: a whole file or a part of one."""
     packer, blocks = _Packer(), []
     for experiment_id, data in patches:
         kind, content = packer.block(data)

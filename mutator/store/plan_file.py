@@ -42,13 +42,11 @@ Chunk = tuple[int, int, int]  # offset and length in bytes, number of experiment
 
 
 class SupportsWrite(Protocol):
-    """A file to which lines can be written."""
-
     def write(self, data: bytes, /) -> object: ...
 
 
 class PlanWriter:
-    """Write experiments, and each fault once, to the given files; `places` has the position of each chunk."""
+    """Write experiments, and each fault once, to the given files."""
 
     def __init__(self, experiments: SupportsWrite, faults: SupportsWrite) -> None:
         self.places: list[Chunk] = []
@@ -57,7 +55,7 @@ class PlanWriter:
         self._offset = 0
 
     def append(self, experiments: Sequence[Experiment], chunks: Iterable[int]) -> None:
-        """Write the experiments of the next chunks; the chunks have these lengths."""
+        """Write the experiments of the next chunks, which have these lengths."""
         lines = (canonical(_line(experiment)).encode() + b"\n" for experiment in experiments)
         for count in chunks:
             data = b"".join(islice(lines, count))
@@ -79,7 +77,6 @@ def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -
 
 
 def make_folder(run: Path) -> None:
-    """Create the folder of the plan's files."""
     with raising_disk_full(run):
         (run / "plan").mkdir(parents=True, exist_ok=True)
 
@@ -110,19 +107,17 @@ def _read(path: Path, lines: _Lines, made: Callable[[dict[str, Any]], _T]) -> It
 
 
 def read_faults(run: Path) -> dict[str, Fault]:
-    """The plan's faults by id."""
     path = run / FAULTS
     return {fault.id: fault for fault in _read(path, _lines(path), fault_from)}
 
 
 def fault_lines(run: Path) -> dict[str, bytes]:
-    """The lines of the plan's faults, unparsed, by id, which is the digest of the line."""
+    """Return the unparsed lines of the plan's faults by id, which is the digest of the line."""
     lines = (line.rstrip(b"\n") for line in lines_of(run / FAULTS))
     return {sha256(line).hexdigest()[:16]: line for line in lines}
 
 
 def lines_named(run: Path, names: Container[str]) -> Iterator[bytes]:
-    """Yield the lines of these experiments in plan order."""
     lines = lines_of(run / EXPERIMENTS)
     return (line.rstrip(b"\n") for name, line in zip(ids(run), lines, strict=True) if name in names)
 
@@ -135,7 +130,6 @@ def chunk_lines(run: Path, chunk: Sequence[int]) -> list[bytes]:
 
 
 def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> tuple[Experiment, ...]:
-    """The experiments of one chunk."""
     path, count = run / EXPERIMENTS, chunk[2]
     found = tuple(_experiments(path, ((None, line) for line in chunk_lines(run, chunk)), faults))
     if len(found) != count:
@@ -144,12 +138,11 @@ def read_chunk(run: Path, chunk: Sequence[int], faults: Mapping[str, Fault]) -> 
 
 
 def read_all(run: Path) -> tuple[Experiment, ...]:
-    """Every experiment in plan order."""
     return tuple(iterate(run))
 
 
 class ExperimentsInOrder(Sequence[Experiment]):
-    """Every experiment in plan order, read on access. A plan of a million experiments is never in memory."""
+    """Every experiment in plan order, read on access, because a plan may have a million experiments."""
 
     def __init__(self, run: Path, chunks: Sequence[Chunk]) -> None:
         self._run, self._chunks = run, chunks
@@ -179,13 +172,11 @@ class ExperimentsInOrder(Sequence[Experiment]):
 
 
 def iterate(run: Path) -> Iterator[Experiment]:
-    """Like `read_all`, but yield one experiment at a time."""
     path = run / EXPERIMENTS
     yield from _experiments(path, _lines(path), read_faults(run))
 
 
 def lines_of(path: Path) -> Iterator[bytes]:
-    """Yield the lines of a plan file, with newlines."""
     try:
         with no_pipe(path).open("rb") as file:
             yield from file
@@ -194,7 +185,6 @@ def lines_of(path: Path) -> Iterator[bytes]:
 
 
 def experiment_on(path: Path, number: int, line: bytes, faults: Mapping[str, Fault]) -> Experiment:
-    """Read the experiment on a line of the plan file at `path`."""
     [experiment] = _experiments(path, [(number, line)], faults)
     return experiment
 
@@ -208,7 +198,6 @@ def _experiments(path: Path, lines: _Lines, faults: Mapping[str, Fault]) -> Iter
 
 
 def ids(run: Path) -> Iterator[str]:
-    """Every experiment's id, in plan order."""
     path = run / EXPERIMENTS
     for number, line in _lines(path):
         found = _ID.match(line)
@@ -228,7 +217,7 @@ def problems(run: Path) -> Iterator[MutatorError]:
         if isinstance(fault, MutatorError):
             yield fault
         elif fault.id not in used:
-            got = f"fault {fault.id}, which no experiment has"
+            got = f"fault {fault.id}, which no experiment uses"
             yield MutatorError(got, where=defined, line=number, remedy=_REMEDY)
     experiments = _tried(planned, _lines(planned), partial(experiment_from, faults=faults))
     yield from (one for one in experiments if isinstance(one, MutatorError))
@@ -254,11 +243,11 @@ def _line(experiment: Experiment) -> dict[str, Any]:
 
 
 def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Experiment:
-    """Read the experiment on a line of the plan; MutatorError if its id does not match, or for an unknown
-    field.
-    """
+    """Read the experiment on a line; MutatorError if its id does not match, or for an unknown field."""
     if data["fault"] not in faults:
-        raise MutatorError(f"fault {data['fault']} is not in {FAULTS}, or was changed there", remedy=_REMEDY)
+        raise MutatorError(
+            f"fault {data['fault']} is missing from {FAULTS}, or was changed there", remedy=_REMEDY
+        )
     trigger = data["trigger"]
     values = {name: value for name, value in data.items() if name != "id"}
     read = {
@@ -275,14 +264,14 @@ def experiment_from(data: Mapping[str, Any], faults: Mapping[str, Fault]) -> Exp
     elif experiment.id != data["id"]:
         raise MutatorError(
             f"experiment {data['id']} has the content of {experiment.id}",
-            expected="the content that the id was made from",
+            expected="the content from which the id was made",
             remedy=_REMEDY,
         )
     return experiment
 
 
 def _is_named(data: Mapping[str, Any]) -> bool:
-    """Whether the id on a line of the plan matches the line's content, computed from the plain data.
+    """Return whether the id on a line of the plan matches the line's content, computed from the plain data.
 
     This takes half the time of `Experiment.id`, which handles missing and new fields.
     """
@@ -324,7 +313,7 @@ def _injection_from(data: Mapping[str, Any]) -> Injection:
 
 
 def _make(kind: type[_T], data: Mapping[str, Any], /, **read: Any) -> _T:
-    """Create a record from its line; some values were `read` already. Missing fields get their defaults."""
+    """Create a record from its line and the values `read` already. Missing fields get their defaults."""
     if unknown := sorted(data.keys() - _known(kind)):  # type: ignore[arg-type]
         raise MutatorError(
             f"{kind.__name__.lower()} has '{unknown[0]}', which this version of mutator does not know",

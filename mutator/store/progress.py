@@ -1,4 +1,4 @@
-"""The progress of a run: stage, completed steps, rate and remaining time."""
+"""The progress of a run."""
 
 import json
 import time
@@ -30,7 +30,6 @@ class Pace:
         self._began = time.monotonic()
 
     def at(self, done: int, *, detail: str = "", outcomes: Counter[str] | None = None) -> Progress:
-        """The progress after `done` steps."""
         elapsed = time.monotonic() - self._began
         per_s = (done - self._before) / elapsed if done > self._before and elapsed else None
         return Progress(
@@ -55,7 +54,6 @@ class Tail:
         self._pace = Pace(stage, total, len(self._labels))
 
     def poll(self) -> Progress:
-        """The current progress of the stage."""
         self._read()
         return self._pace.at(len(self._labels), outcomes=Counter(self._labels.values()))
 
@@ -81,5 +79,5 @@ class Tail:
 
 
 def label(status: str, outcome: str | None) -> str:
-    """The label under which Progress counts an experiment: its outcome or, without one, its status."""
+    """Return an experiment's label in Progress: its outcome or, without one, its status."""
     return str(outcome or status)

@@ -18,13 +18,12 @@ _RECORDS = ("activation", "error")  # fields that contain records
 
 
 def line_of(record: Record) -> dict[str, Any]:
-    """Convert a record to its line's content: `asdict` without a copy of every tuple."""
+    """Convert a record like `asdict`, but without copying every tuple."""
     line = {name: getattr(record, name) for name in _NAMES}
     return line | {name: asdict(line[name]) for name in _RECORDS if line[name] is not None}
 
 
 def record_from(data: Mapping[str, Any]) -> Record:
-    """Create the record from a parsed line."""
     activation = data["activation"]
     return Record(
         experiment_id=str(data["experiment_id"]),
@@ -61,7 +60,7 @@ class Ending(NamedTuple):
 
     @property
     def counts(self) -> bool:
-        """Whether the experiment is finished. A harness error does not count, because it is retried."""
+        """Whether the experiment is finished. A harness error is retried."""
         return self.status != Status.HARNESS_ERROR.value
 
 
@@ -74,7 +73,7 @@ _ONCE = (b'"experiment_id":', _OUTCOME, b'"patch":', b'"status":')
 def ending_on(line: bytes) -> Ending:
     """Read the ending from a record's line, ten times as fast as the whole record.
 
-    It raises ValueError, and the errors that `json.loads` and missing keys raise.
+    Raises ValueError, and the errors that `json.loads` and missing keys raise.
     """
     begin = line.find(_NAME) + len(_NAME)
     found = _END.match(line, line.find(_OUTCOME))
@@ -88,7 +87,6 @@ def ending_on(line: bytes) -> Ending:
 
 
 def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
-    """Read how each experiment ended."""
     for name in records:
         if isinstance(records, IndexedLines):
             line = records.line(name)
@@ -102,7 +100,7 @@ def endings(records: Mapping[str, Record]) -> Iterator[Ending]:
 
 
 def read_records(run: Path, folder: str = "records", *, checksums: bool = True) -> IndexedLines[Record]:
-    """The final record of each experiment that has one; a torn last line is skipped.
+    """Return the final record of each experiment that has one; a torn last line is skipped.
 
     Any other record supersedes a harness error. MutatorError for a damaged line and for a second record of
     one experiment; CheckFailed if the two differ.
@@ -112,7 +110,6 @@ def read_records(run: Path, folder: str = "records", *, checksums: bool = True) 
 
 
 def _replaces(line: Line, known: Line) -> bool:
-    """Whether a second record of an experiment supersedes the first."""
     record, before = (record_from(one.content()) for one in (line, known))
     if record.status is Status.HARNESS_ERROR:
         return False
@@ -122,13 +119,13 @@ def _replaces(line: Line, known: Line) -> bool:
 
 
 def read_timings(run: Path, *, checksums: bool = True) -> IndexedLines[dict[str, Any]]:
-    """The newest timing line of each experiment that has one."""
+    """Return the newest timing line of each experiment that has one."""
     paths = sorted((run / "timings").glob("*.jsonl"))
     return IndexedLines(paths, TIMINGS_SCHEMA, dict, lambda line, known: True, checksums=checksums)
 
 
 def second_record(path: Path, line: int, experiment_id: str, *, same: bool) -> MutatorError:
-    """Return the error about a second final record of an experiment."""
+    """Make the error about a second final record of an experiment."""
     if same:
         return MutatorError(
             f"a second record of experiment {experiment_id}",

@@ -1,7 +1,7 @@
 """The run folder: everything a campaign was given, and everything it produced.
 
 DIR/
-  digests.json          size and SHA-256 of every file that counts
+  digests.json          size and SHA-256 of every verified file
   run.json              schema, plan digest, choices, chunks, limits, canary, sources, stretches of work
   campaign.yaml         the campaign file as it was read
   plan.csv              the plan for people and spreadsheets
@@ -11,7 +11,7 @@ DIR/
   golden/<scenario>[+change]/                    fault-free runs: trace and record of the target
   patches/<session>-<worker>.blocks              source diff of each experiment that ran, appended
   records/<session>-<worker>.jsonl               one line per finished experiment, appended
-  timings/<session>-<worker>.jsonl               CPU and wall time, host: what may differ between runs
+  timings/<session>-<worker>.jsonl               CPU and wall time, host: may differ between runs
   proof/<session>-<worker>.jsonl                 records of the sample rerun on the reference engine
   series/index.js, series/*.js                   channels over time of each experiment, thinned and packed
   series/<session>-<worker>.blocks               the same as appended, until packed
@@ -20,7 +20,7 @@ DIR/
   results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be recreated
   results.json          digests of these tables and of their sources
   report/, exports/     also derived (`report`, `compare`, `export`)
-  damaged/              what a repair put aside (`verify --repair`)
+  damaged/              files that a repair put aside (`verify --repair`)
   owner.lock, workers/                           held by the running command and by its workers
   work/                                          scratch of running experiments
 """
@@ -71,7 +71,7 @@ CONTENT = (  # all files that a run folder may contain; * stands for any text, i
 
 
 class GoldenRun(NamedTuple):
-    """A fault-free run: its scenario with changes, and, if a run has several seeds, its seed (None: the run's
+    """A fault-free run: its scenario with changes, and its seed if a run has several (None: the run's
     seed).
     """
 
@@ -81,7 +81,7 @@ class GoldenRun(NamedTuple):
 
     @classmethod
     def of(cls, experiment: Experiment, *, several_seeds: bool) -> "GoldenRun":
-        """The golden run with which an experiment is compared."""
+        """Return the golden run with which an experiment is compared."""
         return cls(experiment.scenario, experiment.changes, experiment.seed if several_seeds else None)
 
     @property
@@ -92,12 +92,10 @@ class GoldenRun(NamedTuple):
 
     @classmethod
     def from_plain(cls, told: Sequence[Any]) -> "GoldenRun":
-        """Read a golden run from run.json."""
         scenario, changes, *seed = told
         return cls(scenario, tuple(changes), *seed)
 
     def plain(self) -> list[Any]:
-        """The golden run as stored in run.json."""
         return [self.scenario, list(self.changes), *([] if self.seed is None else [self.seed])]
 
 
@@ -136,12 +134,10 @@ class RunFolder:
 
     @staticmethod
     def exists(path: Path) -> bool:
-        """Whether there is a run folder at `path`."""
         return (path / HEAD).is_file()
 
     def problems(self, *, anew: bool = False) -> list[MutatorError]:
-        """Yield all differences from what was written. In folders of earlier schemas, not every change can be
-        detected.
+        """Return all differences from what was written. Earlier schemas do not reveal every change.
 
         With `anew`, earlier verifications are ignored (`verified_runs`).
         """
@@ -169,7 +165,7 @@ class RunFolder:
 
     @property
     def finished(self) -> bool:
-        """Whether every experiment has a record that counts, and the equivalence check is complete."""
+        """Whether every experiment has a final record, and the equivalence check is complete."""
         return self.verifiable and digests.read(self.path).finished
 
     @cached_property
@@ -178,7 +174,7 @@ class RunFolder:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Version of mutator, stretches of work, source digests, seed and reading, as plain data."""
+        """Version of mutator, stretches of work, source digests, seed and reading."""
         head = self.head
         stretches = [plain(stretch) for stretch in self.stretches]
         found = {"mutator": head["provenance"]["mutator"], "stretches": stretches}
@@ -190,7 +186,7 @@ class RunFolder:
         return read_stretches(self.head)
 
     def stretch_of(self, experiment_id: str) -> Stretch | None:
-        """The newest stretch of work that has a record of an experiment."""
+        """Return the newest stretch of work that has a record of an experiment."""
         files = self.path / "records"
         for stretch in reversed(self.stretches):
             for path in files.glob(f"{stretch.records}.jsonl"):
@@ -200,7 +196,7 @@ class RunFolder:
 
     @property
     def planned(self) -> int:
-        """The number of experiments planned for this folder: those of its shard, or all."""
+        """The number of experiments planned for this folder."""
         shard = self.shard
         if shard is None:
             return int(self.head["experiments"])
@@ -224,7 +220,6 @@ class RunFolder:
 
     @property
     def series_mb(self) -> int:
-        """The budget of series in MB."""
         chosen = self.head["choices"].get("series_mb")  # earlier runs do not have this key
         return SERIES_MB if chosen is None else int(chosen)
 
@@ -235,13 +230,11 @@ class RunFolder:
 
     @property
     def stop_note(self) -> str:
-        """A note about runs that end at their first terminal hazard; empty if they continue after it."""
         stops = self.head.get("canary", {}).get("after_hazard") == AfterHazard.STOP
         return STOP_NOTE if stops else ""
 
     @property
     def seeds(self) -> range:
-        """The seeds of all draws, one or several."""
         first, last = self.head.get("seeds", (self.head["seed"], self.head["seed"]))
         return range(first, last + 1)
 
@@ -252,29 +245,24 @@ class RunFolder:
 
     @property
     def scenarios(self) -> set[str]:
-        """The scenarios of the campaign."""
         return {one.scenario for one in self.goldens}
 
     def golden_of(self, experiment: Experiment) -> GoldenRun:
-        """The fault-free run with which an experiment is compared."""
         return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
 
     def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        """The folder of a fault-free run's trace and record."""
+        """Return the folder of a fault-free run's trace and record."""
         return self.path / "golden" / GoldenRun(scenario, changes, seed).key
 
     def golden_folder(self, experiment: Experiment) -> Path:
-        """The folder of an experiment's fault-free run."""
         return self.golden(*self.golden_of(experiment))
 
     @cached_property
     def patches(self) -> Patches:
-        """The source diffs of experiments that have run."""
         return Patches(self.path)
 
     def read_patch(self, experiment_id: str, record: Record | None) -> bytes | None:
-        """The stored diff of an experiment with that record; None if the experiment has not run, or had no
-        mutant.
+        """Return the stored diff of an experiment with that record; None if it has not run, or had no mutant.
 
         MutatorError if the diff is missing or does not match the record.
         """
@@ -286,19 +274,17 @@ class RunFolder:
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
-        """The records of the experiments or, with `proof`, of the equivalence check, by experiment id; parsed
-        on access.
+        """Return the records by experiment id, parsed on access. `proof` has those of the equivalence
+        check.
         """
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:
-        """A current record in the form in which this folder stores it: earlier schemas have no patches."""
+        """Convert a record to the form that this folder stores: earlier schemas have no patches."""
         return record if self.verifiable else replace(record, patch="")
 
     def timings(self) -> Mapping[str, dict[str, Any]]:
-        """The newest timing line of each experiment: what it cost and where it ran. By experiment id; parsed
-        like `records`.
-        """
+        """Return the newest timing line of each experiment by id, parsed on access."""
         return read_timings(self.path, checksums=self.verifiable)
 
     @property
@@ -307,7 +293,6 @@ class RunFolder:
         return plan_file.canary_from(self.path / HEAD, self.head["canary"])
 
     def share(self) -> dict[str, int]:
-        """The ids and positions of the experiments that run in this folder, in plan order."""
         return integrity.share(self.path, self.head, self.shard)
 
     @property
@@ -321,14 +306,16 @@ class RunFolder:
         return self.work / "base"
 
     def find(self, prefix: str) -> str:
-        """The only planned experiment whose id starts with `prefix`; MutatorError for none or several."""
+        """Return the only planned experiment whose id starts with `prefix`; MutatorError for none or
+        several.
+        """
         hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"
             raise MutatorError(
                 got,
                 where=self.path,
-                expected="an id, or the beginning of just one, of plan.csv",
+                expected="an id in plan.csv, or the beginning of only one",
                 remedy="give more of the id" if hits else "see plan.csv or results.csv",
             )
         return hits[0]

@@ -28,7 +28,6 @@ class Index:
 
     * `chunks`: (name, number of entries); `sizes`: the bytes of each entry, in order
     * `goldens`, `entries`: the number of the entry of each golden run and each experiment
-    * `golden_of`: the golden run of each experiment
     * `left_out`: how many experiments ended normally but have no series, mostly because of `budget_mb`
     """
 
@@ -42,8 +41,8 @@ class Index:
     budget_mb: int
 
     def plain(self) -> dict[str, Any]:
-        """The index as JSON types: ids joined into one text, ordered by worth; each entry as a difference
-        from the previous one.
+        """Convert to JSON types: ids joined into one text; each entry as a difference from the previous
+        one.
         """
         names, numbers = list(self.goldens), [*self.entries.values()]
         return {
@@ -61,7 +60,6 @@ class Index:
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> "Index":
-        """Create an index from the result of `plain`."""
         text, names = data["ids"], list(data["goldens"])
         ids = [text[i : i + _ID] for i in range(0, len(text), _ID)]
         golden_of = (names[code] for code in data["golden_of"])
@@ -78,7 +76,7 @@ class Index:
 
     @cached_property
     def places(self) -> list[tuple[str, int]]:
-        """The chunk of each entry, and where the entry starts in it."""
+        """The chunk of each entry, and the offset of the entry in it."""
         found, number = [], 0
         for name, count in self.chunks:
             sizes = self.sizes[number : number + count]
@@ -88,8 +86,6 @@ class Index:
 
 
 class SeriesFolder:
-    """Read the series of the run folder at `run`."""
-
     def __init__(self, run: Path) -> None:
         self.path = run / FOLDER
         self._chunk: tuple[str, bytes] = ("", b"")
@@ -105,25 +101,23 @@ class SeriesFolder:
         return (self.path / f"{INDEX}.js").is_file()
 
     def has(self, experiment_id: str) -> bool:
-        """Whether an experiment has a series; MutatorError for a damaged index."""
+        """Return whether an experiment has a series; MutatorError for a damaged index."""
         if self.kept(experiment_id).is_file():
             return True
         return self.index is not None and experiment_id in self.index.entries
 
     def is_readable(self, experiment_id: str) -> bool:
-        """Whether an experiment has an undamaged series."""
         try:
             return self.read(experiment_id) is not None
         except MutatorError:
             return False
 
     def kept_ids(self) -> list[str]:
-        """The experiments that have a series in a separate file."""
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage, with the
-        command that repairs it.
+        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage, with a
+        remedy.
         """
         try:
             return self._read(experiment_id)
@@ -145,7 +139,7 @@ class SeriesFolder:
         return golden, decode(self.entry(index.entries[experiment_id]), golden)
 
     def entry(self, number: int) -> bytes:
-        """The bytes of an entry of the index; MutatorError if its chunk is damaged."""
+        """Return the bytes of an entry of the index; MutatorError if its chunk is damaged."""
         assert self.index is not None
         name, at = self.index.places[number]
         if self._chunk[0] != name:
@@ -153,7 +147,7 @@ class SeriesFolder:
         return self._chunk[1][at : at + self.index.sizes[number]]
 
     def chunk(self, name: str) -> bytes:
-        """The bytes of a chunk; MutatorError if it is missing or damaged."""
+        """Return the bytes of a chunk; MutatorError if it is missing or damaged."""
         path = self.path / f"{name}.js"
         data = read_script(path)
         if name_of(data) != name:
@@ -161,23 +155,21 @@ class SeriesFolder:
         return data
 
     def kept(self, experiment_id: str) -> Path:
-        """The file of the series that a rerun of an experiment wrote."""
         return self.path / KEPT / f"{experiment_id}.js"
 
 
 def making_again(run: Path, experiment_id: str = "ID") -> str:
-    """The command that recreates the series of an experiment."""
+    """Return the command that recreates the series of an experiment."""
     return f"`mutator rerun {experiment_id} --trace --run {run}`"
 
 
 def putting_aside(run: Path) -> str:
-    """What to do about a damaged file of series."""
+    """Return the remedy for a damaged file of series."""
     aside = f"`mutator verify {run} --repair` puts it aside"
-    return f"{aside}; {making_again(run)} makes the series of an experiment"
+    return f"{aside}; {making_again(run)} recreates the series of an experiment"
 
 
 def read_index(path: Path) -> Index:
-    """Read an index; MutatorError if it is damaged."""
     remedy = putting_aside(path.parent.parent)
     try:
         data = json.loads(gzip.decompress(read_script(path)))
@@ -199,13 +191,12 @@ def write_index(path: Path, index: Index) -> None:
 
 
 def write_kept(path: Path, golden: bytes, faulty: bytes) -> None:
-    """Write the series of one experiment and its golden run into a separate file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     write_script(path, b"".join((_LENGTH.pack(len(golden)), golden, faulty)))
 
 
 def read_kept(path: Path) -> tuple[Series, Series]:
-    """Read (golden, faulty) from such a file; MutatorError if it is damaged."""
+    """Read (golden, faulty) of a rerun; MutatorError if the file is damaged."""
     data = read_script(path)
     try:
         (length,) = _LENGTH.unpack_from(data)

@@ -50,14 +50,14 @@ class Series:
     points: Points = field(default_factory=Points)
 
     def times(self, channel: int) -> np.ndarray:
-        """The times (s) at which a channel has values."""
+        """Return the times (s) at which a channel has values."""
         return self.t[:: self.every[channel]]
 
 
 def encode(one: Series, golden: Series | None = None) -> bytes:
     """Encode a run; the same run always gives the same bytes. Without `golden`, it is a golden run.
 
-    The times of a faulty run begin like those of `golden`.
+    A faulty run begins with the times of `golden`.
     """
     known = 0
     if golden is not None and len(one.t):
@@ -89,7 +89,7 @@ def decode(data: bytes, golden: Series | None = None) -> Series:
     try:
         return _decode(gzip.decompress(data), golden)
     except (ValueError, LookupError, TypeError, struct.error, EOFError, OSError, zlib.error) as err:
-        raise MutatorError(f"a damaged series ({err})", expected="bytes as they were written") from None
+        raise MutatorError(f"a damaged series ({err})", expected="unchanged bytes") from None
 
 
 def _decode(raw: bytes, golden: Series | None) -> Series:
@@ -116,7 +116,7 @@ def _decode(raw: bytes, golden: Series | None) -> Series:
 
 
 def _references(golden: Series | None, known: int, lengths: Iterable[int]) -> Iterator[np.ndarray]:
-    """Yield the reference values of each channel; there are none after the end of the golden run."""
+    """Yield the reference values of each channel; none exist after the end of the golden run."""
     for channel, length in enumerate(lengths):
         row = np.full(length, np.nan, dtype="<f4")
         if golden is not None:
@@ -138,9 +138,7 @@ def _unordered(numbers: np.ndarray) -> np.ndarray:
 
 
 def _words(numbers: np.ndarray) -> np.ndarray:
-    """The second differences of the numbers (modulo 2^32), as words that are small for small values of either
-    sign.
-    """
+    """Return the second differences (modulo 2^32) as words that are small for small values of either sign."""
     steps = np.diff(numbers, n=2, prepend=np.zeros(2, dtype="<i4"))
     return ((steps << 1) ^ (steps >> 31)).view("<u4")
 

@@ -1,6 +1,6 @@
 """Pack the series that workers appended into a run's chunks, the highest worth first, up to the budget.
 
-The same experiments with the same worth give the same files, independent of the workers and their order.
+The files do not depend on the workers and their order.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -52,7 +52,6 @@ class SeriesWriter:
         self._writer().extend(blocks)
 
     def sync(self) -> None:
-        """Sync the file, so that appended series survive a power cut."""
         if self._blocks is not None:
             self._blocks.sync()
 
@@ -67,7 +66,7 @@ class SeriesWriter:
 
 
 def series_block(experiment_id: str, one: EncodedSeries) -> tuple[int, str, bytes]:
-    """The kind, key and content of the block for an experiment's series."""
+    """Return the kind, key and content of the block for an experiment's series."""
     return EXPERIMENT, f"{experiment_id} {one.key}", one.faulty
 
 
@@ -86,7 +85,7 @@ class _Entry:
 
 @dataclass(frozen=True, slots=True)
 class _Found:
-    """Everything to pack: the entries of golden runs, and those of experiments with their golden runs."""
+    """The entries to pack: those of golden runs, and those of experiments with their golden runs."""
 
     goldens: dict[str, _Entry]
     experiments: dict[str, tuple[str, _Entry]]
@@ -97,15 +96,15 @@ class _Found:
 
 
 def segments(run: Path) -> list[Path]:
-    """The workers' files that are not packed yet."""
+    """Return the workers' files that are not packed yet."""
     return [path for path in sorted((run / FOLDER).glob(f"*{SUFFIX}")) if path.is_file()]
 
 
 def pack(run: Path, plan: str, worth: Worth, budget_mb: int, *, others: tuple[Path, ...] = ()) -> None:
     """Pack the series of a run folder, and those of the run folders `others`.
 
-    `worth` has every experiment that ended normally. Damaged series are left out. After a kill, you can pack
-    again.
+    `worth` has every experiment that ended normally. Damaged series are left out. Packing can be repeated
+    after a kill.
     """
     appended = segments(run)
     if not appended and not others:
@@ -139,7 +138,7 @@ def _remove_others(run: Path, index: Index) -> None:
 
 
 def _packed(folder: SeriesFolder) -> _Found:
-    """The series that were packed before, without damaged chunks."""
+    """Return the series that were packed before, without damaged chunks."""
     found = _Found({}, {})
     try:
         index = folder.index
@@ -162,7 +161,7 @@ def _packed(folder: SeriesFolder) -> _Found:
 
 
 def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
-    """The keys of each entry number. Runs with equal bytes share an entry."""
+    """Return the keys of each entry number. Runs with equal bytes share an entry."""
     found: dict[int, list[str]] = {}
     for name, number in entries.items():
         found.setdefault(number, []).append(name)
@@ -170,7 +169,7 @@ def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
 
 
 def _appended(path: Path) -> _Found:
-    """The series that a worker appended, without damaged blocks."""
+    """Return the series that a worker appended, without damaged blocks."""
     found = _Found({}, {})
     for block in read_blocks(path).blocks:
         read = _reader(path, block.offset, len(block.data))
@@ -220,7 +219,7 @@ def _written(folder: Path, plan: str, found: _Found, worth: Worth, budget_mb: in
 
 
 def _kept(found: _Found, worth: Worth, budget: int) -> list[str]:
-    """The experiments, best first, that fit into `budget` bytes together with their golden runs.
+    """Return the experiments, best first, that fit into `budget` bytes together with their golden runs.
 
     One that does not fit in one session does not fit in any later one.
     """
@@ -248,7 +247,6 @@ def _once(entries: Iterable[_Entry]) -> dict[str, _Entry]:
 
 
 def _chunks(folder: Path, entries: Iterable[_Entry]) -> Iterator[tuple[str, list[int]]]:
-    """Write entries into chunks; yield the name and entry sizes of each chunk."""
     parts: list[bytes] = []
     for entry in entries:
         parts.append(entry.read())

@@ -1,8 +1,7 @@
 """Store bytes in a script that a page opened from disk can load, with little overhead.
 
-Such a page cannot fetch or read files, but it can run scripts. The file is therefore a call with a string
-argument that has one character per byte. The page loads it as `x-user-defined`, an encoding in which each
-byte is a character.
+Such a page cannot read files, but it can run scripts. The script calls a function with a string of one
+character per byte. The page loads it as `x-user-defined`, an encoding in which each byte is a character.
 """
 
 import re
@@ -21,12 +20,10 @@ NAME_LENGTH = 16  # hex digits of the SHA-256 in a file's name
 
 
 def name_of(data: bytes) -> str:
-    """The file name for this content."""
     return digest(data)[:NAME_LENGTH]
 
 
 def size_in_script(data: bytes) -> int:
-    """The size of `data` once written in a script."""
     return len(data) + sum(map(data.count, _ESCAPED))
 
 
@@ -36,18 +33,17 @@ def write_script(path: Path, data: bytes) -> None:
 
 
 def script_of(name: str, data: bytes) -> bytes:
-    """The script that passes `data` to the page under a name."""
     text = _SPECIAL.sub(lambda found: _ESCAPED[found[0]], data)
     return b"".join((f'SeriesFile.loaded("{name}","'.encode(), text, _END))
 
 
 def read_script(path: Path) -> bytes:
-    """The data in a script; MutatorError if it is missing or invalid."""
+    """Return the data in a script; MutatorError if it is missing or invalid."""
     try:
         text = no_pipe(path).read_bytes()
     except OSError as err:
         raise MutatorError(f"cannot be read ({err.strerror})", where=path) from None
     call = _CALL.match(text)
     if call is None or call[1].decode() != path.stem or not text.endswith(_END):
-        raise MutatorError("damaged", where=path, expected="a file of series, as it was written")
+        raise MutatorError("damaged", where=path, expected="an unchanged file of series")
     return _ESCAPE.sub(lambda found: _PLAIN[found[0]], text[call.end() : -len(_END)])

@@ -26,5 +26,5 @@ class Shard:
         return cls(int(found[1]), int(found[2]))
 
     def has(self, chunk: int) -> bool:
-        """Whether the chunk of this index (from 0) belongs to this share."""
+        """Return whether the chunk of this index (from 0) belongs to this share."""
         return chunk % self.of == self.number - 1

@@ -12,9 +12,9 @@ from mutator.errors import MutatorError
 class Stretch:
     """What one session ran with.
 
-    `python` and `packages` must stay the same during a run, unless the user accepts other versions, which
-    `accepted` lists. The other fields are only recorded: golden runs show whether machines compute the same
-    results.
+    `python` and `packages` must stay the same during a run, unless the user accepts other versions
+    (`accepted`). The other fields are only recorded, because golden runs show whether machines compute the
+    same results.
     """
 
     python: str  # CPython 3.11.7
@@ -31,12 +31,13 @@ class Stretch:
     machines: Sequence[Mapping[str, Any]] = added(())
 
     def __str__(self) -> str:
-        """`CPython 3.11.7, Linux-6.1-x86_64, Intel(R) Xeon(R) Gold 6226R`."""
         return ", ".join(filter(None, (self.python, self.platform, self.cpu)))
 
 
 def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
-    """The stretches of work in a run.json, oldest first. An old run.json has only that of its planning."""
+    """Return the stretches of work in a run.json, oldest first. An old run.json has only that of its
+    planning.
+    """
     if "stretches" not in head:
         planned = head["provenance"]
         return (Stretch(python=planned["python"], packages=planned["packages"], platform=planned["machine"]),)
@@ -44,7 +45,9 @@ def read_stretches(head: Mapping[str, Any]) -> tuple[Stretch, ...]:
         return tuple(Stretch(**stretch) for stretch in head["stretches"])
     except TypeError as err:
         raise MutatorError(
-            f"no stretch of work ({err})", where="run.json", remedy="restore the file: it is damaged"
+            f"a damaged stretch of work ({err})",
+            where="run.json",
+            remedy="restore the file from a copy of the run folder",
         ) from None
 
 
@@ -59,7 +62,7 @@ def differences(before: Stretch, python: str, packages: Mapping[str, str | None]
 
 
 def told(stretches: Iterable[Stretch]) -> dict[str, str]:
-    """The software and machines of stretches, as text for people; several values are listed, oldest first."""
+    """Describe the software and machines of stretches; several values are listed, oldest first."""
     found: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, text in _texts(stretch).items():
@@ -86,7 +89,7 @@ def _blas_text(library: Mapping[str, Any]) -> str:
 
 
 def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
-    """The version of each package in these stretches; if there are several, all are listed."""
+    """Return the versions of each package in these stretches."""
     found: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, version in stretch.packages.items():

@@ -1,8 +1,7 @@
 """A cache of finished runs that this machine has verified, keyed by their bytes.
 
-The name of an entry is a digest of the SHA-256 of every file that counts and of the verifying version. A run
-with any changed byte is therefore verified in full, even if its digests were recomputed. An unwritable or
-damaged cache is ignored.
+An entry's name is a digest of the SHA-256 of every verified file and of the verifying version. A run with any
+changed byte is therefore verified in full, even if its digests were recomputed.
 """
 
 import json
@@ -18,23 +17,21 @@ from mutator._common.version import VERSION
 from mutator.errors import MutatorError
 
 _SCHEMA = "verified/1"
-_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # files that count, but are not in the ledger
+_OTHER_FILES = ("patches/*.blocks", "patches/*/*.patch")  # verified files that are not in the ledger
 Digests = Mapping[str, str | None]  # SHA-256 by name
 
 
 def other_files(run: Path) -> list[str]:
-    """The names of the files that count but are not in the ledger."""
     paths = (path for pattern in _OTHER_FILES for path in run.glob(pattern))
     return sorted(path.relative_to(run).as_posix() for path in paths)
 
 
 def key_of(found: Digests) -> str:
-    """The key of a run with these files."""
     return digest([_SCHEMA, VERSION, sorted(found.items())])
 
 
 def recall(key: str) -> dict[str, Any]:
-    """What the cache knows about a run; empty for an unknown run."""
+    """Return what the cache knows about a run; empty for an unknown run."""
     path = _path(key)
     try:
         data = json.loads(no_pipe(path).read_bytes())
@@ -47,7 +44,7 @@ def recall(key: str) -> dict[str, Any]:
 
 
 def remember(key: str, **facts: Any) -> None:
-    """Add to what the cache knows about a run."""
+    """Add to what the cache knows about a run. An unwritable cache is ignored."""
     data = recall(key) | facts
     path = _path(key)
     try:

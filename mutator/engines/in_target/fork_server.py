@@ -82,7 +82,6 @@ class Process:
         self.connection.sendall(data)
 
     def serve(self) -> None:
-        """Answer requests until the other end closes the socket."""
         answers: dict[str, Callable[..., dict[str, Any] | None]] = {
             "branch": self.branch,
             "advance": self.advance,
@@ -199,7 +198,6 @@ class Process:
         os._exit(0)
 
     def elsewhere(self, names: Iterable[str]) -> Any:
-        """Return the files outside the tree from which modules of these names were imported."""
         return child.imported_elsewhere(self.start["packages"], self.start["tree"], names)
 
     def touched(self) -> bool:

@@ -106,7 +106,7 @@ def _prctl(option: int, value: int) -> None:
 
 
 def _wait(pid: int, caller: int, deadline: float, space: Space | None) -> str:
-    """Wait until the child has ended (without reaping it) or must be stopped; return the reason."""
+    """Wait until the child has ended (unreaped) or must be stopped; return the reason."""
     handle, pause = os.pidfd_open(pid), _LOOK_S
     poll = select.poll()
     poll.register(handle, select.POLLIN)

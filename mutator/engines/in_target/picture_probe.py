@@ -1,4 +1,4 @@
-"""A replacement of the probe in a tree that is run for its pictures. Standard library and numpy only.
+"""A replacement for the probe in a tree that is run for its pictures. Standard library and numpy only.
 
 At the place of an image effect, the lines of every effect in ASKED are executed on the variables of that
 place, each on the same picture. The pictures before and after are written to the run's folder, and the run
@@ -23,7 +23,6 @@ _drawn = False
 
 
 def limit(max_steps: int) -> None:
-    """Let `observe` end the run after so many steps."""
     global _left
     _left = max_steps
 

@@ -181,7 +181,7 @@ def describe(err: BaseException, tree: str, probe: str | None) -> dict[str, Any]
 
 
 def text(thing: object) -> str:
-    """Convert an object to text. This may fail for the target's classes."""
+    """Convert an object to text, even if its own conversion fails."""
     try:
         return str(thing)
     except BaseException as why:
@@ -239,7 +239,6 @@ def imported_elsewhere(packages: Iterable[str], tree: str, names: Iterable[str])
 
 
 def imported_since(name: str) -> list[str]:
-    """Return module `name` and the modules imported after it, newest first."""
     names = []
     for newer in reversed(sys.modules):
         names.append(newer)
@@ -262,7 +261,7 @@ def third_party(known: set[str], packages: Iterable[str]) -> list[str]:
 def mapped() -> Iterator[str]:
     """Yield the names, relative to module folders, of files mapped into memory.
 
-    This shows libraries that are used without an import of their package.
+    They include libraries that are used without an import of their package.
     """
     folders = sorted((f"{folder}/" for folder in sys.path if folder), key=len, reverse=True)
     with suppress(OSError):

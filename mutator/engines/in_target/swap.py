@@ -19,7 +19,7 @@ class SwapRefused(Exception):
 
 
 def install(name: str, parts: Sequence[types.CodeType]) -> Any:
-    """Load the probe module `name` (dotted) from its code in parts, as an import would."""
+    """Load the probe module `name` from its code in parts, as an import would."""
     package, _, own = name.rpartition(".")
     module = types.ModuleType(name)
     module.__file__, module.__package__ = parts[0].co_filename, package
@@ -83,7 +83,6 @@ def _functions(named: Any) -> Iterator[types.FunctionType]:
 
 
 def _mangled(holder: Any, name: str) -> str:
-    """Return the name as it is in the class's dict."""
     private = isinstance(holder, type) and name.startswith("__") and not name.endswith("__")
     return f"_{holder.__name__.lstrip('_')}{name}" if private else name
 

@@ -12,8 +12,6 @@ _TASKS = Path("/proc/self/task")
 def others() -> list[str]:
     """Return the names of all threads except the main one, including those of libraries; "" if a thread has
     no name.
-
-    Python's threads have their names in the program, others those in the system.
     """
     threading: Any = sys.modules.get("threading")
     known = {one.native_id: one.name for one in threading.enumerate()} if threading else {}

@@ -101,7 +101,6 @@ class Watcher:
         probe.observe = observe_and_look
 
     def found(self) -> dict[str, Any]:
-        """Return the notes in order of first appearance, and the threads except the main one."""
         names = sorted(self._threads.union(threads.others()))
         return {"noted": list(self.noted.values()), "threads": names}
 
@@ -192,7 +191,6 @@ class Watcher:
         return _Watched(original, before)
 
     def _watch_seed(self, kind: Any) -> None:
-        """Watch generators of the standard library, which are seeded on creation."""
         original = kind.seed
 
         def seed(generator: Any, a: Any = None, version: int = 2) -> None:

@@ -66,10 +66,10 @@ def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
     path.mkdir() if stranger.endswith("/") else path.touch()
     before = contents(run)
     first = stranger.partition("/")[0] if "/" in stranger and not (run / stranger).is_file() else ""
-    with pytest.raises(MutatorError, match="holds what no run writes: ") as refused:
+    with pytest.raises(MutatorError, match="contains files that no run writes: ") as refused:
         clean(run)
     assert (first or stranger.split("/")[0]) in refused.value.got
-    assert "move that elsewhere" in str(refused.value)
+    assert "move them elsewhere" in str(refused.value)
     assert contents(run) == before
 
 
@@ -90,7 +90,7 @@ def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
             (folder / name).touch()
         with pytest.raises(MutatorError) as refused:
             clean(folder)
-        assert not names or refused.value.got == "holds what no run writes: a, b, c and 2 more"
+        assert not names or refused.value.got == "contains files that no run writes: a, b, c and 2 more"
         assert len(contents(folder)) == 1 + len(names)
 
 
@@ -120,12 +120,12 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
     (elsewhere / "S1").mkdir(parents=True)
     (elsewhere / "S1" / "trace.npz").touch()
     (run / "golden").symlink_to(elsewhere)
-    with pytest.raises(MutatorError, match="holds what no run writes: golden"):
+    with pytest.raises(MutatorError, match="contains files that no run writes: golden"):
         clean(run)
     (run / "golden").unlink()
     (run / "plots").mkdir()
     (run / "plots" / "x.svg").symlink_to(elsewhere / "S1" / "trace.npz")
-    with pytest.raises(MutatorError, match=r"holds what no run writes: plots/x\.svg"):
+    with pytest.raises(MutatorError, match=r"contains files that no run writes: plots/x\.svg"):
         clean(run)
     assert (run / "run.json").exists()
     assert (elsewhere / "S1" / "trace.npz").exists()

@@ -76,7 +76,7 @@ def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
     """A file with a valid checksum is refused if its content is not a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
-    with pytest.raises(MutatorError, match="no ledger"):
+    with pytest.raises(MutatorError, match="not a ledger"):
         digests.read(run)
 
 

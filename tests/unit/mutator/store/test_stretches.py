@@ -34,7 +34,7 @@ def test_an_old_head_has_what_it_was_planned_with() -> None:
 @pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
 def test_a_damaged_stretch_is_told(stretch: Any) -> None:
     """Missing or unknown keys, or a value that is no object, get a clear error."""
-    with pytest.raises(MutatorError, match=r"run\.json: no stretch of work"):
+    with pytest.raises(MutatorError, match=r"run\.json: a damaged stretch of work"):
         read_stretches({"stretches": [stretch]})
 
 
