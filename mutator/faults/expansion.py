@@ -1,4 +1,4 @@
-"""Expand specs into faults: draw values, convert units, check parameters against their model."""
+"""Expand specs into faults."""
 
 import math
 from collections.abc import Iterator
@@ -30,9 +30,8 @@ def expand(
     """Return the faults of `spec` in `reading` (None: the library's default), by variant and range.
 
     The same seed draws the same values for every reading, trigger, scenario and method. MutatorError
-    (file:line) for an unknown model or parameter, a wrong unit, a value out of range, a location outside the
-    target or in a forbidden place, and a change that the manifest does not define. Anchors are resolved
-    later, when a mutant is built.
+    (file:line) for an unknown model, parameter or change, a wrong unit, a value out of range, and a location
+    outside the target or in a forbidden place. Anchors are resolved later, when a mutant is built.
     """
     reading = reading or spec.readings.default
     spec.readings.check(reading)
@@ -43,8 +42,8 @@ def expand(
 def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
     """Return the values of `draw` for `seed`, in the draw's unit: one from each range, or the list unchanged.
 
-    The value from a range depends only on seed, key, position and earlier values. A duplicate is drawn again,
-    because equal faults have the same id. A real 0 is also drawn again, because it changes nothing.
+    The value from a range depends only on seed, key, position and earlier values. Duplicates are drawn again,
+    because equal faults have the same id. So is a real 0, because it changes nothing.
     """
     if draw.kind == "list":
         return draw.values
@@ -61,7 +60,7 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
 
 
 def _value(draw: Draw, index: int, u: float) -> int | float:
-    """Return the value at the fraction `u` of one range, rounded and capped as the draw specifies."""
+    """Return the value at the fraction `u` of one range, rounded and capped."""
     low, high = draw.ranges[index]
     if draw.kind == "integers":
         whole = int(low) + math.floor(u * (int(high) - int(low) + 1))
@@ -72,8 +71,6 @@ def _value(draw: Draw, index: int, u: float) -> int | float:
 
 
 class _Expander:
-    """Expands the variants of one spec in one reading."""
-
     def __init__(
         self, spec: FaultSpec, seed: int, reading: str, models: FaultModels, manifest: TargetManifest
     ) -> None:

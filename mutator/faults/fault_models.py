@@ -53,7 +53,7 @@ class ParamSchema:
 
     `unit` is None (a plain number), 'target' (the unit of the changed variable), or the unit that the
     template expects (`s`). `min` and `max` are inclusive, in that unit. With the value `neutral` the model
-    changes nothing. `choices` lists the terms of a `choice`, which the template writes verbatim.
+    changes nothing. `choices` lists the terms of a `choice`.
     """
 
     name: str
@@ -76,10 +76,7 @@ _TARGET = ParamSchema(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Example:
-    """Source code before and after one injection, tagged `example`.
-
-    It is documentation and runs as a test.
-    """
+    """Documentation that runs as a test: source before and after one injection, tagged `example`."""
 
     about: str
     injection: InjectionSpec
@@ -93,8 +90,8 @@ class FaultModel:
     """A fault model: template text, parameter schema, examples.
 
     `raises`: its injected lines raise on purpose, so an exception in them counts as a crash of the target.
-    `expression` is the template of a changed value, or None if the model cannot change an expression. `needs`
-    is what the templates need in addition to their parameters. Not every kind of anchor can provide it.
+    `expression` is the template of a changed value, or None if the model cannot change an expression. Not
+    every kind of anchor can provide what the templates need (`needs`).
     """
 
     name: str
@@ -110,7 +107,6 @@ class FaultModel:
     template_path: Path
 
     def param(self, name: str) -> ParamSchema | None:
-        """The parameter `name`, or None."""
         return next((p for p in self.params if p.name == name), None)
 
     @property
@@ -119,7 +115,7 @@ class FaultModel:
         return frozenset(_PARTS.findall(self.expression or ""))
 
     def changes_nothing(self, params: Mapping[str, object]) -> bool:
-        """Whether these values certainly change nothing.
+        """Return whether these values certainly change nothing.
 
         False if an optional bound is set, because a bound can change a value that is otherwise left alone.
         """
@@ -141,7 +137,6 @@ class FaultModels:
         return iter(self.models.values())
 
     def get(self, name: str) -> FaultModel:
-        """Return the model `name`; MutatorError that lists the known names."""
         if name not in self.models:
             raise MutatorError(
                 f"unknown fault model '{name}'",
@@ -245,7 +240,7 @@ def _load(path: Path) -> FaultModel:
         raise source.error(
             ("expression",),
             f"`expression` with kind {kind.value}",
-            expected="`expression` only with kind insert; a value template is one, and a guard has none",
+            expected="`expression` only with kind insert",
             remedy="delete `expression`",
         )
     template = _text(template_path)

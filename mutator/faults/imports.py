@@ -12,7 +12,7 @@ from mutator.targets.manifest import TargetManifest
 def check_import(manifest: TargetManifest, dotted: str) -> None:
     """Raise MutatorError unless `dotted` is a module of the target and a name defined in it.
 
-    The error has no file and line; the caller adds them.
+    The caller adds file and line to the error.
     """
     module, _, name = dotted.rpartition(".")
     base = module.replace(".", "/")
@@ -34,7 +34,7 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
 
 
 def _names(path: str, data: bytes, root: Path) -> list[str]:
-    """The names that a module defines or imports at top level, sorted."""
+    """Return the names that a module defines or imports at top level, sorted."""
     try:
         return sorted(_defined(ast.parse(data)))
     except (SyntaxError, ValueError, RecursionError) as error:

@@ -1,4 +1,4 @@
-"""Injections as written in YAML: a place, a fault model, parameters with units in their names."""
+"""Injections as written in YAML."""
 
 import math
 import re
@@ -20,7 +20,7 @@ _REFERENCE = re.compile(r"(-?)([a-z][a-z0-9_]*)\Z")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawn:
-    """A parameter whose value is the drawn value `name`, multiplied by `sign`.
+    """A parameter with the drawn value `name`, multiplied by `sign`.
 
     With `written_in` and `read_as`, the value is converted to the first unit and then misread as the second.
     """
@@ -45,7 +45,6 @@ class ParamSpec:
 
     @property
     def key(self) -> str:
-        """The key in the file."""
         return f"{self.name}_{self.unit}" if self.unit else self.name
 
 
@@ -98,7 +97,7 @@ class InjectionModel(StrictModel, title="An injection"):
     )
 
     def injection(self, source: Source, keys: Keys) -> InjectionSpec:
-        """Check the injection and convert it; errors point into `source` at `keys`."""
+        """Check and convert the injection; errors point into `source` at `keys`."""
         if self.unit is not None and self.unit != DIMENSIONLESS and self.unit not in units.UNITS:
             raise source.error(
                 (*keys, "unit"),
@@ -126,7 +125,6 @@ class InjectionModel(StrictModel, title="An injection"):
         )
 
     def _check_instance(self, kind: AnchorKind, source: Source, keys: Keys) -> None:
-        """Check that `where`, `call` and `every` fit the place and each other."""
         given = [name for name in ("where", "call", "every") if getattr(self, name) is not None]
         if given and kind in FIXED_ANCHORS:
             raise source.error(

@@ -41,7 +41,7 @@ def resolve(
             raise source.error(
                 param.keys,
                 f"'{param.value}' for '{param.key}' at `{spec.location.anchor.kind.value}`",
-                expected="none: the anchored expression is what changes",
+                expected="none: the anchored expression changes",
                 remedy="leave it out, or anchor at a statement",
             )
     for schema in model.params:
@@ -68,8 +68,6 @@ def resolve(
 
 
 class _Resolver:
-    """Checks the parameters of one injection."""
-
     def __init__(
         self,
         spec: InjectionSpec,
@@ -85,7 +83,7 @@ class _Resolver:
         self.drawn = value
 
     def schema(self, param: ParamSpec) -> ParamSchema:
-        """Return the schema of a parameter as written, after checking the dimension of its unit suffix.
+        """Return the schema of a parameter, after checking the dimension of its unit suffix.
 
         A constant that is not a number must have no unit suffix.
         """
@@ -111,10 +109,7 @@ class _Resolver:
         return schema
 
     def is_plain(self, param: ParamSpec, schema: ParamSchema) -> bool:
-        """Whether it is a constant but not a number.
-
-        Then it is a truth value, None, or a text other than the draw's name.
-        """
+        """Return whether it is a truth value, None, or a text other than the draw's name."""
         if schema.type != "constant" or param.unit:
             return False
         if not isinstance(param.value, str):
@@ -123,7 +118,7 @@ class _Resolver:
         return drawn is None or self.draw is None or drawn.name != self.draw.name
 
     def keys(self, schema: ParamSchema) -> list[str]:
-        """The keys that a spec can use for a parameter: one for each unit of the right dimension."""
+        """Return the keys that a spec can use: one for each unit of the right dimension."""
         unit = self.unit(schema)
         if unit is None:
             return [schema.name]
@@ -131,11 +126,11 @@ class _Resolver:
         return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
     def key(self, schema: ParamSchema) -> str:
-        """The key that errors show: the one in the template's unit."""
+        """Return the key in the template's unit, for errors."""
         return f"`{self.keys(schema)[0]}`"
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
-        """The template's unit for the parameter; None for a plain number."""
+        """Return the template's unit for the parameter; None for a plain number."""
         if schema.unit != TARGET_UNIT:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:

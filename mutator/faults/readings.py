@@ -19,14 +19,14 @@ class Readings:
     """The readings of a library, in order. The first is the default, which every variant must define."""
 
     names: tuple[str, ...]
-    about: tuple[str, ...]  # what each one means
+    about: tuple[str, ...]
 
     @property
     def default(self) -> str:
         return self.names[0]
 
     def check(self, name: str) -> None:
-        """Raise MutatorError, which lists the readings, for an unknown name."""
+        """Raise MutatorError for an unknown name."""
         if name not in self.names:
             raise MutatorError(
                 f"reading '{name}'",
@@ -54,13 +54,12 @@ class ReadingsModel(StrictModel, title="readings.yaml"):
 
     readings: dict[str, _DeclaredReadingModel] = Field(
         min_length=1,
-        description="Name -> reading. A name consists of small letters, digits and `_`. The first reading is "
-        "the default.",
+        description="Name -> reading. A name consists of lowercase letters, digits and `_`. "
+        "The first reading is the default.",
     )
 
 
 def load_readings(library: Path) -> Readings:
-    """Return the readings that a library declares, or `UNDECLARED`."""
     path = library / FILE
     if not path.is_file():
         return UNDECLARED
@@ -68,7 +67,10 @@ def load_readings(library: Path) -> Readings:
     for name in model.readings:
         if not _NAME.match(name):
             raise source.error(
-                ("readings", name), f"'{name}'", expected="small letters, digits and _", remedy="rename it"
+                ("readings", name),
+                f"'{name}'",
+                expected="lowercase letters, digits and _",
+                remedy="rename it",
             )
     about = tuple(reading.about.strip() for reading in model.readings.values())
     return Readings(names=tuple(model.readings), about=about)

@@ -25,8 +25,8 @@ _LARGEST = 1e15  # limit of a drawn number: whole numbers up to it are exact
 class Draw:
     """How a variant's values are made: one draw from each range, or a list.
 
-    Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` seeds the draw together
-    with the campaign's seed: equal keys and ranges draw equal values.
+    Values are in `unit`, the suffix of the YAML key (None for plain numbers). `key` and the campaign's seed
+    determine the draw: equal keys and ranges draw equal values.
     """
 
     key: str
@@ -41,7 +41,6 @@ class Draw:
 
     @property
     def count(self) -> int:
-        """The number of values."""
         return len(self.values) if self.kind == "list" else len(self.ranges)
 
     @property
@@ -69,11 +68,10 @@ class Variant:
     keys: Keys
 
     def injections(self, reading: str) -> tuple[InjectionSpec, ...]:
-        """The injections under `reading`, or under the default if the variant does not define `reading`."""
         return self.readings[self._written(reading)]
 
     def hold(self, reading: str) -> Hold | None:
-        """How long the fault stays active under `reading` or the default; None: as long as its trigger."""
+        """Return how long the fault stays active; None: as long as its trigger."""
         return self.holds[self._written(reading)]
 
     def _written(self, reading: str) -> str:
@@ -81,7 +79,6 @@ class Variant:
 
     @property
     def count(self) -> int:
-        """The number of faults it expands to."""
         return self.draw.count if self.draw else 1
 
 
@@ -98,17 +95,15 @@ class FaultSpec:
 
     @property
     def name(self) -> str:
-        """`<module>/<fault_type>`; its faults have `<module>/<fault_type>/<variant>` as `Fault.spec`."""
+        """`<module>/<fault_type>`. The `Fault.spec` of its faults is `<module>/<fault_type>/<variant>`."""
         return f"{self.module}/{self.fault_type}"
 
     @property
     def path(self) -> Path:
-        """The file it was read from."""
         return self.source.path
 
     @property
     def count(self) -> int:
-        """The number of faults it expands to, in each reading."""
         return sum(v.count for v in self.variants)
 
     def __iter__(self) -> Iterator[Variant]:
@@ -132,7 +127,7 @@ class SweepModel(StrictModel, title="A sweep"):
         return self
 
     def ranges(self) -> tuple[tuple[float, float], ...]:
-        """All ranges as (low, high); ValueError if the sweep is not valid."""
+        """Return all ranges as (low, high); ValueError if the sweep is not valid."""
         if len(self.first) != 2 or len(self.last) != 2 or not self.first[0] <= self.first[1]:
             raise ValueError("first and last as [low, high]")
         low, high = self.first
@@ -201,7 +196,7 @@ class _VariantBase(StrictModel, title="A variant"):
 class SpecModel(StrictModel, title="The file"):
     """A fault type of a module, in one or more variants."""
 
-    # `variants` depends on the readings of a library: see `spec_model`
+    # `spec_model` adds `variants`
 
     module: str = Field(description="The module of the controller that the fault is in.")
     fault_type: str = Field(
@@ -212,7 +207,7 @@ class SpecModel(StrictModel, title="The file"):
 
 @cache
 def spec_model(readings: Readings) -> type[SpecModel]:
-    """The schema of a library's spec files. Its variants have one key for each reading of the library."""
+    """Make the schema of a library's spec files. Its variants have one key for each reading."""
     keys: dict[str, Any] = {}
     for name, about in zip(readings.names, readings.about, strict=True):
         required = name == readings.default
@@ -250,7 +245,7 @@ def load_spec(path: Path, readings: Readings) -> FaultSpec:
 
 def _check_name(name: str, source: Source, keys: Keys) -> None:
     if not _NAME.match(name):
-        raise source.error(keys, f"'{name}'", expected="small letters, digits and _", remedy="rename it")
+        raise source.error(keys, f"'{name}'", expected="lowercase letters, digits and _", remedy="rename it")
 
 
 def _variant(spec: str, name: str, model: _VariantBase, readings: Readings, source: Source) -> Variant:

@@ -2,7 +2,7 @@
 
 Ids are made from a condition's canonical text (`gap <= 2.0 and closing > 0.0`). All numbers are floats and
 division cannot raise, so a condition is True or False for every observation. A formula yields a number; its
-language is the same, plus choices (`a / b if b > 0 else inf`).
+language also has choices (`a / b if b > 0 else inf`).
 """
 
 import ast
@@ -17,7 +17,7 @@ TIME = "t"  # s; every target has it
 _FUNCTIONS = ("abs", "min", "max", "hypot")
 _OVER_TIME = ("ever", "rate")  # whether a condition has held so far; a number's change per second
 _ARGUMENTS = {"abs": (1, 1), "hypot": (2, 2), "rate": (1, 1)}  # minimum, maximum; others take two or more
-_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not allowed as variables
+_NAMES = (*_FUNCTIONS, *_OVER_TIME, "inf", "True", "False")  # not variables
 _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 RESERVED = (*_FUNCTIONS, *_OVER_TIME, "inf", TIME)  # names in formulas that are not the target's values
@@ -45,8 +45,7 @@ def check_condition(
 def check_formula(text: str, variables: Collection[str], *, over_time: bool = False) -> str:
     """Check a formula and return its canonical text; errors as in `check_condition`.
 
-    Allowed: everything that `check_condition` allows inside a comparison, `inf`, and choices, `a if CONDITION
-    else b`.
+    Allowed: everything that `check_condition` allows inside a comparison, `inf`, and `a if CONDITION else b`.
     """
     return _checked(text, {}, variables, number=True, over_time=over_time)
 
@@ -62,7 +61,7 @@ def _checked(
     try:
         writer = _Writer(text, constants, variables, divide="({} / {})", over_time=over_time)
         canonical = writer.number(parse(text)) if number else writer.boolean(parse(text))
-        # the probe must be able to read and compile it, too
+        # the probe must be able to compile it, too
         if over_time:
             compile(canonical, "<condition>", "eval")
         else:
@@ -73,32 +72,28 @@ def _checked(
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """The variables of a checked condition or formula, in order of appearance."""
+    """Return the variables of a checked condition or formula, in order of appearance."""
     nodes = (node for node in ast.walk(parse(text)) if isinstance(node, ast.Name))
     found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
     return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))
 
 
 def to_code(text: str, *, number: bool = False) -> str:
-    """Convert a checked condition or formula to Python source that cannot raise.
-
-    Division goes through the probe's `_div`, and `math` must be available.
+    """Convert a checked condition or formula to Python source that cannot raise. It uses `_div` and
+    `math`.
     """
     writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
     return writer.number(parse(text)) if number else writer.boolean(parse(text))
 
 
 def evaluate(condition: str, values: Mapping[str, float]) -> bool:
-    """Evaluate a condition as the probe does, for these values of the variables; missing values are NaN."""
+    """Evaluate a condition as the probe does; missing values are NaN."""
     names = names_in(condition)
     return bool(_function(condition, names, False)(*(float(values.get(name, math.nan)) for name in names)))
 
 
 def divide(a: float, b: float) -> float:
-    """a / b by IEEE 754: infinite or NaN at b = 0, never an exception.
-
-    The probe contains the same function.
-    """
+    """Divide by IEEE 754: infinite or NaN at b = 0. The probe contains the same function."""
     if b:
         return a / b
     return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
@@ -131,7 +126,7 @@ def parse(text: str) -> ast.expr:
 
 
 class _Writer:
-    """Writes a parsed condition back as text.
+    """Writes a parsed condition as text.
 
     It rejects everything that is not allowed, booleans used as numbers, and numbers used as booleans.
     """
@@ -168,10 +163,11 @@ class _Writer:
             if len(node.args) != 1 or node.keywords:
                 raise self._refuse(f"{ast.unparse(node)!r}", "write ever(CONDITION)")
             return f"ever({self.boolean(node.args[0])})"
-        raise self._refuse(f"{ast.unparse(node)!r} is no truth value", "compare it with something: t <= 2.0")
+        raise self._refuse(
+            f"{ast.unparse(node)!r} is not a truth value", "compare it with something: t <= 2.0"
+        )
 
     def number(self, node: ast.expr) -> str:
-        """A formula: a number, or a choice between two."""
         if isinstance(node, ast.IfExp):
             return f"{self._term(node.body)} if {self.boolean(node.test)} else {self.number(node.orelse)}"
         return self._term(node)

@@ -31,7 +31,7 @@ def at_time(time_s: float, *, name: str = "random", hold_s: float | None = None)
 
 
 def time_of(trigger: Trigger) -> float | None:
-    """The time at which a trigger of `at_time` fires; None for any other."""
+    """Return the time at which a trigger of `at_time` fires; None for other triggers."""
     name, _, time = trigger.condition.partition(" >= ")
     try:
         return float(time) if name == "t" else None
@@ -42,7 +42,7 @@ def time_of(trigger: Trigger) -> float | None:
 def draw_time(seed: int, key: str, *, first_s: float, last_s: float, step_s: float) -> float:
     """Draw the time of a step from `first_s` to `last_s` (both included), each with the same probability.
 
-    `seed` and `key` determine the result: the start of a step, rounded to nine decimals for readability.
+    `seed` and `key` determine the result, which is rounded to nine decimals for readability.
     """
     first, last = round(first_s / step_s), round(last_s / step_s)
     if last < first:
@@ -70,12 +70,12 @@ def _read_condition(text: str, armed_after_s: float, variables: Collection[str])
 _Reader = Callable[[str, float, Collection[str]], Trigger | None]
 
 
-# in this order; a reader returns None for other kinds, and the last one raises MutatorError
+# a reader returns None for other kinds; the last one raises MutatorError
 READERS: tuple[_Reader, ...] = (_read_always, _read_time, _read_condition)
 TYPED = "a time in s, `always`, or a condition, e.g. 't > 3'"
 
 
 def read_trigger(text: str, armed_after_s: float, variables: Collection[str]) -> Trigger:
-    """Parse a trigger that a user typed (`TYPED`) over observed values; MutatorError for anything else."""
+    """Parse a trigger that a user typed (`TYPED`) over observed values; MutatorError if invalid."""
     found = (reader(text, armed_after_s, variables) for reader in READERS)
     return next(trigger for trigger in found if trigger is not None)

@@ -28,19 +28,18 @@ _OF_MANY: Mapping[str, np.ufunc] = {"min": np.minimum, "max": np.maximum}
 
 
 def holds(condition: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Whether a checked condition holds, for each step; `values` has the variables and the time (s)."""
+    """Return for each step whether a checked condition holds. `values` includes the time (s)."""
     with np.errstate(all="ignore"):
         return _for_each_step(_Evaluation(values).boolean(parse(condition)), values)
 
 
 def numbers(formula: str, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """The value of a checked formula for each step. Division by 0 is infinite or NaN, as in the probe."""
+    """Return a checked formula's value for each step. Division by 0 is infinite or NaN, as in the probe."""
     with np.errstate(all="ignore"):
         return _for_each_step(_Evaluation(values).number(parse(formula)), values)
 
 
 def _for_each_step(found: Any, values: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Expand a value that is the same in every step to an array."""
     shape = values[TIME].shape
     return found if np.shape(found) == shape else np.full(shape, found)
 

@@ -28,13 +28,12 @@ def check(formula: str, variables: Collection[str], step_s: float) -> None:
 
 
 def names_in(formula: str, variables: Collection[str]) -> tuple[str, ...]:
-    """The variables of a formula."""
     known = set(variables)
     return tuple(dict.fromkeys(name for name in _NAME.findall(formula) if name in known))
 
 
 def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) -> np.ndarray:
-    """How far each step is from violating the formula (below 0: violated).
+    """Return how far each step is from violating the formula (below 0: violated).
 
     `values` has an array for each variable, and the time of each step. If the formula looks n steps ahead,
     its value for step i is known at step i + n and stored there; the first n entries are `inf`. MutatorError
@@ -45,9 +44,8 @@ def robustness(formula: str, values: Mapping[str, np.ndarray], step_s: float) ->
     uneven = np.flatnonzero(~(np.abs(lengths - step_s) <= _SAME_LENGTH * step_s))
     if uneven.size:
         raise MutatorError(
-            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, and {formula!r} to judge it by",
-            expected=f"steps of {step_s:g} s, the manifest's `step_s`: a formula of signal temporal logic "
-            "counts steps",
+            f"a step of {lengths[uneven[0]]:g} s at {time[uneven[0]]:g} s, but {formula!r} counts steps",
+            expected=f"steps of {step_s:g} s, the manifest's `step_s`",
             remedy="record even steps, or write the hazard with `when`",
         )
     return _evaluated(formula, values, step_s)
@@ -100,7 +98,7 @@ def _parse(specification: Any, formula: str, names: Collection[str]) -> None:
 
 
 def _ahead(node: Any, interpreter: Any) -> int:
-    """How many steps a formula looks ahead; ValueError if unbounded."""
+    """Return how many steps a formula looks ahead; ValueError if unbounded."""
     kind = type(node).__name__
     if kind in _UNBOUNDED:
         raise ValueError(f"unbounded {kind.lower()}")

@@ -1,6 +1,6 @@
 """Conditions and formulas as JSON, which the report's page evaluates.
 
-A number, a truth value or a name (also `t` and `inf`) stands for itself. Anything else is a list of an
+A number, truth value or name (also `t` and `inf`) is written as itself. Anything else is a list of an
 operator and its operands: `+ - * / neg abs hypot min max rate`, `< <= > >= == !=`, `and or not ever`, and
 `if` with a condition and two numbers.
 """
@@ -32,7 +32,7 @@ _OPERATORS: Mapping[type[ast.AST], str] = {
 
 
 def tree(text: str, derived: Mapping[str, str]) -> Tree:
-    """The tree of a checked condition or formula; a `derived` value is replaced by its own formula."""
+    """Return the tree of a checked condition or formula; `derived` values are replaced by their formulas."""
     return _tree(parse(text), derived)
 
 

@@ -304,7 +304,7 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ("error_m:\n", "error_m:\n        decimals: 1\n", "11: 1 decimals; expected `decimals` only with"),
         ("error_m:\n", "error_m:\n        values: [1]\n", "10: 2 ways to draw"),
         ("error_m:\n", "other_m: {values: [1]}\n      error_m:\n", "9: 2 draws; expected one"),
-        ("module: sensor", "module: Sensor", "2: 'Sensor'; expected small letters"),
+        ("module: sensor", "module: Sensor", "2: 'Sensor'; expected lowercase letters"),
         ("hold: to_end", "hold: forever", "21: 'forever' for 'hold'; expected one of 'while' or 'to_"),
         (
             "written_in: kph",

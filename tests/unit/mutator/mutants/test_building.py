@@ -198,7 +198,7 @@ def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
 
 def test_triggers_are_checked_again(toy: Workspace) -> None:
     """A probe is not built with an invalid condition, or with a hold for a time that has no length."""
-    with pytest.raises(MutatorError, match="is no truth value"):
+    with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="expected hold_s with it"):
         build(toy, None, Trigger(name="x", condition="True", hold=Hold.FOR))
