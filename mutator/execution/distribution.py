@@ -1,4 +1,4 @@
-"""Distribute a session's pending work to processes: one interface, and one module for each way."""
+"""Distribute a session's pending work to processes."""
 
 from pkgutil import resolve_name
 from typing import Protocol
@@ -15,18 +15,17 @@ _DASK = "mutator.execution.cluster.dask_workers:ClusterWorkers"
 class Distributor(Protocol):
     """Distributes the pieces of a prepared session until none is left, or the session must stop.
 
-    When `run` returns, finished work is in the run folder. Workers or the distributor append it. Reasons for
-    an early end go to `session.problem` and `session.interrupted`.
+    When `run` returns, finished work is in the run folder. Reasons for an early end go to `session.problem`
+    and `session.interrupted`.
     """
 
     def run(self, session: Session) -> None: ...
 
 
 def distributor(cluster: str | None = None, *, insecure: bool = False) -> Distributor:
-    """The distributor for a cluster, or for this machine if there is none; MutatorError for an unusable
-    cluster.
+    """Make the distributor for a cluster or, without one, for this machine. Opens no connection.
 
-    Starts nothing and opens no connection.
+    MutatorError for an unusable cluster.
     """
     if cluster is None:
         if insecure:

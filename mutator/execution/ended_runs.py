@@ -10,7 +10,7 @@ from mutator.verification.equivalence import Proof
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ended:
-    """What every session of a finished run reports at its end."""
+    """The outcome that every session of a finished run reports."""
 
     outcomes: Counter[str]
     proof: Proof | None
@@ -18,7 +18,6 @@ class Ended:
 
 
 def keep_end(folder: RunFolder, ended: Ended) -> None:
-    """Store a finished run's outcome for later sessions."""
     if key := integrity.content_key(folder.path):
         proof = ended.proof and {"sampled": ended.proof.sampled, "same": ended.proof.same}
         told = {"outcomes": dict(ended.outcomes), "proof": proof, "seal": ended.seal}
@@ -26,7 +25,7 @@ def keep_end(folder: RunFolder, ended: Ended) -> None:
 
 
 def ended_before(folder: RunFolder) -> Ended | None:
-    """The stored outcome of a finished run whose verified bytes have not changed; else None."""
+    """Return the stored outcome of a finished run whose verified bytes have not changed; else None."""
     if not folder.finished or not (key := integrity.content_key(folder.path)):
         return None
     known = verified_runs.recall(key)

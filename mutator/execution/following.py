@@ -14,7 +14,6 @@ _NOTIFY_S = 0.5
 
 @contextmanager
 def followed(session: Session) -> Iterator[None]:
-    """Report progress while the session runs."""
     stages = _stages(session)
     stop = threading.Event()
 
@@ -33,9 +32,7 @@ def followed(session: Session) -> Iterator[None]:
 
 
 def _stages(session: Session) -> Iterator[Progress]:
-    """Yield the current progress at each request: of the experiments, then, once all have a record, of the
-    proof.
-    """
+    """Yield the current progress: of the experiments until all have a record, then of the proof."""
     folder = session.folder
     experiments = Tail("experiments", folder.path / "records", folder.planned)
     while (progress := experiments.poll()).done < progress.total:

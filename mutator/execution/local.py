@@ -44,7 +44,7 @@ def _without(*names: str) -> Iterator[None]:
 
 
 class _Silent:
-    """Pytest plugin that sends the terminal reporter's output to a buffer: the caller owns the terminal."""
+    """Pytest plugin that buffers the terminal reporter's output, because the caller owns the terminal."""
 
     def __init__(self) -> None:
         self.text = io.StringIO()

@@ -37,7 +37,7 @@ from mutator.store.stretches import Stretch, differences
 from mutator.verification import equivalence
 
 _SEGMENTS = {"records": SCHEMA, "timings": TIMINGS_SCHEMA, equivalence.FOLDER: SCHEMA}
-_MARK = f".{HEAD}."  # followed by a process id: the unfinished head, present from the beginning of a merge
+_MARK = f".{HEAD}."  # followed by a process id: marks an unfinished merge
 _REMEDY = "give the folder of each shard of one plan, once"
 
 
@@ -80,7 +80,7 @@ def merge(shards: Sequence[Path], out: Path, *, accept_versions: bool = False) -
 
 
 def _make_empty(out: Path) -> None:
-    """Make the folder to merge into. Delete what a killed merge left there."""
+    """Make the folder to merge into. Delete files that a killed merge left there."""
     if any(out.glob(f"{_MARK}*")):
         with owned(out, patience_s=0.0):
             cleaning.clear(out)
@@ -105,7 +105,7 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
         for key in ("plan", "sources"):
             if folder.head[key] != first.head[key]:
                 raise MutatorError(
-                    f"made from another {key.rstrip('s')} than {first.path}",
+                    f"made from a different {key.rstrip('s')} than {first.path}",
                     where=folder.path,
                     expected="shards of one plan, with the same target, templates and scenarios",
                     remedy=_REMEDY,
@@ -113,28 +113,28 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_numbers(folders: Sequence[RunFolder]) -> None:
-    """Check that each share of the plan is there exactly once."""
+    """Check that each share of the plan is present exactly once."""
     held: dict[int, RunFolder] = {}
     of: int | None = None
     for folder in folders:
         shard = folder.shard
         if shard is None:
             raise MutatorError(
-                "a whole run, no shard", where=folder.path, expected="the run of a shard", remedy=_REMEDY
+                "a whole run, not a shard", where=folder.path, expected="the run of a shard", remedy=_REMEDY
             )
         of = of or shard.of
         if shard.of != of:
             raise MutatorError(
                 f"shard {shard.number}/{shard.of}",
                 where=folder.path,
-                expected=f"one of {of} shards, as {folders[0].path}",
+                expected=f"one of {of} shards, like {folders[0].path}",
                 remedy=_REMEDY,
             )
         if shard.number in held:
             raise MutatorError(
                 f"shard {shard.number}/{of} a second time",
                 where=folder.path,
-                expected=f"another shard than {held[shard.number].path}",
+                expected=f"a different shard from {held[shard.number].path}",
                 remedy=_REMEDY,
             )
         held[shard.number] = folder
@@ -144,7 +144,6 @@ def _check_numbers(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_complete(folder: RunFolder) -> None:
-    """Check that every experiment of the share has a record that counts, and that the proof is complete."""
     records = folder.records()
     done = sum(one.counts for one in endings(records))
     if done < folder.planned:
@@ -157,7 +156,7 @@ def _check_complete(folder: RunFolder) -> None:
     equivalence.judge(folder, records)
     if left := len(equivalence.left(folder)):
         raise MutatorError(
-            f"unfinished: of its proof {counted(left, 'experiment')} left to run",
+            f"unfinished: {counted(left, 'experiment')} of its proof left to run",
             where=folder.path,
             expected="a finished shard",
             remedy="resume it with the command that started it",
@@ -174,14 +173,12 @@ def _check_goldens(folders: Sequence[RunFolder]) -> None:
                 f"the golden run {differ[0]} differs from the one in {folders[0].path}",
                 where=folder.path,
                 expected="machines on which the target computes the same bytes",
-                remedy="run this shard again on such a machine (run.json says what each ran with)",
+                remedy="run this shard again on such a machine (run.json lists the machines)",
             )
 
 
 def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretch]:
-    """The stretches of all shards. Unless accepted, Python and packages must equal those of the first shard's
-    last stretch.
-    """
+    """Yield all shards' stretches. Unless accepted, their versions must equal those of the first shard."""
     first = folders[0]
     for folder in folders:
         ends = zip(first.stretches[-1:], folder.stretches[-1:], strict=False)
@@ -198,7 +195,7 @@ def _stretches(folders: Sequence[RunFolder], *, accept: bool) -> Iterator[Stretc
 
 
 def _copy(folders: Sequence[RunFolder], out: Path, stretches: Sequence[dict[str, Any]]) -> None:
-    """Copy everything of the shards. The head comes last, so that an unfinished copy is not a run folder."""
+    """Copy all content. The head comes last, so that an unfinished copy is not a run folder."""
     first = folders[0]
     ledger = digests.settled(first.path)
     reviewed = all((folder.path / REVIEWED).exists() for folder in folders)
@@ -238,9 +235,8 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
 
 
 def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
-    """Pack the series of all shards, within the limit for one run.
-
-    Call this before the head is written, because nothing packs them later.
+    """Pack the series of all shards. Call this before the head is written, because nothing packs them
+    later.
     """
     shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):
@@ -256,7 +252,6 @@ def _rows(folder: RunFolder) -> Iterator[Row]:
 
 
 def _copy_segments(folder: RunFolder, out: Path) -> None:
-    """Copy a shard's segments into files whose names contain the shard."""
     assert folder.shard is not None
     for kind, schema in _SEGMENTS.items():
         if (folder.path / kind).is_dir():

@@ -1,4 +1,4 @@
-"""Describe a run's progress: stage, share done, rate, remaining time."""
+"""Describe a run's progress."""
 
 import time
 from collections import Counter
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from mutator.store.progress import Progress
 
-LINE_EVERY_S = 15.0  # a line now and then shows in a log that the run is alive
+LINE_EVERY_S = 15.0  # shows in a log that the run is alive
 
 STAGES = {
     "plan": "planning",
@@ -41,17 +41,16 @@ class Lines:
 
 
 def title(progress: "Progress") -> str:
-    """The name of the stage."""
     return STAGES.get(progress.stage, progress.stage)
 
 
 def count(progress: "Progress") -> str:
-    """The count, such as `12/60`; empty if there is nothing to count."""
+    """Return the count, such as `12/60`; empty if there is nothing to count."""
     return f"{progress.done}/{progress.total}" if progress.total else ""
 
 
 def rate(progress: "Progress") -> str:
-    """The rate if known: `1.5 a second`, or `24.0 a minute` for slow runs."""
+    """Return the rate if known: `1.5 a second`, or `24.0 a minute` for slow runs."""
     if progress.per_s is None:
         return ""
     if progress.per_s < 1.0:
@@ -60,17 +59,16 @@ def rate(progress: "Progress") -> str:
 
 
 def endings(outcomes: Counter[str]) -> str:
-    """The outcomes so far: `hazard 12, sdc 30, masked 2`."""
+    """Return the outcomes so far: `hazard 12, sdc 30, masked 2`."""
     return ", ".join(f"{name} {outcomes[name]}" for name in sorted(outcomes) if outcomes[name])
 
 
 def remaining(progress: "Progress") -> str:
-    """The remaining time of the stage, if known."""
     return "" if not progress.remaining_s else f"{duration(progress.remaining_s)} left"
 
 
 def duration(seconds: float) -> str:
-    """A duration: `45 s`, `3 min 20 s`, `2 h 05 min`."""
+    """Format a duration: `45 s`, `3 min 20 s`, `2 h 05 min`."""
     whole = round(seconds)
     if whole < 60:
         return f"{whole} s"

@@ -19,7 +19,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--campaign-out",
         metavar="DIR",
         type=Path,
-        help="its run folder; an interrupted run resumes there",
+        help="the run folder; an interrupted run resumes there",
     )
     group.addoption(
         "--require-reviewed",

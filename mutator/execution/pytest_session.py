@@ -40,7 +40,7 @@ class HarnessErrors(Exception):
 
 
 class CampaignItem(pytest.Item):
-    """Work of a campaign. Fails only for harness errors. The report of a known error has no traceback."""
+    """Work of a campaign. Fails only for harness errors; known ones have no traceback."""
 
     def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], style: Any = None) -> Any:
         if isinstance(excinfo.value, HarnessErrors | MutatorError):
@@ -94,12 +94,12 @@ class DealItem(CampaignItem):
 def _defect(err: Exception, chunk: str) -> str:
     lines = "".join(traceback.format_exception(err))
     return (
-        f"{chunk} was given up by a defect of mutator; please report it with these lines:\n{lines}".rstrip()
+        f"{chunk} failed because of a defect in mutator; please report it with these lines:\n{lines}".rstrip()
     )
 
 
 class LazyWorker:
-    """This process's Worker, made when the first chunk runs, because collecting needs none."""
+    """This process's Worker, made when the first chunk runs, because collection needs none."""
 
     def __init__(self, workspace: Workspace, assignment: Assignment) -> None:
         self._workspace = workspace
@@ -145,7 +145,7 @@ def configure(
 
 
 def _collect(session: pytest.Session, works: Sequence[Pending | Sample], worker: LazyWorker) -> bool:
-    """Make the session's items: chunks, then experiments of the proof. Nothing else is collected.
+    """Make the session's items: chunks, then experiments of the proof.
 
     The proof has the smallest items and comes last, so that the workers finish at about the same time.
     """
@@ -194,7 +194,7 @@ class WorkerSide:
 
 
 class Controller:
-    """Plugin of the controller: distributes chunks, or runs them itself without xdist, and notes problems."""
+    """Plugin of the controller: distributes chunks, or runs them itself without xdist."""
 
     def __init__(self, begun: Session | None = None) -> None:
         self.begun = begun
@@ -219,7 +219,7 @@ class Controller:
 
     def pytest_collection(self, session: pytest.Session) -> bool | None:
         if session.config.pluginmanager.hasplugin("dsession"):
-            return None  # xdist's hook, which collects nothing in this process
+            return None  # xdist's hook collects nothing in this process
         assert self.begun is not None
         begun = self.begun
         name = begun.worker_name("main")
@@ -252,7 +252,7 @@ class Controller:
 
 
 class PlainController(Controller):
-    """Controller for a pytest command of the user: also plans, checks, and reports the end."""
+    """Controller for a user's pytest command: also plans, checks, and reports the end."""
 
     def __init__(
         self,
@@ -335,7 +335,7 @@ class PlainController(Controller):
 
 
 def _told(config: pytest.Config) -> Notify | None:
-    """A function that reports stages without pytest items; None with `-q`."""
+    """Return a function that reports stages without pytest items; None with `-q`."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None

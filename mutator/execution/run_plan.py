@@ -42,7 +42,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
     loaded = load_campaign(workspace.campaign(campaign))
     if digest(loaded.source) != head["campaign_digest"]:
         raise MutatorError(
-            f"holds a run of campaign '{head['campaign']}' with another text than {loaded.path}",
+            f"holds a run of campaign '{head['campaign']}' whose text differs from {loaded.path}",
             where=out,
             remedy="use another folder, or give the run's own file: " + str(out / "campaign.yaml"),
         )
@@ -54,7 +54,7 @@ def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choic
             raise MutatorError(
                 f"{name} {value}",
                 where=out,
-                expected="what this run was planned with: "
+                expected="the value of this run's plan: "
                 + (f"no {name}" if frozen is None else f"{name} {frozen}"),
                 argument=name,
                 remedy=f"leave out `{name}`, or use another folder",

@@ -31,10 +31,10 @@ _KEPT = 32  # golden runs: those of the current seed and the next
 
 @dataclass(frozen=True, kw_only=True)
 class Finished:
-    """An experiment with its record. `out` (the target's output folder) is valid until the next result.
+    """An experiment with its record.
 
-    `out` is None without a mutant or a run. `mode`, `why` and `start` are those of the execution. `series` is
-    None if not requested or if the run failed.
+    `out` (the target's output folder) is valid until the next result; None without a mutant or a run.
+    `series` is None if not requested or if the run failed.
     """
 
     experiment: Experiment
@@ -51,11 +51,7 @@ class Finished:
 
 
 class Goldens:
-    """The channels of golden runs, loaded on request. Only the last few are kept in memory.
-
-    `folder_of` finds the output folder of an experiment's golden run. With `several_seeds`, each seed has
-    golden runs.
-    """
+    """The channels of golden runs, loaded on request. Only the last few are kept in memory."""
 
     def __init__(
         self,
@@ -71,18 +67,17 @@ class Goldens:
         self._ends = lru_cache(_KEPT)(lambda folder: load_judged(manifest, folder)[1].t_end is not None)
 
     def key(self, experiment: Experiment) -> str:
-        """The name of the experiment's golden run."""
         return GoldenRun.of(experiment, several_seeds=self._several_seeds).key
 
     def trace(self, experiment: Experiment) -> Trace:
         return self._trace(self.folder(experiment))
 
     def ends(self, experiment: Experiment) -> bool:
-        """Whether the golden run of an experiment reaches a terminal hazard."""
+        """Return whether the golden run of an experiment reaches a terminal hazard."""
         return self._ends(self.folder(experiment))
 
     def sampler(self, experiment: Experiment) -> Sampler:
-        """The sampler that makes series of runs compared with the experiment's golden run."""
+        """Return the sampler for series of runs compared with the experiment's golden run."""
         return self._sampler(self.folder(experiment))
 
 
@@ -195,7 +190,6 @@ class Runner:
     def _record(
         self, experiment: Experiment, built: Mutant, execution: Execution
     ) -> tuple[Record, Trace | None]:
-        """The record, and the trace of a run that ended normally."""
         if execution.status is not Status.OK or execution.probe is None:
             return self._failed(experiment, built, execution), None
         activation = activation_of(execution.probe)
@@ -211,7 +205,6 @@ class Runner:
     def _judged(
         self, experiment: Experiment, built: Mutant, execution: Execution, faulty: Trace, judged: Judged
     ) -> Record:
-        """The record of a run that ended normally, compared with golden."""
         activation = activation_of(execution.probe or {})
         reference, time = self.goldens.trace(experiment), self.manifest.time_channel
         if execution.stopped:
@@ -252,12 +245,11 @@ class Runner:
 
 
 def _problem_of(err: BadOutput) -> str:
-    """The problem with an output, without the path of its scratch folder."""
     return f"{Path(err.where or '').name}: {err.got}"
 
 
 def _not_by_the_fault(t_first: float | None, activation: Activation | None) -> str:
-    """Why the fault cannot have caused a difference from golden; empty if it can."""
+    """Return why the fault cannot have caused a difference from golden; empty if it can."""
     if t_first is None or (activation is not None and t_first >= activation.first):
         return ""
     when = "although the fault was never active" if activation is None else f"before {activation.first} s"
@@ -278,7 +270,7 @@ def _bare(
 
 
 def without_outcome(experiment_id: str, status: Status, detail: str) -> Record:
-    """The record of an experiment that has a status but no outcome."""
+    """Make the record of an experiment that has a status but no outcome."""
     return Record(
         experiment_id=experiment_id,
         status=status,

@@ -1,4 +1,4 @@
-"""Run a campaign: plan if needed, check, run what has no record yet, build the table.
+"""Run a campaign: plan if needed, check, run experiments without a record, build the table.
 
 `mutator run` and `pytest --campaign FILE --campaign-out DIR -n N` differ only in what starts pytest.
 """
@@ -32,8 +32,8 @@ def run_campaign(
 
     A frozen plan in `out` is used unchanged. Omitted `choices` are the frozen ones. `engine` is a name in
     `engines.kinds` (None: the fastest that pays off). With `reviewed`, only approved mutants run
-    (`mutator.review.gate`). A run continues only with the Python and packages that it began with, unless
-    `accept_versions`. Another thread calls `notify` about twice a second.
+    (`mutator.review.gate`). Without `accept_versions`, Python and packages must not change during a run.
+    Another thread calls `notify` about twice a second.
 
     Raises MutatorError for wrong input, other choices than the frozen ones, or a changed campaign file or
     target. Raises CheckFailed if something is not approved, or a preflight or the equivalence check fails.

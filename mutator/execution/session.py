@@ -54,11 +54,11 @@ class Summary:
     """The outcome of a session. `outcomes` is as in Progress."""
 
     planned: int  #: number of planned experiments in this folder
-    done: int  #: number of them with a record that counts
+    done: int  #: number of them with a final record
     ran: int  #: number of these that ran in this session
     outcomes: Counter[str]  #: number of experiments by outcome or status
     harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
-    problem: str  #: why the session ended early (disk full, a worker died); empty if it did not
+    problem: str  #: why the session ended early (disk full, a worker died); else empty
     interrupted: bool  #: whether a signal ended it
     results: Path | None  #: path of results.csv; None if the disk was full
     proof: equivalence.Proof | None  #: the equivalence check; None if none was needed
@@ -111,7 +111,7 @@ class Session:
         self._not_forked = "" if engine else not_worth_forking(self.manifest, experiments)
         self.problem = ""
         self.interrupted = False
-        self.working = ""  # who is working, if known
+        self.working = ""  # the present workers, if known
         self._began = time.monotonic()
         self._done_before = 0
         self._records: Mapping[str, Record] | None = None
@@ -150,18 +150,18 @@ class Session:
         self._records = None if left else records
 
     def note_machine(self, machine: Mapping[str, Any]) -> None:
-        """In run.json, add a participating machine to the current stretch of work."""
+        """Add a participating machine to the current stretch of work in run.json."""
         add_machine(self.folder, machine)
 
     def worker_name(self, name: str) -> str:
-        """A name for a worker's files that no session used before."""
+        """Return a name for a worker's files that no session used before."""
         kinds = ("records", "timings", equivalence.FOLDER)
         files = chain.from_iterable((self.folder.path / kind).glob("*.jsonl") for kind in kinds)
         taken = [int(number[0]) for path in files if (number := re.match(r"\d+", path.name))]
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
-        """Everything that an xdist worker needs, in types that execnet can send."""
+        """Return everything that an xdist worker needs, in types that execnet can send."""
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
@@ -239,25 +239,19 @@ class Session:
 
     @contextmanager
     def _noting_full_disk(self) -> Iterator[None]:
-        """Note a full disk as the session's problem. The records are complete, and the rest can be made
-        later.
-        """
+        """Note a full disk as the session's problem. The records are complete; the rest can be made later."""
         try:
             yield
         except DiskFull as err:
             self.problem = self.problem or str(err)
 
     def _close_segments(self, *, finished: bool | None = None) -> None:
-        """Record the digests of the files that this session's workers wrote. If a worker is still shutting
-        down, the next session does it.
-        """
+        """Record the digests of the workers' files, unless a worker is still ending."""
         if not wait_for_workers(self.folder.path):
             digests.close_segments(self.folder.path, finished=finished)
 
     def _pack_series(self) -> None:
-        """Pack the series that this session's workers wrote. If a worker is still ending, the next session
-        does it.
-        """
+        """Pack the workers' series, unless a worker is still ending. The next session then packs them."""
         folder = self.folder
         if segments(folder.path) and not wait_for_workers(folder.path):
             texts = Results.of_run(folder.path).texts()
@@ -277,7 +271,7 @@ def open_session(
     accept_versions: bool = False,
     notify: Notify | None = None,
 ) -> Iterator[Session]:
-    """Lock the run folder `out`, freeze the plan there unless it is, and yield the session.
+    """Lock the run folder `out`, freeze the plan if needed, and yield the session.
 
     Scratch folders are deleted before and after.
     """

@@ -46,8 +46,7 @@ def run_single(
 ) -> Single:
     """Run `experiment` into the folder `out`: golden/ (unless given), faulty/ and mutant.patch.
 
-    `faulty` is empty if the mutant was refused. It holds what the run left if the run failed. Raises
-    CheckFailed if the golden run fails.
+    `faulty` is empty if the mutant was refused. Raises CheckFailed if the golden run fails.
     """
     with _engine(manifest, out, limits or Limits()) as engine:
         reference = golden or _run_golden(workspace, engine, experiment, out / "golden")
@@ -80,7 +79,7 @@ def rerun(
 ) -> tuple[Single, bool]:
     """Rerun a planned experiment into the folder `out` (default: traces/<id>/ of the run folder).
 
-    The second value says whether the record equals the campaign's. It is True if there is none yet.
+    The second value is whether the record equals the campaign's, or there is none yet.
     """
     folder = RunFolder.open(run)
     manifest = manifest_of(workspace, folder)
@@ -99,7 +98,7 @@ def rerun(
 
 
 def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
-    """Whether a rerun's record equals the campaign's; True if there is none yet.
+    """Return whether a rerun's record equals the campaign's; True if there is none yet.
 
     Raises MutatorError if the patch of the campaign's record is damaged.
     """
@@ -110,7 +109,7 @@ def is_same(folder: RunFolder, known: Record | None, found: Record) -> bool:
 
 
 def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
-    """The target of a run; MutatorError if its sources have changed since the run."""
+    """Return the target of a run; MutatorError if its sources have changed since the run."""
     manifest = workspace.manifest(folder.head["target"])
     check_sources(folder.path, folder.head["sources"], sources(workspace, manifest, folder.scenarios))
     return manifest
@@ -118,7 +117,7 @@ def manifest_of(workspace: Workspace, folder: RunFolder) -> TargetManifest:
 
 @contextmanager
 def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[ReferenceEngine]:
-    """An engine that works in `out`. Its scratch folder is deleted afterwards."""
+    """Yield an engine that works in `out`. Its scratch folder is deleted afterwards."""
     check_requirements(manifest)
     make_folder(out)
     with alone_in(out):
@@ -133,7 +132,6 @@ def _engine(manifest: TargetManifest, out: Path, limits: Limits) -> Iterator[Ref
 
 
 def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Experiment, place: Path) -> Path:
-    """Run the experiment's scenario without a fault, and move the output to `place`."""
     job = Job(
         name="golden",
         scenario=workspace.scenario(experiment.scenario),
@@ -152,7 +150,7 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
 
 
 def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
-    """The runs, with their output moved to `out`/faulty and their diff next to it."""
+    """Yield the runs, with their output moved to `out`/faulty and their diff next to it."""
     for finished in runs:
         left = finished.out
         if left is None or not left.is_dir():  # a run may delete it

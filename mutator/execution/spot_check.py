@@ -14,7 +14,7 @@ from mutator.workspace import Workspace
 
 
 def drawn(folder: RunFolder, count: int) -> list[str]:
-    """Ids of `count` experiments that have a result, or of all if there are fewer.
+    """Draw the ids of `count` experiments that have a result, or of all if there are fewer.
 
     The draw has no seed, so nobody can predict it.
     """
@@ -24,7 +24,7 @@ def drawn(folder: RunFolder, count: int) -> list[str]:
 
 
 def driven_again(workspace: Workspace, folder: RunFolder, ids: Sequence[str]) -> Iterator[MutatorError]:
-    """Rerun these experiments, and yield those whose records differ. The run folder is not changed."""
+    """Rerun these experiments, and yield those whose records differ."""
     manifest, records = manifest_of(workspace, folder), folder.records()
     experiments = {experiment.id: experiment for experiment in plan_file.read_all(folder.path)}
     with ScratchFolder("mutator-verify-") as scratch:

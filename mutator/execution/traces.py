@@ -37,13 +37,13 @@ class Traces:
         return {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
-        """The campaign's record of an experiment; MutatorError if only its results are left."""
+        """Return the campaign's record of an experiment; MutatorError if only its results are left."""
         if experiment_id not in self._records:
-            raise MutatorError(f"there is no record of {experiment_id} any more", where=self.folder.path)
+            raise MutatorError(f"the record of {experiment_id} is gone", where=self.folder.path)
         return self._records[experiment_id]
 
     def of(self, experiment_id: str) -> tuple[Trace, Trace]:
-        """The fault-free and the faulty trace of an experiment that ended normally.
+        """Return the fault-free and the faulty trace of an experiment that ended normally.
 
         Reruns the experiment if no trace is stored. Raises MutatorError if that is impossible, or if the
         result differs from the campaign's.
@@ -61,7 +61,7 @@ class Traces:
         return load_trace(self.manifest, golden), load_trace(self.manifest, kept / "faulty")
 
     def sampled(self, experiment_id: str, *, drive: bool = False) -> tuple[Trace, Trace]:
-        """The fault-free and the faulty trace from an experiment's series, at most 20 values a second.
+        """Return the fault-free and the faulty trace from an experiment's series, at most 20 values a second.
 
         Without a series, the experiment is rerun if `drive` is set. Raises MutatorError if there is no
         series, it is damaged, or the rerun fails as in `of`.
@@ -81,7 +81,7 @@ class Traces:
         return sampled_traces(*found, self.manifest.time_channel)
 
     def is_kept(self, experiment_id: str) -> bool:
-        """Whether the stored trace is that of the campaign's run, and not of other sources."""
+        """Return whether the stored trace is that of the campaign's run, and not of other sources."""
         faulty = self.folder.path / "traces" / experiment_id / "faulty"
         if not (faulty / self.manifest.trace_file).is_file():
             return False

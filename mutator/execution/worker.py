@@ -34,8 +34,8 @@ from mutator.workspace import Workspace
 class Assignment:
     """The role of a worker.
 
-    `name` makes its file names in the run folder unique. `engine` runs its chunks. `parent` is the process
-    that it must not outlive (None: the worker is the command itself).
+    `name` makes its file names in the run folder unique. `parent` is the process that it must not outlive
+    (None: the worker is the command itself).
     """
 
     run: Path
@@ -117,7 +117,6 @@ class Worker:
         return errors
 
     def close(self) -> None:
-        """End the engine; sync and close this worker's files."""
         self._runner.engine.close()
         for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
             if writer is not None:
@@ -170,7 +169,7 @@ class Worker:
 
 
 def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
-    """The line in `timings/` of an experiment that `worker` ran on this machine."""
+    """Return the line in `timings/` of an experiment that `worker` ran on this machine."""
     return {
         "experiment_id": finished.experiment.id,
         "cpu_s": finished.cpu_s,
@@ -183,7 +182,7 @@ def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
 
 
 def dying_python(parent: int) -> list[str]:
-    """The start of a Python command line. From its start, the process dies with `parent`."""
+    """Return the start of a Python command line. From its start, the process dies with `parent`."""
     return [sys.executable, "-I", "-S", guard.__file__, str(parent), sys.executable]
 
 

@@ -150,7 +150,7 @@ def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> No
     [
         (("1/2",), "no folder of shard 2/2"),
         (("1/2", "1/2"), "shard 1/2 a second time"),
-        (("1/2", "whole"), "a whole run, no shard"),
+        (("1/2", "whole"), "a whole run, not a shard"),
     ],
 )
 def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str) -> None:

@@ -1,7 +1,8 @@
 """Decide which worker runs which piece of work next. Uses no network and starts nothing.
 
-Pieces are cut on demand, sized by measured times, so that all workers finish at about the same time. A worker
-gets work with the golden run that it already has, if possible. Near the end, idle workers repeat late pieces.
+Pieces are cut on demand, sized by measured times, so that all workers finish at about the same time. If
+possible, a worker gets work with the golden run that it already has. Near the end, idle workers repeat late
+pieces.
 """
 
 import time
@@ -29,7 +30,7 @@ _PROOF_S = 20.0  # idle time before a worker may check its own runs; longer if r
 
 @dataclass
 class _Out:
-    """A piece in progress: its worker, its start, and its expected duration."""
+    """A piece in progress."""
 
     piece: Piece
     worker: str
@@ -82,21 +83,18 @@ class Board:
 
     @property
     def is_empty(self) -> bool:
-        """Whether all work is done."""
         return not (self._out or self._proof or self._waiting)
 
     @property
     def ran_all(self) -> bool:
-        """Whether only the proof is left."""
         outstanding = any(out.piece.kind is Kind.RUN for out in self._out.values())
         return not (self._waiting or outstanding)
 
     def drop_proof(self) -> None:
-        """Drop the proof, because no record needs one."""
         self._proof.clear()
 
     def take(self, worker: str, *, ahead: bool = False) -> Piece | None:
-        """The next piece for a worker, or None.
+        """Return the next piece for a worker, or None.
 
         With `ahead`, the piece waits at the worker while another one runs there. Near the end no piece is
         given ahead.
@@ -195,8 +193,8 @@ class Board:
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
     def _group_for(self, worker: str) -> Group | None:
-        """The group with the worker's golden run if it has work; else the one with the most work left per
-        worker.
+        """Return the group with the worker's golden run or, without work there, the one with the most work
+        per worker.
         """
         own = self._groups.get(self._at.get(worker, ""))
         if own is not None and self._has_for(own, worker):
@@ -209,13 +207,11 @@ class Board:
         return bool(group.left) or any(self._may_try(worker, piece) for piece in group.again)
 
     def _may_try(self, worker: str, piece: Piece) -> bool:
-        """Whether the worker may run the piece: the piece has not killed it, or has killed every worker
-        present.
-        """
+        """Return whether the piece has not killed the worker, or has killed every worker present."""
         return worker not in piece.died_at or self._slots.keys() <= set(piece.died_at)
 
     def _proof_for(self, worker: str) -> Piece | None:
-        """An experiment of the proof that another worker or an earlier session ran.
+        """Return an experiment of the proof that another worker or an earlier session ran.
 
         A worker gets its own only if it is alone, or after a long idle time.
         """

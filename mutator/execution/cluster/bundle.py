@@ -36,8 +36,6 @@ _ROOT = "{root}/"
 
 @dataclass(frozen=True, slots=True)
 class Bundle:
-    """A bundle in transit, and its digest."""
-
     data: bytes
     digest: str
 
@@ -78,7 +76,7 @@ def _parts(workspace: Workspace, folder: RunFolder, engine: str) -> Iterator[tup
 
 
 def _read_in_root(manifest: TargetManifest) -> list[Path]:
-    """Files outside the tree that the arguments of a run name."""
+    """Return the files outside the tree that the arguments of a run name."""
     named = [word.removeprefix(_ROOT) for word in manifest.entry_args if word.startswith(_ROOT)]
     places = [manifest.root / name for name in named]
     return sorted(path for place in places for path in (place, *place.rglob("*")) if path.is_file())
@@ -107,7 +105,6 @@ class Site:
 
     @cached_property
     def meta(self) -> dict[str, Any]:
-        """The content of meta.json."""
         return read_json(self.place / "meta.json", SCHEMA)
 
     @cached_property
@@ -121,16 +118,13 @@ class Site:
 
     @cached_property
     def models(self) -> FaultModels:
-        """The fault models."""
         return load_fault_models(self.place / "templates")
 
     @property
     def limits(self) -> Limits:
-        """The limits of each run."""
         return Limits(**self.meta["limits"])
 
     def scenario(self, name: str) -> Path:
-        """The path of a scenario's file."""
         return self.place / "scenarios" / f"{name}.yaml"
 
     @cached_property

@@ -39,7 +39,7 @@ def submit(client: Client, address: str, function: Callable[..., _T], *arguments
 
 
 async def call(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
-    """Call a function on a worker now, and return its result. Errors are those of `answer`."""
+    """Call a function on a worker, and return its result. Errors are those of `answer`."""
     future = submit(client, address, function, *arguments)
     try:
         return await answer(future)
@@ -48,7 +48,7 @@ async def call(client: Client, address: str, function: Callable[..., _T], *argum
 
 
 async def answer(future: "Future[_T]") -> _T:
-    """The result of a task. Raises Refused if the task raises, Cut if the scheduler dropped it.
+    """Return the result of a task. Raises Refused if the task raises, Cut if the scheduler dropped it.
 
     If the worker is dead, this never returns.
     """

@@ -1,7 +1,7 @@
 """The process on a worker that runs pieces of work: `python -m mutator.execution.cluster.child FD SITE NAME`.
 
-It receives pieces from its host over the connection FD. It sends the id of each finished experiment, then the
-result of the piece. Because it is separate from the host, no run can kill the worker.
+It receives pieces from its host over the connection FD, and sends the id of each finished experiment, then
+the result of the piece. Because it is separate from the host, no run can kill the worker.
 """
 
 import os
@@ -59,8 +59,9 @@ class PieceRunner:
         self._runners: dict[Kind, Runner] = {}
 
     def run(self, piece: Piece, tell: Callable[[str], None]) -> Result:
-        """Run a piece. Calls `tell` with each finished experiment; raises Unlike if the golden run differs
-        here.
+        """Run a piece. Calls `tell` with each finished experiment.
+
+        Raises Unlike if a golden run differs here.
         """
         began = time.monotonic()
         experiments = piece.experiments()
@@ -77,7 +78,6 @@ class PieceRunner:
         return replace(made, number=piece.number, seconds=time.monotonic() - began)
 
     def close(self) -> None:
-        """End the engines."""
         for runner in self._runners.values():
             runner.engine.close()
 
@@ -120,7 +120,6 @@ class PieceRunner:
         self._alike.add(key)
 
     def _drive_golden(self, golden: GoldenRun, known: str, place: Path) -> None:
-        """Make a golden run in the folder `place`. Unlike if it differs from the campaign's."""
         site = self._site
         engine = ReferenceEngine(site.manifest, self._base, self._work, site.limits, self._parent)
         job = Job(
@@ -143,7 +142,6 @@ class PieceRunner:
 
 
 def _made(finished: list[Finished], name: str, *, proof: bool) -> Result:
-    """What the run folder stores of these experiments."""
     records = tuple(canonical(line_of(one.record)).encode() for one in finished)
     if proof:
         return Result(number=0, ending=Ending.DONE, records=records)

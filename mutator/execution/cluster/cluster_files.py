@@ -1,7 +1,6 @@
 """Cluster files: which kind of cluster to start for a run, how many workers, and the cluster's options.
 
-The kinds are a fixed list of classes of dask-jobqueue and dask-kubernetes. A file cannot name other code to
-import.
+The kinds are a fixed list of classes, so a file cannot name other code to import.
 """
 
 import difflib
@@ -160,7 +159,7 @@ class ClusterFile:
             )
 
     def _options(self) -> dict[str, Any]:
-        """The arguments of the class: one thread per worker, and a dashboard only for this machine."""
+        """Return the arguments of the class: one thread per worker, and a dashboard only for this machine."""
         options = dict(self.model.options)
         if self.model.kind == KUBERNETES:
             from tornado.ioloop import IOLoop
@@ -185,7 +184,7 @@ class ClusterFile:
                 ("kind",), str(error), remedy="submit from a machine that has this command"
             ) from None
         except (ImportError, TypeError, ValueError, RuntimeError, OSError) as error:
-            remedy = f"correct the options as the documentation of {_CLASSES[self.model.kind][1]} has them"
+            remedy = f"correct the options: see the documentation of {_CLASSES[self.model.kind][1]}"
             if self.model.kind == KUBERNETES:
                 remedy += ", and see that kubectl works here"
             raise self._error(("options",), " ".join(str(error).split()), remedy=remedy) from None
@@ -195,13 +194,12 @@ class ClusterFile:
 
 
 def load_cluster(path: Path) -> ClusterFile:
-    """Read a cluster file strictly; MutatorError with file and line for a mistake."""
     model, source = read(path, ClusterModel, SCHEMA)
     return ClusterFile(model=model, source=source)
 
 
 def _noting(job_class: Any, problems: list[Exception]) -> type:
-    """A class of jobs that keeps the errors of failed submissions, which Dask only logs."""
+    """Make a class of jobs that keeps the errors of failed submissions, which Dask only logs."""
 
     from distributed import Status
 
@@ -217,16 +215,14 @@ def _noting(job_class: Any, problems: list[Exception]) -> type:
 
 
 def _delete_keys(cluster: Any) -> None:
-    """Delete the files of `security: true`. Dask deletes them only on garbage collection, which may never
-    come.
-    """
+    """Delete the files of `security: true`. Dask would delete them only on garbage collection."""
     for key in ("ca_file", "cert", "key"):
         if file := getattr(cluster, f"_job_{key}", None):
             file.close()
 
 
 def _class(kind: str) -> Any:
-    """The class that starts clusters of this kind; MutatorError if its extra is not installed."""
+    """Return the class that starts clusters of this kind; MutatorError if its extra is not installed."""
     module, name = _CLASSES[kind]
     original = signal.signal
     try:
@@ -239,7 +235,6 @@ def _class(kind: str) -> Any:
 
 
 def _parameters(cluster_class: type) -> Iterator[str]:
-    """The option names of a class, its bases and its jobs."""
     for part in (*cluster_class.__mro__, *getattr(cluster_class, "job_cls", object).__mro__):
         if part.__module__.startswith(("dask_jobqueue", "dask_kubernetes")) and "__init__" in vars(part):
             yield from inspect.signature(part).parameters

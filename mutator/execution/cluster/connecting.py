@@ -28,9 +28,9 @@ _TO_CLOSE = (
 
 
 def checked_address(address: str, *, where: Path | None = None) -> str:
-    """Return the scheduler's address unchanged; MutatorError if it is not a valid address.
+    """Return the scheduler's address unchanged; MutatorError if it is invalid.
 
-    `where` is the file that the address was read from.
+    `where` is the file from which the address was read.
     """
     found = _ADDRESS.fullmatch(address)
     if found and 0 < int(found["port"]) < 2**16:
@@ -44,16 +44,15 @@ def checked_address(address: str, *, where: Path | None = None) -> str:
 
 
 def is_closed(address: str) -> bool:
-    """Whether nobody else can read the traffic or join, because it uses TLS or stays on this machine.
+    """Return whether nobody else can read the traffic or join, because it uses TLS or stays on this machine.
 
-    Host names are not looked up, except that `localhost` is this machine.
+    Host names except `localhost` are not looked up.
     """
     found = _ADDRESS.fullmatch(address)
     return found is not None and (found["protocol"] == "tls" or is_loopback(found["host"]))
 
 
 def is_loopback(host: str) -> bool:
-    """Whether a host name or number means this machine."""
     try:
         return host == "localhost" or ipaddress.ip_address(host.strip("[]")).is_loopback
     except ValueError:
@@ -61,9 +60,9 @@ def is_loopback(host: str) -> bool:
 
 
 def refused(what: str, *, where: Path | None = None, line: int | None = None) -> MutatorError:
-    """Make (not raise) the error for a network on which others can reach the scheduler."""
+    """Make the error for a network on which others can reach the scheduler."""
     return MutatorError(
-        f"{what}, which is neither on the loopback nor encrypted",
+        f"{what}, which is neither encrypted nor on the loopback interface",
         where=where,
         line=line,
         argument="cluster",
@@ -86,10 +85,10 @@ def importing(extra: str) -> Iterator[None]:
 
 @contextmanager
 def own_scheduler() -> Iterator[None]:
-    """Dask settings for a scheduler in this process.
+    """Apply Dask settings for a scheduler in this process.
 
     A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
-    dashboard's link uses this machine's own address, the only one that it answers on.
+    dashboard answers only on this machine's own address.
     """
     import dask
 
@@ -104,7 +103,7 @@ def own_scheduler() -> Iterator[None]:
 
 
 def certificates() -> "Security":
-    """TLS settings from Dask's configuration (`distributed.comm.tls`); MutatorError if unusable."""
+    """Return the TLS settings of Dask's configuration (`distributed.comm.tls`); MutatorError if unusable."""
     from distributed import Security
 
     remedy = (
@@ -115,9 +114,7 @@ def certificates() -> "Security":
         security = Security()
         context = security.get_connection_args("client")["ssl_context"]
     except (OSError, ssl.SSLError) as error:
-        raise MutatorError(
-            f"no use of the TLS certificates: {error}", argument="cluster", remedy=remedy
-        ) from None
+        raise MutatorError(f"unusable TLS certificates: {error}", argument="cluster", remedy=remedy) from None
     if context is None:
         raise MutatorError("tls:// without certificates", argument="cluster", remedy=remedy)
     return security
@@ -154,10 +151,9 @@ async def connected(to: "str | Cluster", *, where: Path | None = None) -> AsyncI
 
 
 async def _reason(address: str, error: BaseException) -> str:
-    """The reason for a failed connection, from the innermost error. Dask itself only reports how long it
-    tried.
+    """Return the reason for a failed connection from the innermost error.
 
-    If Dask's last attempt was cut short, that error says nothing, so this makes one more attempt.
+    If that error says nothing, because Dask's last attempt was cut short, make one more attempt.
     """
     while error.__cause__ is not None:
         error = error.__cause__

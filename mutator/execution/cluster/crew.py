@@ -1,4 +1,4 @@
-"""The workers of a run: admitted ones, refused ones with reasons, and the speed of each."""
+"""The workers of a run: admitted ones, refused ones with reasons, and their speed."""
 
 import time
 from collections import deque
@@ -22,7 +22,7 @@ class _Member:
 
 
 class Crew:
-    """All workers seen so far. `stretch` is the run's current stretch of work, `now` a clock in seconds."""
+    """All workers seen so far. `now` is a clock in seconds."""
 
     def __init__(self, stretch: Stretch, *, accept: bool, now: Callable[[], float] = time.monotonic) -> None:
         self._stretch, self._accept, self._now = stretch, accept, now
@@ -35,19 +35,16 @@ class Crew:
         return sorted(self._stretch.packages)
 
     def let_in(self, name: str, facts: Mapping[str, Any]) -> None:
-        """Admit a worker; `facts` are those of `dask_side.facts`."""
         self._present[name] = _Member(str(facts["host"]))
 
     def leave(self, name: str) -> None:
-        """Remove a worker."""
         self._present.pop(name, None)
 
     def refuse(self, name: str, why: str) -> None:
-        """Note that a worker may not take part."""
         self.refused[name] = why
 
     def objection(self, facts: Mapping[str, Any]) -> str:
-        """Why a worker may not take part; empty if it may.
+        """Return why a worker may not take part; empty if it may.
 
         The reasons are those for which its machine could not resume the run.
         """
@@ -62,7 +59,7 @@ class Crew:
             self._present[name].finished.append((self._now(), count))
 
     def told(self) -> str:
-        """A summary: `3 workers on alpha 2.4 a second, beta 0.9 a second`."""
+        """Return a summary: `3 workers on alpha 2.4 a second, beta 0.9 a second`."""
         hosts: dict[str, list[float | None]] = {}
         for member in self._present.values():
             hosts.setdefault(member.host, []).append(self._per_s(member))
@@ -72,7 +69,7 @@ class Crew:
         return f"{text}; {len(self.refused)} refused" if self.refused else text
 
     def _per_s(self, member: _Member) -> float | None:
-        """A worker's recent experiments per second; None if unknown."""
+        """Return a worker's recent experiments per second; None if unknown."""
         if len(member.finished) < 2:
             return None
         (began, first), *_ = member.finished
@@ -81,7 +78,7 @@ class Crew:
 
 
 def describe(name: str, facts: Mapping[str, Any]) -> str:
-    """Describe a worker in messages: its name and, if known, its machine, processor and versions."""
+    """Describe a worker: its name and, if known, its machine, processor and versions."""
     if not facts:
         return name
     parts = (facts["host"], facts["cpu"] or facts["platform"], facts["python"], f"mutator {facts['mutator']}")

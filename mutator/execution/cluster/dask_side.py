@@ -1,7 +1,7 @@
 """Functions that the command submits to Dask workers by reference.
 
-For each run, a worker runs a task outside the thread pool (`attend`) that lasts as long as the run. When that
-task ends, everything of the run on this worker ends. Each piece is a separate task.
+For each run, a worker runs a task outside the thread pool (`attend`) that lasts as long as the run. When it
+ends, everything of the run on this worker ends. Each piece is a separate task.
 """
 
 import platform
@@ -27,7 +27,7 @@ _arrived = threading.Condition()
 
 
 def facts(packages: Iterable[str]) -> dict[str, Any]:
-    """What this worker computes with, including the versions of these packages, as in a stretch of work."""
+    """Return what this worker computes with, including the versions of these packages."""
     return {
         "mutator": VERSION,
         "host": socket.gethostname(),
@@ -70,7 +70,6 @@ def leave(run: str) -> None:
 
 
 def work(run: str, piece: bytes) -> bytes:
-    """Run a piece and return its result."""
     deadline = time.monotonic() + _PATIENCE_S
     with _arrived:
         while run not in _hosts:
@@ -81,7 +80,7 @@ def work(run: str, piece: bytes) -> bytes:
 
 
 def _wanted() -> Wanted:
-    """Whether this thread's task is still wanted: it is not released, and the worker is not closing."""
+    """Make a function that tells whether this thread's task is still wanted and the worker is not closing."""
     worker: Worker = get_worker()
     key = worker.get_current_task()
 

@@ -17,8 +17,6 @@ _LOOK_S = 0.5  # between two checks for remarks
 
 
 class ClusterWorkers:
-    """The distributor of `mutator run --cluster`."""
-
     def __init__(self, where: Where, *, insecure: bool = False) -> None:
         self._where, self._insecure = where, insecure
 

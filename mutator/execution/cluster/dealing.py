@@ -1,7 +1,7 @@
 """Distribute work through Dask, which carries the bytes and knows which workers are present.
 
-The board decides which worker runs which piece. Each task names its worker. A worker has at most two tasks
-per thread. A finished task is released immediately.
+The board decides which worker runs which piece. A worker has at most two tasks per thread. A finished task is
+released immediately.
 """
 
 import asyncio
@@ -79,7 +79,6 @@ class Deal:
         self._alone_since = time.monotonic()
 
     async def run(self) -> None:
-        """Distribute the work until it is done or no worker is left."""
         try:
             while not (self._board.is_empty and not self._writes) and not self._session.problem:
                 await self._meet()
@@ -90,7 +89,7 @@ class Deal:
                 self._changed.clear()
         except _Gone:
             self._session.problem = (
-                f"the scheduler at {self._address} does not answer any more, but finished work is stored; "
+                f"the scheduler at {self._address} no longer answers, but finished work is stored; "
                 "start the scheduler and its workers again, then run the same command"
             )
         except DiskFull as err:
@@ -106,7 +105,7 @@ class Deal:
             self._intake.close()
 
     async def _part(self) -> None:
-        """Tell the workers to drop the run. Any that do not answer drop it once the client is gone."""
+        """Tell the workers to drop the run. Workers that do not answer drop it once the client is gone."""
         present = [one for one in self._tended.values() if one.lease is not None]
         parting = [call(self._client, one.address, dask_side.leave, self._run) for one in present]
         with suppress(TimeoutError):
@@ -162,7 +161,6 @@ class Deal:
                 self._board.give_back(piece, one.name)
 
     def _check_left(self) -> None:
-        """End the session if no worker is left or expected."""
         if any(one.task is not None and not one.task.done() for one in self._tended.values()):
             self._alone_since = time.monotonic()
         elif len(self._tended) >= (self._queued or 1):
@@ -175,7 +173,6 @@ class Deal:
             )
 
     def _drop_needless_proof(self) -> None:
-        """Drop the proof once everything ran and nothing was forked."""
         if self._board.ran_all and self._session.proof and not self._forked:
             self._forked = True  # so that this is computed only once
             if equivalence.needless(self._session.folder) is not None:
@@ -255,7 +252,6 @@ class Deal:
             raise Refused(result.text)
 
     async def _done(self, piece: Piece, one: _Tended, result: Result) -> None:
-        """Handle a piece that is done for the first time."""
         if one.facts:  # before its first results are written, run.json must name the worker
             self._session.note_machine({"worker": one.name, **one.facts})
             one.facts = {}
@@ -285,7 +281,7 @@ class Deal:
 
 
 def _read(data: bytes, piece: Piece) -> Result:
-    """The result of a piece. Damaged data counts as a piece that could not run there."""
+    """Return the result of a piece. Damaged data counts as a piece that could not run there."""
     try:
         return Result.of(data)
     except MutatorError as err:

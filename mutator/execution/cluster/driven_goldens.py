@@ -35,7 +35,7 @@ class DrivenGoldens:
         ]
 
     def fetch(self, golden: GoldenRun, known: str, to: Path) -> bool:
-        """Copy the golden run to `to`; False, without `to`, if none with digest `known` is cached."""
+        """Copy the golden run with the digest `known` to `to`; return False if it is not cached."""
         with suppress(OSError):
             kept_folders.fetch(self._entry(golden), to)
             if digest_of(self._site.manifest, to) == known:
@@ -44,7 +44,7 @@ class DrivenGoldens:
         return False
 
     def keep(self, golden: GoldenRun, out: Path) -> None:
-        """Cache the golden run in the folder `out`. If the cache is not writable, do nothing."""
+        """Cache the golden run in the folder `out`, if the cache is writable."""
         kept_folders.store(self._entry(golden), lambda made: shutil.copytree(out, made))
 
     def _entry(self, golden: GoldenRun) -> Path:

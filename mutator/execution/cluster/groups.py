@@ -33,7 +33,7 @@ class Group:
 
 
 def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> dict[str, Group]:
-    """The pending work by golden run. All experiments of a chunk have the same one."""
+    """Return the pending work by golden run. All experiments of a chunk have the same one."""
     chunks: dict[str, list[Pending]] = {}
     for one in pending:
         first = next(iter(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk])))
@@ -45,7 +45,7 @@ def groups_of(folder: RunFolder, pending: Sequence[Pending], faults: Faults) -> 
 
 
 def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
-    """Yield the rest of these chunks run by run. Experiments that share a run come together."""
+    """Yield the rest of these chunks. Experiments that share a run come together."""
     for one in pending:
         lines = list(plan_file.chunk_lines(folder.path, folder.head["chunks"][one.chunk]))
         read = [(_read(lines[place]), lines[place]) for place in one.places]
@@ -54,7 +54,6 @@ def _runs_of(folder: RunFolder, pending: Sequence[Pending]) -> Iterator[Run]:
 
 
 def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
-    """The golden run of the experiment on a line of the plan."""
     data = _read(line)
     fault = plan_file.fault_from(json.loads(faults[data["fault"]]))
     experiment = plan_file.experiment_from(data, {fault.id: fault})
@@ -62,12 +61,10 @@ def golden_of(folder: RunFolder, line: bytes, faults: Faults) -> str:
 
 
 def faults_of(lines: Run, faults: Faults) -> tuple[bytes, ...]:
-    """The lines of these experiments' faults, without duplicates."""
     return tuple(dict.fromkeys(faults[_read(line)["fault"]] for line in lines.values()))
 
 
 def id_of(line: bytes) -> str:
-    """The id of the experiment on a line of the plan."""
     return str(_read(line)["id"])
 
 

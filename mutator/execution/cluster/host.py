@@ -26,7 +26,7 @@ from mutator.execution.cluster.bundle import Site
 from mutator.execution.cluster.pieces import Ending, Piece, Result
 from mutator.execution.worker import dying_python
 
-_LOOK_S = 0.25  # between two checks whether the work is still wanted
+_LOOK_S = 0.25  # between two checks that the work is still wanted
 _END_S = 5.0
 _START_S = 60.0  # time for a process to begin its first piece
 _CHILD = "mutator.execution.cluster.child"
@@ -35,7 +35,7 @@ Wanted = Callable[[], bool]
 
 
 class NotWanted(Exception):
-    """Nobody waits for this piece any more."""
+    """Nobody waits for this piece any longer."""
 
 
 @dataclass
@@ -59,7 +59,9 @@ class _Child:
         return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
 
     def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """The process's result for a piece; fills `finished`. TimeoutError after `patience_s` of silence."""
+        """Return the process's result for a piece; fill `finished`. TimeoutError after `patience_s` of
+        silence.
+        """
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
@@ -102,9 +104,7 @@ class Host:
 
     @classmethod
     def lay_out(cls, data: bytes, place: str, name: str) -> "Host":
-        """Make a host for the bundle `data` in a new folder of `place`; MutatorError if the bundle is
-        damaged.
-        """
+        """Make a host for the bundle `data` in a new folder of `place`; MutatorError if it is damaged."""
         with raising_disk_full(Path(place)):
             Path(place).mkdir(parents=True, exist_ok=True)
             folder = Path(tempfile.mkdtemp(prefix="mutator-", dir=place)).resolve()
@@ -137,12 +137,11 @@ class Host:
             self._gone.set()
 
     def end(self) -> None:
-        """Make the attending thread end, and wait for it."""
         self._leaving = True
         self._gone.wait(_END_S)
 
     def run(self, data: bytes, wanted: Wanted) -> Result:
-        """Run a piece. NotWanted once nobody waits for it; MutatorError if the piece is damaged."""
+        """Run a piece. NotWanted once nobody waits for it; MutatorError if it is damaged."""
         piece = Piece.of(data)
         try:
             child = self._borrowed()
@@ -162,7 +161,7 @@ class Host:
                 child.end()
 
     def _borrowed(self) -> _Child:
-        """An idle process or a new one; NotWanted if the host has ended."""
+        """Return an idle process or a new one; NotWanted if the host has ended."""
         with self._lock:
             if self._idle:
                 return self._idle.pop()

@@ -20,7 +20,7 @@ from mutator.verification import equivalence
 
 
 class Intake:
-    """Appends results to the run folder, like a worker on this machine. `name` makes its file names unique.
+    """Appends results to the run folder, like a worker on this machine.
 
     Results are trusted, because a worker that might compute differently gets no work.
     """
@@ -65,7 +65,6 @@ class Intake:
             writer.extend([canonical(line_of(record)).encode()])
 
     def close(self) -> None:
-        """Sync and close the files."""
         for writer in (self._patches, self._series, self._records, self._timings, self._proofs):
             if writer is not None:
                 writer.close()

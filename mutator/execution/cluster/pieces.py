@@ -49,7 +49,6 @@ class Piece:
         return tuple(self.lines)
 
     def packed(self) -> bytes:
-        """The bytes to send to the worker."""
         head = {"number": self.number, "kind": self.kind, "golden": self.golden, "ids": self.ids}
         parts = {"head": json.dumps(head).encode(), "plan": b"\n".join(self.lines.values())}
         return pack(parts | {"faults": b"\n".join(self.faults)})
@@ -68,15 +67,14 @@ class Piece:
         )
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """The piece's experiments; MutatorError if a line does not match its id."""
+        """Parse the piece's experiments; MutatorError if a line does not match its id."""
         faults = {fault.id: fault for fault in (plan_file.fault_from(json.loads(f)) for f in self.faults)}
         return tuple(plan_file.experiment_from(json.loads(line), faults) for line in self.lines.values())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Result:
-    """The result of a piece. If it is not done, `text` says why, and `at` names the experiment that was
-    running.
+    """The result of a piece. If it is not done, `text` says why, and `at` is the experiment that was running.
 
     `records` and `timings` are lines of the run folder's files without checksums. `patches` and `series` are
     blocks of its files.
@@ -97,7 +95,6 @@ class Result:
     _HEAD = ("number", "ending", "text", "at", "seconds", "forked", "series_of")
 
     def packed(self) -> bytes:
-        """The bytes to send to the command."""
         head = {name: getattr(self, name) for name in self._HEAD}
         parts = {"head": json.dumps(head).encode(), "patches": self.patches, "series": self.series}
         return pack(parts | {"records": _joined(self.records), "timings": _joined(self.timings)})

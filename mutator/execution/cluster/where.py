@@ -1,7 +1,7 @@
 """Parse `WHERE` of a run on a cluster, and open a Dask client for it.
 
-`parse` is fast and does not import Dask. `WHERE` is a scheduler's address, the file that a scheduler wrote,
-`local:N`, or a cluster file.
+`WHERE` is a scheduler's address, the file that a scheduler wrote, `local:N`, or a cluster file. `parse` does
+not import Dask.
 """
 
 import json
@@ -35,8 +35,8 @@ class Where(Protocol):
     """A usable cluster. `open` returns an asynchronous Dask client and needs a running event loop.
 
     On exit, `open` ends what it started; an existing scheduler keeps running. Raises MutatorError if the
-    cluster does not exist or the extra is not installed. Unless `insecure` is set, it also raises
-    this error if others on the network can reach the cluster.
+    cluster does not exist or the extra is not installed, and, unless `insecure`, if others on the network can
+    reach the cluster.
     """
 
     def open(self, *, insecure: bool) -> AbstractAsyncContextManager["Client"]: ...
@@ -83,7 +83,7 @@ def _scheduler_file(path: Path) -> "Scheduler":
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scheduler:
-    """A running scheduler. `file` is the file that its address was read from."""
+    """A running scheduler. `file` is the file from which its address was read."""
 
     address: str
     file: Path | None = None
