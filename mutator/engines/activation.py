@@ -31,7 +31,6 @@ class Observed:
 
     @cached_property
     def columns(self) -> np.ndarray:
-        """`values` transposed: a row for the time, then a row for each observed value."""
         return np.array(self.values, dtype=float).T
 
     def step_of(self, observation: int) -> int:
@@ -92,8 +91,6 @@ def _holds(function: ast.FunctionDef, values: dict[str, Any]) -> Any:
 
 
 def _value(node: ast.expr, values: Mapping[str, Any]) -> Any:
-    """Return the value of an expression made by `conditions.to_code`: an array, or one value for all."""
-
     def of(node: ast.expr) -> Any:
         return _value(node, values)
 

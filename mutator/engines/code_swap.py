@@ -1,7 +1,8 @@
 """Find the functions of a loaded program that a mutant changes, and check whether their code can be swapped.
 
-No function of the target is active between two steps of a run. Until the trigger first holds, the changed
-program acts like the pristine one, because the probe guards every inserted statement.
+No function of the target is active between two steps of a run, so code can be swapped there. Until the
+trigger first holds, the changed program acts like the pristine one, because the probe guards every inserted
+statement.
 """
 
 import re
@@ -204,7 +205,7 @@ def same(one: CodeType, other: CodeType) -> bool:
 
 
 def essence(code: CodeType) -> tuple[object, ...]:
-    """Return a key of what the code and its nested code do; equal for functions that do the same."""
+    """Return a key of what the code does; equal for functions that do the same."""
     return (*_essence(code), *map(essence, _inner(code)))
 
 

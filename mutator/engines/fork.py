@@ -115,7 +115,7 @@ class ForkEngine:
         if self._unfit:
             raise Refused(*self._unfit.args)
         if job.mutant is None or job.golden is None or job.hash_seed:
-            raise Refused("no experiment")
+            raise Refused("not an experiment")
         swap = plan_swap(self._manifest, job.files, str(self._running().tree))
         if self._warm:
             return self._from_the_start(job, folder, swap)
@@ -161,7 +161,6 @@ class ForkEngine:
     def _become(
         self, waiting: Waiting, job: Job, folder: Path, swap: CodeSwap, start: Start, watch: bool = False
     ) -> Execution:
-        """Let a waiting process fork a child that finishes the run as the mutant."""
         out = folder / "out"
         out.mkdir(parents=True)
         inactive(folder).touch()
@@ -278,7 +277,7 @@ class ForkEngine:
             write_atomic(known, marshal.dumps(found))
             return Observed(values=found[0], before=found[1], libraries=found[2])
         except NotSwappable as why:
-            raise Refused(f"its observation cannot be put into it: {why}") from None
+            raise Refused(f"its observing statement cannot be inserted: {why}") from None
         finally:
             remove_folder(folder)
 
@@ -328,7 +327,6 @@ def make_fork(setting: Setting) -> ForkEngine:
 
 
 def make_warm(setting: Setting) -> ForkEngine:
-    """Make the engine that forks each run from the loaded target before the first step."""
     return _make(setting, warm=True)
 
 

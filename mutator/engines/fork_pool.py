@@ -47,8 +47,6 @@ class Refused(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Golden:
-    """A golden run: its key, and a function that returns its arguments."""
-
     key: Hashable
     arguments: Callable[[], list[str]]
 

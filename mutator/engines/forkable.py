@@ -24,7 +24,7 @@ def unfit(manifest: TargetManifest) -> Refused | None:
 
 
 def not_loadable(manifest: TargetManifest, base: Path, home: Path) -> Refused | None:
-    """Load the target to find out why it cannot be forked; None if it can.
+    """Load the target, and return why it cannot be forked; None if it can.
 
     `base` is a pristine tree made by `prepare_base`, `home` a new scratch folder.
     """

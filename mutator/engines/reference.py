@@ -150,13 +150,11 @@ class ReferenceEngine:
         return path
 
     def _observation(self) -> tuple[str, list[int]]:
-        """Return the observing file, and the lines (from 1) of its observing statement."""
         location = self.manifest.observation.location
         first, last = parsed(self.manifest.tree, location.path).span(location)
         return location.path, [line + 1 for line in range(first, max(last, first + 1))]
 
     def _observed(self) -> tuple[str, list[str]]:
-        """Return the object in which the probe keeps its observations, and the observed values' names."""
         holder, _ = state_after(0, None, None)
         return holder, [value.name for value in self.manifest.observation.values]
 

@@ -39,7 +39,6 @@ def not_worth_forking(manifest: TargetManifest, experiments: int) -> str:
 
 
 def not_forkable(manifest: TargetManifest) -> str:
-    """Return why this target cannot be forked here; empty if it can."""
     if manifest.stepwise is None:
         return f"{manifest.path.name} names no `entry.stepwise`"
     if sys.platform != "linux":

@@ -23,7 +23,6 @@ _OTHER = ("", "start it after the run, or not at all")
 
 
 def too_many(others: Sequence[str]) -> str:
-    """Return the message about a process that has these threads besides its main one."""
     told = [*dict.fromkeys(map(_told, others))]
     listed = ", ".join([*told[:_LISTED], *(["and more"] if len(told) > _LISTED else [])])
     return f"it has {len(others) + 1} threads, and only one can be forked: besides the main one, {listed}"
@@ -39,7 +38,6 @@ def _told(name: str) -> str:
 
 
 def _about(name: str) -> tuple[str, str]:
-    """Return what the thread is, and how to turn it off."""
     if not name:
         return _UNNAMED
     return next(((what, remedy) for begin, what, remedy in _KNOWN if name.startswith(begin)), _OTHER)

@@ -113,7 +113,6 @@ def _check_plans(folders: Sequence[RunFolder]) -> None:
 
 
 def _check_numbers(folders: Sequence[RunFolder]) -> None:
-    """Check that each share of the plan is present exactly once."""
     held: dict[int, RunFolder] = {}
     of: int | None = None
     for folder in folders:

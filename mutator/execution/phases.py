@@ -45,7 +45,6 @@ def title(progress: "Progress") -> str:
 
 
 def count(progress: "Progress") -> str:
-    """Return the count, such as `12/60`; empty if there is nothing to count."""
     return f"{progress.done}/{progress.total}" if progress.total else ""
 
 

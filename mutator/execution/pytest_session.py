@@ -30,8 +30,6 @@ _PROBLEM = "mutator_problem"
 
 
 class Deals(Protocol):
-    """Distributes a session's work (`mutator.execution.distribution`)."""
-
     def run(self, session: Session) -> None: ...
 
 
@@ -335,7 +333,6 @@ class PlainController(Controller):
 
 
 def _told(config: pytest.Config) -> Notify | None:
-    """Return a function that reports stages without pytest items; None with `-q`."""
     reporter = config.pluginmanager.get_plugin("terminalreporter")
     if reporter is None or config.get_verbosity() < 0:
         return None

@@ -35,7 +35,6 @@ def open_frozen(
 
 
 def _found(workspace: Workspace, campaign: str | Path, out: Path, choices: Choices) -> RunFolder:
-    """Open a run folder planned from this campaign, choices and sources; MutatorError if any differs."""
     folder = RunFolder.open(out)
     head = folder.head
     check_version(out, head["schema"], head["provenance"])

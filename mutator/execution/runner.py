@@ -73,11 +73,9 @@ class Goldens:
         return self._trace(self.folder(experiment))
 
     def ends(self, experiment: Experiment) -> bool:
-        """Return whether the golden run of an experiment reaches a terminal hazard."""
         return self._ends(self.folder(experiment))
 
     def sampler(self, experiment: Experiment) -> Sampler:
-        """Return the sampler for series of runs compared with the experiment's golden run."""
         return self._sampler(self.folder(experiment))
 
 

@@ -53,10 +53,10 @@ Notify = Callable[[Progress], None]
 class Summary:
     """The outcome of a session. `outcomes` is as in Progress."""
 
-    planned: int  #: number of planned experiments in this folder
-    done: int  #: number of them with a final record
-    ran: int  #: number of these that ran in this session
-    outcomes: Counter[str]  #: number of experiments by outcome or status
+    planned: int  #: planned experiments in this folder
+    done: int  #: experiments with a final record
+    ran: int  #: experiments that ran in this session
+    outcomes: Counter[str]  #: experiments by outcome or status
     harness_errors: tuple[tuple[str, str], ...]  #: (experiment id, detail) of each harness error
     problem: str  #: why the session ended early (disk full, a worker died); else empty
     interrupted: bool  #: whether a signal ended it
@@ -150,7 +150,6 @@ class Session:
         self._records = None if left else records
 
     def note_machine(self, machine: Mapping[str, Any]) -> None:
-        """Add a participating machine to the current stretch of work in run.json."""
         add_machine(self.folder, machine)
 
     def worker_name(self, name: str) -> str:
@@ -161,7 +160,6 @@ class Session:
         return f"{max(taken, default=0) + 1:04d}-{name}"
 
     def worker_input(self) -> dict[str, Any]:
-        """Return everything that an xdist worker needs, in types that execnet can send."""
         return {
             "parent": os.getpid(),
             "run": str(self.folder.path),
@@ -173,7 +171,6 @@ class Session:
         }
 
     def finish(self) -> Summary:
-        """Build the tables from the existing records, and return the outcome of the session."""
         self.notify(Progress(stage="tables"))
         if self._known:
             return self._finish_again(self._known)

@@ -150,7 +150,6 @@ def _run_golden(workspace: Workspace, engine: ReferenceEngine, experiment: Exper
 
 
 def _kept(runs: Iterator[Finished], out: Path) -> Iterator[Finished]:
-    """Yield the runs, with their output moved to `out`/faulty and their diff next to it."""
     for finished in runs:
         left = finished.out
         if left is None or not left.is_dir():  # a run may delete it

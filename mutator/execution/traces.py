@@ -25,7 +25,6 @@ class Traces:
 
     @cached_property
     def manifest(self) -> TargetManifest:
-        """The run's target; MutatorError if it cannot be found."""
         return self.workspace.manifest(self.folder.head["target"])
 
     @cached_property
@@ -37,7 +36,6 @@ class Traces:
         return {experiment.id: experiment for experiment in plan_file.read_all(self.folder.path)}
 
     def record(self, experiment_id: str) -> Record:
-        """Return the campaign's record of an experiment; MutatorError if only its results are left."""
         if experiment_id not in self._records:
             raise MutatorError(f"the record of {experiment_id} is gone", where=self.folder.path)
         return self._records[experiment_id]

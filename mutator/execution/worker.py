@@ -169,7 +169,6 @@ class Worker:
 
 
 def timing_of(finished: Finished, worker: str) -> dict[str, Any]:
-    """Return the line in `timings/` of an experiment that `worker` ran on this machine."""
     return {
         "experiment_id": finished.experiment.id,
         "cpu_s": finished.cpu_s,

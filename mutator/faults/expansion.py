@@ -60,7 +60,6 @@ def draw_values(draw: Draw, seed: int) -> tuple[int | float, ...]:
 
 
 def _value(draw: Draw, index: int, u: float) -> int | float:
-    """Return the value at the fraction `u` of one range, rounded and capped."""
     low, high = draw.ranges[index]
     if draw.kind == "integers":
         whole = int(low) + math.floor(u * (int(high) - int(low) + 1))

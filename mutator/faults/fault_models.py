@@ -214,7 +214,6 @@ class FaultModelModel(StrictModel, title="The file"):
 
 
 def load_fault_models(folder: Path) -> FaultModels:
-    """Read every `<model>.yaml` and `<model>.py.j2` of `folder`, and `_fi.py.j2`."""
     models = {}
     for path in sorted(folder.glob("*.yaml")):
         model = _load(path)
@@ -234,7 +233,7 @@ def load_fault_models(folder: Path) -> FaultModels:
 def _load(path: Path) -> FaultModel:
     model, source = read(path, FaultModelModel, SCHEMA)
     if model.name != path.stem:
-        raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', as the file is named")
+        raise source.error(("name",), f"'{model.name}'", expected=f"'{path.stem}', the name of the file")
     template_path, kind = path.with_suffix(".py.j2"), SnippetKind(model.kind)
     if model.expression is not None and kind is not SnippetKind.INSERT:
         raise source.error(

@@ -34,7 +34,6 @@ def check_import(manifest: TargetManifest, dotted: str) -> None:
 
 
 def _names(path: str, data: bytes, root: Path) -> list[str]:
-    """Return the names that a module defines or imports at top level, sorted."""
     try:
         return sorted(_defined(ast.parse(data)))
     except (SyntaxError, ValueError, RecursionError) as error:

@@ -126,11 +126,9 @@ class _Resolver:
         return [f"{schema.name}_{suffix}" for suffix in dict.fromkeys((unit.suffix, *fitting))]
 
     def key(self, schema: ParamSchema) -> str:
-        """Return the key in the template's unit, for errors."""
         return f"`{self.keys(schema)[0]}`"
 
     def unit(self, schema: ParamSchema) -> units.Unit | None:
-        """Return the template's unit for the parameter; None for a plain number."""
         if schema.unit != TARGET_UNIT:
             return units.UNITS[schema.unit] if schema.unit else None
         if self.spec.unit is None:
@@ -180,7 +178,7 @@ class _Resolver:
         """Return the value; MutatorError for a text that resembles the draw's name, a likely typing error."""
         assert not isinstance(param.value, Drawn)
         if isinstance(param.value, str) and self.draw and suggestion(param.value, [self.draw.name]):
-            raise self._wrong(param, f"'{self.draw.name}', the draw, or a text that resembles it less")
+            raise self._wrong(param, f"'{self.draw.name}', the draw, or a less similar text")
         return param.value
 
     def _number(self, param: ParamSpec, schema: ParamSchema) -> float:

@@ -137,7 +137,6 @@ def _block_at(data: bytes, at: int) -> Block | None:
 
 
 def _intact(data: bytes, at: int) -> Iterator[int]:
-    """Yield the offsets, from `at` on, at which intact blocks begin."""
     while (at := data.find(_MARK, at)) >= 0:
         if _block_at(data, at) is not None:
             yield at

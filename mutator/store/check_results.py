@@ -19,13 +19,11 @@ class CheckResult:
 
 
 def loaded_packages(folder: RunFolder) -> tuple[str, ...]:
-    """Return the packages that the golden runs loaded; empty before they have run."""
     path = folder.path / FILE
     return tuple(read_json(path, SCHEMA).get("packages", ())) if path.is_file() else ()
 
 
 def measured_cpu_s(folder: RunFolder) -> float | None:
-    """Return the mean CPU time of the golden runs in s; None before they have run."""
     path = folder.path / FILE
     found = read_json(path, SCHEMA).get("run_cpu_s") if path.is_file() else None
     return found if isinstance(found, int | float) else None

@@ -78,7 +78,6 @@ def content_key(run: Path) -> str:
 
 
 def digests_of(run: Path, ledger: Ledger) -> dict[str, Digest | None]:
-    """Return the digests of all verified files, by their names in the run folder."""
     names = list(dict.fromkeys((*ledger.names, *verified_runs.other_files(run))))
     return dict(zip(names, digests.of_files([run / name for name in names]), strict=True))
 
@@ -241,7 +240,7 @@ def _head_problem(segment: Segment, lines: _Lines, plan: str) -> Iterator[Mutato
                 where=segment.path,
                 line=1,
                 expected=plan[:16],
-                remedy="put the file back where it came from",
+                remedy="move the file back to its own run folder",
             )
     except MutatorError as err:
         yield err

@@ -46,7 +46,6 @@ class LineWriter:
         self.append(_head(path, head))
 
     def append(self, value: Mapping[str, Any]) -> None:
-        """Append one line. It is on the disk after the next `sync` at the latest."""
         self.extend([canonical(value).encode()])
         if self._unsynced >= _BATCH:
             self.sync()

@@ -100,8 +100,6 @@ def _unpacked(block: Block, whole: _Whole | None) -> bytes | None:
 
 
 class Patches:
-    """Read the patches of the run folder at `run`."""
-
     def __init__(self, run: Path) -> None:
         self.run = run
 
@@ -162,7 +160,6 @@ class Patches:
 
 
 def rewrite(path: Path, patches: Iterable[tuple[str, bytes]]) -> None:
-    """Rewrite a file of blocks with only these patches."""
     write_atomic(path, packed_patches(patches))
 
 

@@ -68,7 +68,6 @@ class PlanWriter:
 
 
 def write(run: Path, experiments: Sequence[Experiment], chunks: Sequence[int]) -> list[Chunk]:
-    """Write the plan's files; return the position of each chunk."""
     make_folder(run)
     with writing_atomic(run / EXPERIMENTS) as lines, writing_atomic(run / FAULTS) as faults:
         writer = PlanWriter(lines, faults)

@@ -17,7 +17,7 @@ class Progress:
     detail: str = ""  #: the step on which the stage is working
     done: int = 0  #: completed steps of the stage
     total: int = 0  #: total steps of the stage; 0: nothing to count
-    outcomes: Counter[str] = field(default_factory=Counter)  #: number of experiments by outcome or status
+    outcomes: Counter[str] = field(default_factory=Counter)  #: experiments by outcome or status
     per_s: float | None = None  #: steps per second since the stage began
     remaining_s: float | None = None  #: estimated time in s to the end of the stage
 

@@ -1,28 +1,6 @@
 """The run folder: everything a campaign was given, and everything it produced.
 
-DIR/
-  digests.json          size and SHA-256 of every verified file
-  run.json              schema, plan digest, choices, chunks, limits, canary, sources, stretches of work
-  campaign.yaml         the campaign file as it was read
-  plan.csv              the plan for people and spreadsheets
-  plan/experiments.jsonl, plan/faults.jsonl      the frozen plan
-  reviewed.json         approvals of what is run, with digests (`run --require-reviewed`)
-  checks.json           the checks before the campaign, keyed by digest
-  golden/<scenario>[+change]/                    fault-free runs: trace and record of the target
-  patches/<session>-<worker>.blocks              source diff of each experiment that ran, appended
-  records/<session>-<worker>.jsonl               one line per finished experiment, appended
-  timings/<session>-<worker>.jsonl               CPU and wall time, host: may differ between runs
-  proof/<session>-<worker>.jsonl                 records of the sample rerun on the reference engine
-  series/index.js, series/*.js                   channels over time of each experiment, thinned and packed
-  series/<session>-<worker>.blocks               the same as appended, until packed
-  traces/<experiment>/                           on request (`rerun --trace`)
-  plots/                                         plots, stills and films of experiments (`show`)
-  results.csv, results.parquet, propagation.parquet, timings.parquet    derived; can be recreated
-  results.json          digests of these tables and of their sources
-  report/, exports/     also derived (`report`, `compare`, `export`)
-  damaged/              files that a repair put aside (`verify --repair`)
-  owner.lock, workers/                           held by the running command and by its workers
-  work/                                          scratch of running experiments
+docs/reference/run-folder.md describes its files.
 """
 
 from collections.abc import Mapping, Sequence
@@ -174,7 +152,6 @@ class RunFolder:
 
     @property
     def provenance(self) -> dict[str, Any]:
-        """Version of mutator, stretches of work, source digests, seed and reading."""
         head = self.head
         stretches = [plain(stretch) for stretch in self.stretches]
         found = {"mutator": head["provenance"]["mutator"], "stretches": stretches}
@@ -196,7 +173,6 @@ class RunFolder:
 
     @property
     def planned(self) -> int:
-        """The number of experiments planned for this folder."""
         shard = self.shard
         if shard is None:
             return int(self.head["experiments"])
@@ -240,7 +216,6 @@ class RunFolder:
 
     @cached_property
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that the campaign needs."""
         return tuple(map(GoldenRun.from_plain, self.head["goldens"]))
 
     @property
@@ -251,7 +226,6 @@ class RunFolder:
         return GoldenRun.of(experiment, several_seeds=len(self.seeds) > 1)
 
     def golden(self, scenario: str, changes: tuple[str, ...] = (), seed: int | None = None) -> Path:
-        """Return the folder of a fault-free run's trace and record."""
         return self.path / "golden" / GoldenRun(scenario, changes, seed).key
 
     def golden_folder(self, experiment: Experiment) -> Path:

@@ -101,7 +101,6 @@ class SeriesFolder:
         return (self.path / f"{INDEX}.js").is_file()
 
     def has(self, experiment_id: str) -> bool:
-        """Return whether an experiment has a series; MutatorError for a damaged index."""
         if self.kept(experiment_id).is_file():
             return True
         return self.index is not None and experiment_id in self.index.entries
@@ -185,7 +184,6 @@ def read_index(path: Path) -> Index:
 
 
 def write_index(path: Path, index: Index) -> None:
-    """Write an index; equal indexes give equal bytes."""
     text = canonical(index.plain()).encode()
     write_script(path, gzip.compress(text, compresslevel=9, mtime=0))
 

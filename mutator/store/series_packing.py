@@ -76,8 +76,6 @@ Worth = Mapping[str, Any]  # experiment -> sort key, best first
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Entry:
-    """Stored bytes: their digest, their size in a script, and a function that reads them."""
-
     digest: str
     size: int
     read: Read
@@ -138,7 +136,6 @@ def _remove_others(run: Path, index: Index) -> None:
 
 
 def _packed(folder: SeriesFolder) -> _Found:
-    """Return the series that were packed before, without damaged chunks."""
     found = _Found({}, {})
     try:
         index = folder.index
@@ -169,7 +166,6 @@ def _by_entry(entries: Mapping[str, int]) -> dict[int, list[str]]:
 
 
 def _appended(path: Path) -> _Found:
-    """Return the series that a worker appended, without damaged blocks."""
     found = _Found({}, {})
     for block in read_blocks(path).blocks:
         read = _reader(path, block.offset, len(block.data))

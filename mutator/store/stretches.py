@@ -89,7 +89,6 @@ def _blas_text(library: Mapping[str, Any]) -> str:
 
 
 def package_versions(stretches: Iterable[Stretch]) -> dict[str, str]:
-    """Return the versions of each package in these stretches."""
     found: dict[str, dict[str, None]] = {}
     for stretch in stretches:
         for name, version in stretch.packages.items():

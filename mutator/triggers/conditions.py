@@ -72,7 +72,6 @@ def _checked(
 
 
 def names_in(text: str) -> tuple[str, ...]:
-    """Return the variables of a checked condition or formula, in order of appearance."""
     nodes = (node for node in ast.walk(parse(text)) if isinstance(node, ast.Name))
     found = sorted(nodes, key=lambda node: (node.lineno, node.col_offset))
     return tuple(dict.fromkeys(node.id for node in found if node.id not in _NAMES))

@@ -132,7 +132,6 @@ class Process:
         theirs.close()
 
     def go_on(self, step: int, args: list[str] | None) -> None:
-        """In a new process: advance to `step`, report, and wait."""
         try:
             if args is not None:
                 sys.argv = [self.start["module"], *args]
@@ -144,7 +143,6 @@ class Process:
         self.serve()
 
     def advance(self, step: int) -> dict[str, Any]:
-        """Advance the golden run until just before `step`."""
         while self.step < step and not self.run.done:
             self.run.step()
             self.step += 1

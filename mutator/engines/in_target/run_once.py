@@ -132,7 +132,7 @@ def run_module(module: str, args: list[str]) -> None:
 
 
 def run_until(job: dict[str, Any]) -> bool:
-    """Run to the end or the first terminal hazard; write the results; return whether the run was stopped."""
+    """Run and write the results; return whether a terminal hazard stopped the run."""
     sys.argv = [job["module"], *job["args"]]
     begin = operator.attrgetter(job["stepwise"])(importlib.import_module(job["module"]))
     stepped = begin(job["args"])
@@ -248,7 +248,6 @@ def imported_since(name: str) -> list[str]:
 
 
 def libraries(known: set[str], packages: Iterable[str]) -> list[str]:
-    """Return the modules imported since the `known` ones, in order, without those of the packages."""
     return [name for name in sys.modules if name not in known and name.partition(".")[0] not in packages]
 
 

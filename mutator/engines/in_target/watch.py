@@ -258,10 +258,8 @@ class _Like(type):
 
 
 def _is_salted(thing: object) -> bool:
-    """Return whether an object's hash may depend on PYTHONHASHSEED."""
     return not isinstance(thing, int | float)
 
 
 def _without_time(*args: Any, **_: Any) -> bool:
-    """Return whether `time.localtime` or a similar function is called without a time."""
     return not any(isinstance(one, int | float | tuple | time.struct_time) for one in args)

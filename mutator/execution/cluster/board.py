@@ -73,11 +73,9 @@ class Board:
         self._done: Counter[Kind] = Counter()
 
     def join(self, worker: str, slots: int) -> None:
-        """Add a worker that can run `slots` pieces at once."""
         self._slots[worker] = slots
 
     def leave(self, worker: str) -> None:
-        """Remove a worker that is gone, or that gets no more work."""
         for known in (self._slots, self._at, self._idle_since):
             known.pop(worker, None)
 
@@ -136,8 +134,8 @@ class Board:
     def died(self, piece: Piece, worker: str, at: str = "") -> Piece | None:
         """Note that a worker or its process died during a piece, perhaps in the experiment `at`.
 
-        The piece goes to another worker, if there is one. A piece that killed twice is split. If it has only
-        one experiment, it is returned, and the caller gives it up.
+        The piece goes to another worker, if there is one. After two deaths it is split or, if it has only one
+        experiment, returned, and the caller gives it up.
         """
         if (out := self._out.get(piece.number)) is None:
             return None

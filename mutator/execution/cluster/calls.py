@@ -39,7 +39,6 @@ def submit(client: Client, address: str, function: Callable[..., _T], *arguments
 
 
 async def call(client: Client, address: str, function: Callable[..., _T], *arguments: Any) -> _T:
-    """Call a function on a worker, and return its result. Errors are those of `answer`."""
     future = submit(client, address, function, *arguments)
     try:
         return await answer(future)

@@ -183,7 +183,7 @@ def _serve(connection: Connection, runner: PieceRunner) -> None:
 
 
 def _refuse(connection: Connection, err: Exception) -> None:
-    """Answer the first piece with the reason why no piece can run here."""
+    """Answer the first piece with the reason why nothing can run here."""
     with suppress(EOFError):
         piece = Piece.of(connection.recv_bytes())
         text = str(err if isinstance(err, MutatorError) else shortage(err) or repr(err))
@@ -191,7 +191,6 @@ def _refuse(connection: Connection, err: Exception) -> None:
 
 
 def main() -> int:
-    """Run pieces until the host closes the connection, or report why that is impossible."""
     connection, site, name = Connection(int(sys.argv[1])), Site(Path(sys.argv[2])), sys.argv[3]
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the host handles these signals
     try:

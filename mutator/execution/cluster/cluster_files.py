@@ -135,7 +135,6 @@ class ClusterFile:
         raise refused(what, where=self.source.path, line=self.source.line(("options",)))
 
     def _check_options(self, cluster_class: type) -> None:
-        """Raise MutatorError for an option that the class does not have, or that a file may not set."""
         known = set(_parameters(cluster_class)) - _NO_OPTIONS
         for name, value in self.model.options.items():
             if name not in known:

@@ -88,7 +88,7 @@ def own_scheduler() -> Iterator[None]:
     """Apply Dask settings for a scheduler in this process.
 
     A frozen worker is noticed within a minute. Dask does not profile its threads, which saves CPU time. The
-    dashboard answers only on this machine's own address.
+    dashboard's link uses the only address on which it answers.
     """
     import dask
 

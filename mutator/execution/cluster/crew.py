@@ -15,7 +15,7 @@ _RECENT = 20  # finished pieces used to measure a worker's rate
 
 @dataclass
 class _Member:
-    """An admitted worker: its machine, and how many experiments it finished when."""
+    """An admitted worker: its machine, and when it finished how many experiments."""
 
     host: str
     finished: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_RECENT))
@@ -54,7 +54,6 @@ class Crew:
         return "" if self._accept else "; ".join(text.replace(", here", ", there") for text in found)
 
     def finished(self, name: str, count: int) -> None:
-        """Note that a worker finished this many experiments."""
         if name in self._present:
             self._present[name].finished.append((self._now(), count))
 
@@ -69,7 +68,6 @@ class Crew:
         return f"{text}; {len(self.refused)} refused" if self.refused else text
 
     def _per_s(self, member: _Member) -> float | None:
-        """Return a worker's recent experiments per second; None if unknown."""
         if len(member.finished) < 2:
             return None
         (began, first), *_ = member.finished

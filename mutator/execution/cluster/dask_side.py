@@ -40,7 +40,6 @@ def facts(packages: Iterable[str]) -> dict[str, Any]:
 
 
 def deliver(run: str, name: str, bundle: bytes, digest: str) -> None:
-    """Unpack the bundle of a run; MutatorError if it is damaged."""
     if sha256(bundle).hexdigest() != digest:
         raise MutatorError(
             "the bundle that arrived differs from the one that was sent", remedy="check the network"

@@ -25,7 +25,7 @@ class ClusterWorkers:
         remarks: queue.Queue[str] = queue.Queue()
         loop = asyncio.new_event_loop()
         deal = loop.create_task(self._deal(session, remarks.put))
-        # no join: in CPython 3.11 and 3.12 a thread counts as ended once Ctrl-C interrupts its join
+        # no join: in CPython 3.11 and 3.12 a thread is marked as ended once Ctrl-C interrupts its join
         over = threading.Event()
         thread = threading.Thread(target=_run, args=(loop, deal, over), name="cluster")
         thread.start()

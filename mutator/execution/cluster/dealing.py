@@ -124,7 +124,6 @@ class Deal:
         return self._crew.told() + (f"; {link}" if link else "")
 
     async def _meet(self) -> None:
-        """Find new workers and serve them; take back the work of those that are gone."""
         try:
             async with asyncio.timeout(_PATIENCE_S):
                 scheduler = self._client.scheduler
@@ -262,7 +261,6 @@ class Deal:
         await self._write(self._intake.take, piece, result)
 
     async def _died(self, piece: Piece, one: _Tended, result: Result) -> None:
-        """Retry or give up a piece during which a worker or its process died."""
         if (given_up := self._board.died(piece, one.name, result.at)) is not None:
             what = "takes down what runs it, and did so" if result.ending is Ending.DIED else "failed"
             await self._write(self._intake.give_up, given_up, f"{what} twice: {result.text}")

@@ -58,7 +58,6 @@ class Intake:
         self._records.extend(result.records)
 
     def give_up(self, piece: Piece, why: str) -> None:
-        """Note that the experiment of a piece has no result, with the reason."""
         writer = self._records if piece.kind is Kind.RUN else self._proof_writer()
         for name in piece.lines:
             record = without_outcome(name, Status.HARNESS_ERROR, why)

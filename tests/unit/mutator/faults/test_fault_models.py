@@ -121,7 +121,7 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "old", "new", "said"),
     [
-        ("scale.yaml", "name: scale", "name: times", "2: 'times'; expected 'scale', as the file is named"),
+        ("scale.yaml", "name: scale", "name: times", "2: 'times'; expected 'scale', the name of the file"),
         (
             "scale.yaml",
             "kind: insert",
