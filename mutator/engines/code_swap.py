@@ -29,9 +29,7 @@ class NotSwappable(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FunctionSwap:
-    """A function of `module` with its code before and after; `path`: the names that lead to it (class,
-    method).
-    """
+    """A function of `module`, before and after; `path`: the names that lead to it (class, method)."""
 
     module: str
     path: tuple[str, ...]

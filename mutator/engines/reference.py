@@ -184,9 +184,7 @@ class ReferenceEngine:
         return Ended(**json.loads(told))
 
     def _told(self, connection: socket.socket, deadline: float) -> bytes:
-        """Return the guard's JSON report; empty if none arrives in time. Exit if this process's parent is
-        gone.
-        """
+        """Return the guard's report; empty if none arrives in time. Exit if this process's parent is gone."""
         connection.settimeout(_LOOK_UP_S)
         while time.monotonic() < deadline:
             try:

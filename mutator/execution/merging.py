@@ -234,9 +234,7 @@ def _copy_patches(folder: RunFolder, out: Path) -> None:
 
 
 def _pack_series(folders: Sequence[RunFolder], out: Path) -> None:
-    """Pack the series of all shards. Call this before the head is written, because nothing packs them
-    later.
-    """
+    """Pack the series of all shards before the head is written, because nothing packs them later."""
     shards = tuple(folder.path for folder in folders)
     if any((shard / SERIES).is_dir() for shard in shards):
         first, rows = folders[0], chain.from_iterable(map(_rows, folders))

@@ -49,9 +49,7 @@ CONTENT = (  # all files that a run folder may contain; * stands for any text, i
 
 
 class GoldenRun(NamedTuple):
-    """A fault-free run: its scenario with changes, and its seed if a run has several (None: the run's
-    seed).
-    """
+    """A fault-free run: scenario, changes and, if the run has several seeds, its seed (else None)."""
 
     scenario: str
     changes: tuple[str, ...] = ()
@@ -248,9 +246,7 @@ class RunFolder:
         return self.patches.read(experiment_id)
 
     def records(self, kind: str = "records") -> Mapping[str, Record]:
-        """Return the records by experiment id, parsed on access. `proof` has those of the equivalence
-        check.
-        """
+        """Return the records by experiment id, parsed on access. `proof`: of the equivalence check."""
         return read_records(self.path, kind, checksums=self.verifiable)
 
     def comparable(self, record: Record) -> Record:
@@ -280,9 +276,7 @@ class RunFolder:
         return self.work / "base"
 
     def find(self, prefix: str) -> str:
-        """Return the only planned experiment whose id starts with `prefix`; MutatorError for none or
-        several.
-        """
+        """Return the only planned experiment whose id starts with `prefix`; MutatorError if not unique."""
         hits = [name for name in plan_file.ids(self.path) if name.startswith(prefix)]
         if len(hits) != 1 or not prefix:
             got = f"{len(hits)} experiments start with '{prefix}'" if hits else f"no experiment '{prefix}'"

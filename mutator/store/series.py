@@ -41,9 +41,7 @@ class Index:
     budget_mb: int
 
     def plain(self) -> dict[str, Any]:
-        """Convert to JSON types: ids joined into one text; each entry as a difference from the previous
-        one.
-        """
+        """Convert to JSON types: ids joined into one text; entries as differences from the previous one."""
         names, numbers = list(self.goldens), [*self.entries.values()]
         return {
             "schema": SCHEMA,
@@ -115,9 +113,7 @@ class SeriesFolder:
         return sorted(path.stem for path in (self.path / KEPT).glob("*.js"))
 
     def read(self, experiment_id: str) -> tuple[Series, Series] | None:
-        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage, with a
-        remedy.
-        """
+        """Return (golden, faulty) of an experiment; None without a series. MutatorError for damage."""
         try:
             return self._read(experiment_id)
         except MutatorError as err:

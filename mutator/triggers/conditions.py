@@ -78,9 +78,7 @@ def names_in(text: str) -> tuple[str, ...]:
 
 
 def to_code(text: str, *, number: bool = False) -> str:
-    """Convert a checked condition or formula to Python source that cannot raise. It uses `_div` and
-    `math`.
-    """
+    """Convert a checked condition or formula to Python that cannot raise, with `_div` and `math`."""
     writer = _Writer(text, {}, None, divide="_div({}, {})", infinity="math.inf", hypot="math.hypot")
     return writer.number(parse(text)) if number else writer.boolean(parse(text))
 

@@ -150,9 +150,7 @@ class Process:
         return {"step": self.step}
 
     def load(self, modules: list[str]) -> dict[str, Any]:
-        """Import modules that mutants will need. Failures are ignored, because the mutant's own import
-        reports them.
-        """
+        """Import modules that mutants will need. The mutant's own import reports failures."""
         for name in modules:
             with suppress(Exception):
                 importlib.import_module(name)

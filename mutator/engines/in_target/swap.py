@@ -72,9 +72,7 @@ def live_function(module: str, path: Sequence[str], code: types.CodeType) -> typ
 
 
 def _functions(named: Any) -> Iterator[types.FunctionType]:
-    """Yield the functions behind a name: the function itself, those of a method or property, and wrapped
-    ones.
-    """
+    """Yield the functions behind a name: itself, those of a method or property, and wrapped ones."""
     if isinstance(named, types.FunctionType):
         yield named
     if named is not None and not isinstance(named, type):

@@ -67,9 +67,7 @@ class Watcher:
         self._watch_seed(random.Random)
 
     def note(self, kind: str, what: str, *, direct: bool = False) -> None:
-        """Note the innermost line of the tree on the stack; with `direct`, only if it made the call
-        itself.
-        """
+        """Note the innermost line of the tree on the stack; with `direct`, only if it made the call."""
         frame: FrameType | None = sys._getframe()
         here, via = sys._getframe().f_code.co_filename, ""
         while frame is not None and frame.f_code.co_filename == here:

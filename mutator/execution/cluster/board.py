@@ -191,9 +191,7 @@ class Board:
         return max(1, round(min(MOST_S, max(LEAST_S, share_s)) / mean_s)) if mean_s else _FIRST
 
     def _group_for(self, worker: str) -> Group | None:
-        """Return the group with the worker's golden run or, without work there, the one with the most work
-        per worker.
-        """
+        """Return the worker's group or, without work there, the one with the most work per worker."""
         own = self._groups.get(self._at.get(worker, ""))
         if own is not None and self._has_for(own, worker):
             return own

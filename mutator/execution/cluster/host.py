@@ -59,9 +59,7 @@ class _Child:
         return replace(result, at=next((name for name in piece.ids if name not in finished), ""))
 
     def _answer(self, data: bytes, patience_s: float, wanted: Wanted, finished: set[str]) -> Result:
-        """Return the process's result for a piece; fill `finished`. TimeoutError after `patience_s` of
-        silence.
-        """
+        """Return the result of a piece; fill `finished`. TimeoutError after `patience_s` of silence."""
         self.connection.send_bytes(data)
         since = time.monotonic()
         while time.monotonic() - since < patience_s:
