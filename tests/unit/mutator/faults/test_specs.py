@@ -189,8 +189,8 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
             "after_assign: gap}\n          model: offset\n          unit: m\n          params: {by_m: error}",
             "assigned_value: gap}\n          model: offset\n          unit: m\n"
             "          params: {by_m: error, target: gap}",
-            "17: 'gap' for 'target' at `assigned_value`; expected none: the anchored expression is "
-            "what changes; leave it out, or anchor at a statement",
+            "17: 'gap' for 'target' at `assigned_value`; expected none: the anchored expression "
+            "changes; leave it out, or anchor at a statement",
         ),
         (
             "model: offset\n          unit: m\n          params: {by_m: error}",
