@@ -81,7 +81,7 @@ def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: s
 def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path) -> None:
     """The error names the file and the line of the options, and nothing is sent to the queueing system."""
     with pytest.raises(
-        MutatorError, match=r"some.yaml:4: the network .* neither on the loopback nor encrypted"
+        MutatorError, match=r"some.yaml:4: the network .* neither encrypted nor on the loopback"
     ):
         run(opened(tmp_path, text))
 

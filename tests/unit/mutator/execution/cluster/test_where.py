@@ -110,7 +110,7 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
     """No connection is attempted. The remedy names TLS and the argument that allows open networks."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
-        MutatorError, match=r"neither on the loopback nor encrypted.*tls://.*`insecure_network`"
+        MutatorError, match=r"neither encrypted nor on the loopback.*tls://.*`insecure_network`"
     ):
         run(opened(parse("tcp://10.0.0.1:8786")))
 
