@@ -159,7 +159,7 @@ def test_tls_needs_certificates() -> None:
     files = {"ca-file": "/no/ca.pem", "client.cert": "/no/cert.pem", "client.key": "/no/key.pem"}
     with (
         dask.config.set({f"distributed.comm.tls.{key}": file for key, file in files.items()}),
-        pytest.raises(MutatorError, match="the TLS certificates"),
+        pytest.raises(MutatorError, match="unusable TLS certificates"),
     ):
         run(opened(parse("tls://127.0.0.1:1")))
 
