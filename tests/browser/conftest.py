@@ -155,7 +155,6 @@ class Page:
         return list(self.page.evaluate(script, name))
 
     def texts(self, selector: str) -> list[str]:
-        """Return the texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def wait_for_rows(self, count: int) -> None:
@@ -251,7 +250,6 @@ def serious_faults() -> Callable[[Any], list[str]]:
 
 @pytest.fixture
 def open_report(browser: Any) -> Iterator[Callable[[Path], Page]]:
-    """Open the report of a run folder on a wide screen."""
     context = browser.new_context(viewport={"width": 1400, "height": 900}, reduced_motion="reduce")
     context.set_default_timeout(20_000)
     pages: list[Page] = []
@@ -267,5 +265,4 @@ def open_report(browser: Any) -> Iterator[Callable[[Path], Page]]:
 
 @pytest.fixture
 def page(open_report: Callable[[Path], Page], run: Path) -> Page:
-    """The report on a wide screen."""
     return open_report(run)

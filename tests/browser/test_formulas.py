@@ -27,7 +27,6 @@ def term(rng: random.Random, depth: int = 3) -> str:
 
 
 def condition(rng: random.Random) -> str:
-    """Return a random condition."""
     a, b, c = (term(rng, 1) for _ in range(3))
     one = f"{a} {rng.choice(['<', '<=', '>', '>=', '==', '!='])} {b}"
     return rng.choice([one, f"not {one} and {c} > 1", f"ever({one}) or {c} < 0", f"{a} <= {b} < {c}", "True"])

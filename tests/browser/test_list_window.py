@@ -30,7 +30,6 @@ def height(page: "Page") -> float:
 
 
 def test_a_filter_that_leaves_few_rows_leaves_a_low_window(page: "Page") -> None:
-    """With few rows the window becomes low. Without the filter it has its old height again."""
     before = height(page)
     page.page.fill("#search", "crashed")
     page.page.wait_for_function("document.querySelectorAll('#grid tr[data-at]').length < 3")
@@ -52,7 +51,6 @@ def test_other_rows_are_shown_from_the_first_on(page: "Page") -> None:
 
 
 def test_an_experiment_named_by_the_start_of_its_id_is_marked_in_the_list(page: "Page") -> None:
-    """The start of an id in the address marks the row, as the whole id does."""
     name = page.page.inner_text("#grid tr[data-at='0'] code")
     page.open(f"e={name[:6]}")
     page.page.wait_for_selector("#experiment h2")

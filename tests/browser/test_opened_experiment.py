@@ -36,7 +36,6 @@ def test_of_an_experiment_that_did_not_end_well_nothing_is_made_up(
 
 
 def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
-    """Closing an experiment stops its replay."""
     page.page.click(FIRST)
     page.page.wait_for_selector("#experiment .again")
     page.page.keyboard.press("Escape")
@@ -45,7 +44,6 @@ def test_a_closed_experiment_leaves_nothing_behind(page: "Page") -> None:
 
 
 def test_arrows_in_code_scroll_the_code(page: "Page") -> None:
-    """The arrow keys scroll the code and do not open another experiment."""
     page.page.click(FIRST)
     page.page.focus("#experiment .spec pre")
     before = page.fragment

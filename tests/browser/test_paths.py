@@ -72,7 +72,6 @@ def report(
 
 @pytest.fixture
 def opened(open_report: "Callable[[Path], Page]", report: Path) -> "Page":
-    """The report on a wide screen."""
     return open_report(report)
 
 

@@ -101,7 +101,6 @@ class Replayed:
         return str(self.page.inner_text(selector))
 
     def texts(self, selector: str) -> list[str]:
-        """Return the texts of all selected elements."""
         return list(self.page.eval_on_selector_all(selector, "all => all.map((e) => e.textContent)"))
 
     def pixels(self, selector: str) -> set[tuple[int, ...]]:
@@ -268,7 +267,6 @@ def vivid(colours: set[tuple[int, ...]]) -> bool:
 
 
 def test_after_the_end_of_the_drive_all_is_gray(replayed: Replayed) -> None:
-    """After the end of the drive the plots have no colours, and the scene is marked."""
     seek(replayed, END)
     assert replayed.text(".state").endswith("H1: the car hits the one ahead")
     assert replayed.page.locator(".is-after").count() == 0
@@ -342,7 +340,6 @@ def test_what_came_stays_to_be_read(replayed: Replayed) -> None:
 
 
 def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) -> None:
-    """If the scene or one of its channels is missing, instruments and plots are shown."""
     replayed.show(FACTS | {"scene": None})
     assert replayed.page.locator("canvas.scene").count() == 0
     assert replayed.page.locator(".gauge").count() == 4
@@ -352,7 +349,6 @@ def test_a_target_without_a_scene_has_instruments_and_plots(replayed: Replayed) 
 
 
 def test_with_reduced_motion_it_shows_two_pictures_a_second(page: "Page") -> None:
-    """With reduced motion, playback advances in steps of half a second."""
     page.page.evaluate(SHOW, [SERIES, FACTS])
     page.page.click(".replay-player .play")
     page.page.wait_for_function(f"{T} > 2")

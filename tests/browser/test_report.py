@@ -28,7 +28,6 @@ LOADED = """async (id) => {
 
 @pytest.fixture(scope="module")
 def rows(run: Path) -> list[dict[str, str]]:
-    """The rows of results.csv."""
     with (run / "results.csv").open(newline="") as file:
         return list(csv.DictReader(file))
 
@@ -54,7 +53,6 @@ def test_filters_leave_what_fits_and_are_in_the_address(page: "Page", rows: list
 
 
 def test_a_click_on_a_head_sorts_and_what_is_empty_is_last(page: "Page", rows: list[dict[str, str]]) -> None:
-    """A head sorts up, then down, then not at all. Numbers sort by size, and empty cells are last."""
     before = page.column("experiment_id")
     times = sorted(f"{float(row['t_activation']):.2f}" for row in rows if row["t_activation"])
     head = '#grid th[data-column="t_activation"]'
@@ -165,7 +163,6 @@ def test_a_link_that_asks_for_what_is_not_there_says_so(page: "Page") -> None:
 
 
 def test_none_is_a_value_of_a_filter_and_of_a_search(page: "Page", rows: list[dict[str, str]]) -> None:
-    """`alerts=none` finds experiments without an alert, in the address and in the search."""
     without = sum(row["alerts"] == "" for row in rows)
     for fragment in ("alerts=none", "q=alerts%3Dnone"):
         page.open(fragment)

@@ -82,7 +82,6 @@ FIRST_ROW = "Number(document.querySelector('#grid tr[data-at]').dataset.at)"
 
 @pytest.fixture
 def scrolled(page: "Page") -> Iterator["Page"]:
-    """The table, scrolled until its first rows are not in the page."""
     page.page.evaluate(SCROLLED)
     page.page.wait_for_function(f"{FIRST_ROW} === 2")
     yield page
@@ -114,7 +113,6 @@ def test_a_redraw_that_is_due_while_printing_is_for_paper(scrolled: "Page", due:
 
 
 def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scrolled: "Page") -> None:
-    """After a scroll, the printed page has five rows, and the window keeps its position."""
     page = scrolled.page
     page.evaluate("document.querySelector('#grid').hidden = true")
     others = rows_of(page.pdf(tagged=True))
@@ -126,5 +124,4 @@ def test_a_printed_page_has_all_its_rows_and_the_screen_gets_its_own_back(scroll
 
 
 def rows_of(pdf: bytes) -> int:
-    """Return the number of rows in the tables of a tagged PDF."""
     return len(re.findall(rb"/S\s*/TR\b", pdf))

@@ -26,7 +26,6 @@ def file(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
 
 @pytest.fixture
 def open_page(browser: Any, file: Path) -> Iterator[Callable[..., Any]]:
-    """Open the page. An error in the console fails the test."""
     errors: list[str] = []
     contexts = []
 
@@ -111,7 +110,6 @@ def test_groups_that_are_alike_are_folded(open_page: Callable[..., Any]) -> None
 
 
 def test_all_that_a_filter_shows_are_marked_after_a_question(open_page: Callable[..., Any]) -> None:
-    """The question states the number and the states. Without a yes, nothing is marked."""
     page = open_page("q=gap")
     page.keyboard.press("Shift+R")
     assert page.inner_text("#ask-title") == "Reject 2 groups?"
@@ -142,6 +140,5 @@ def test_a_narrow_screen_needs_no_scrolling_sideways(open_page: Callable[..., An
 def test_axe_finds_no_serious_fault(
     open_page: Callable[..., Any], serious_faults: Callable[[Any], list[str]], scheme: str
 ) -> None:
-    """axe finds no serious fault in the list of groups or in an opened one."""
     page = open_page(color_scheme=scheme, reduced_motion="reduce")
     assert serious_faults(page) == []

@@ -20,7 +20,6 @@ HACKED = "globalThis.hacked = true"
 def address(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace], serve: Callable[..., Any]
 ) -> Iterator[str]:
-    """The address of a server with a copy of the synthetic run in runs/night."""
     shutil.copytree(run, tmp_path / "runs" / "night")
     with serve(copy_toycar(tmp_path), (tmp_path / "runs",)) as found:
         yield found

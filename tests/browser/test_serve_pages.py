@@ -15,7 +15,6 @@ Visit = Callable[..., Any]
 
 @pytest.fixture(scope="module")
 def folder(run: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder of runs with a copy of the synthetic run."""
     runs = tmp_path_factory.mktemp("runs")
     shutil.copytree(run, runs / "night")
     return runs

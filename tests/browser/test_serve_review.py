@@ -28,7 +28,6 @@ def library(
 
 @pytest.fixture(scope="module")
 def address(library: Workspace, serve: Callable[..., Any]) -> Iterator[str]:
-    """The address of a server of that library."""
     with serve(library) as found:
         yield found
 

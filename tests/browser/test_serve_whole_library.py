@@ -69,7 +69,6 @@ def marked(page: Any, count: int) -> dict[str, str]:
 
 
 def shown(page: Any, group: str) -> str:
-    """Return the marks that the page shows for a group, as keys."""
     pressed = f"#group-{group} .head [data-mark][aria-pressed=true]"
     kinds = page.eval_on_selector_all(pressed, "all => all.map((button) => button.dataset.mark)")
     return "".join(kind[0] for kind in kinds)

@@ -114,10 +114,6 @@ def test_search_finds_what_newcomers_look_for(site: Path, visited: Any) -> None:
 
 
 def test_a_console_block_is_copied_without_prompts_and_output(site: Path, visited: Any) -> None:
-    """The button of a console block copies only its commands.
-
-    The button of any other block copies all of it.
-    """
     visited.context.grant_permissions(["clipboard-read", "clipboard-write"])
     visited.goto((site / "docs" / "tutorial" / "first-campaign.html").as_uri())
     copied = []

@@ -54,7 +54,6 @@ def test_the_worst_are_listed_and_the_map_counts_all(
 def test_an_experiment_that_is_not_listed_is_told(
     run: Path, large: Path, open_report: "Callable[[Path], Page]"
 ) -> None:
-    """A link to an experiment that is not listed shows the command that prints it."""
     ids = open_report(run).page.evaluate(
         "Packed.read('table').then((t) => t.columns.find((c) => c.name === 'experiment_id').texts)"
     )

@@ -39,7 +39,6 @@ def own(root: Path) -> Path:
 
 
 def test_the_spec_without_a_mistake_is_fine(cli: Cli, own: Path) -> None:
-    """The spec that the other tests break is valid."""
     assert cli("diff", own).code == 0
 
 
@@ -178,7 +177,6 @@ def test_a_run_folder_of_a_newer_schema_is_left_alone(cli: Cli, root: Path) -> N
 def test_the_command_line_names_its_options(
     cli: Cli, own: Path, root: Path, words: list[str], said: str
 ) -> None:
-    """Where the API names an argument, the command line names the matching option."""
     answer = cli(*words)
     assert answer.code == 2, answer.err
     assert said in answer.err

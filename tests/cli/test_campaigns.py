@@ -51,7 +51,6 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, subprocess
 
 @pytest.fixture
 def run(finished: tuple[Path, Any], monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The finished run's folder. Its root is the current folder."""
     root, _ = finished
     monkeypatch.chdir(root)
     monkeypatch.setenv("MUTATOR_ROOT", str(root))
@@ -63,7 +62,6 @@ def results(run: Path) -> list[str]:
 
 
 def experiment_with(run: Path, word: str) -> str:
-    """Return the id of the first experiment with `word` in its row."""
     return next(line.split(",")[0] for line in results(run) if f",{word}," in line)
 
 
@@ -178,14 +176,12 @@ def test_run_as_json(cli: Cli, run: Path) -> None:
 
 
 def test_other_choices_need_another_folder(cli: Cli, run: Path) -> None:
-    """A run folder resumes only with the options it was planned with."""
     answer = cli("run", "toy", "--out", run, "--limit", "9")
     assert answer.code == 2
     assert "--limit" in answer.err
 
 
 def wait_for(folder: Path, files: str) -> None:
-    """Wait at most a minute until the folder contains files that match."""
     deadline = time.monotonic() + 60
     while not any(folder.glob(files)) and time.monotonic() < deadline:
         time.sleep(0.05)
@@ -234,7 +230,6 @@ def test_report_is_made_again_from_the_records(cli: Cli, run: Path) -> None:
 
 
 def test_report_of_a_folder_of_runs_is_their_history(cli: Cli, run: Path, tmp_path: Path) -> None:
-    """The history is written into that folder and names each run."""
     shutil.copytree(run, tmp_path / "runs" / "first")
     answer = cli("report", tmp_path / "runs", "--json")
     assert answer.code == 0
@@ -263,7 +258,6 @@ def test_a_report_of_a_run_whose_proof_failed(cli: Cli, run: Path, tmp_path: Pat
 
 
 def test_a_library_for_the_report_can_be_named(cli: Cli, run: Path, root: Path, nowhere: Path) -> None:
-    """A report is written without a library, but a library that the user names must exist."""
     assert cli("report", run).code == 0
     assert cli("report", run, "--root", root).code == 0
     answer = cli("report", run, "--root", nowhere / "none")
@@ -354,7 +348,6 @@ def test_rerun_gives_the_same_again(cli: Cli, run: Path) -> None:
 
 
 def test_rerun_keeps_a_trace(cli: Cli, run: Path) -> None:
-    """With --trace the trace and a plot stay in the run folder."""
     name = experiment_with(run, "sdc")
     answer = cli("rerun", name, "--trace", "--json").json
     assert answer["same_as_record"] is True
@@ -380,7 +373,6 @@ def test_rerun_tells_a_difference(cli: Cli, run: Path, tmp_path: Path, reseal: R
 
 
 def test_clean_deletes_run_folders_only(cli: Cli, root: Path) -> None:
-    """`clean` deletes a run folder only after a yes, and never deletes any other folder."""
     cli("plan", "toy", "--out", "runs/p", "--limit", "2")
     Path("mine").mkdir()
     assert cli("clean", "mine", "--yes").code == 2

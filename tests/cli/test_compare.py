@@ -83,7 +83,6 @@ def test_a_gate_fails_and_names(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_run_with_itself(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """A run compared with itself passes every gate and has no difference."""
     _, after = runs
     answer = cli("compare", after, after, "--json", "--fail-on", "new-hazard,worse,harness-error,unmatched")
     assert answer.code == 0
@@ -143,7 +142,6 @@ def test_export(cli: Cli, runs: tuple[Path, Path]) -> None:
 
 
 def test_a_gate_on_severity_needs_classes(cli: Cli, runs: tuple[Path, Path]) -> None:
-    """For a target without severity classes, a gate on severity is wrong input."""
     answer = cli("compare", *runs, "--fail-on", "severity:S2")
     assert answer.code == 2
     assert "has no severity classes" in answer.err

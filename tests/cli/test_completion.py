@@ -49,7 +49,6 @@ def test_names_are_completed(complete: Complete, words: list[str], offered: list
 
 
 def test_run_folders_and_their_experiments_are_completed(complete: Complete, cli: Cli) -> None:
-    """Run folders in runs/ are offered, and the experiment ids of the named run or of the newest one."""
     cli("plan", "small", "--out", "runs/old", "--limit", "2")
     cli("plan", "toy", "--out", "runs/new", "--limit", "2")
     os.utime("runs/old/run.json", (1, 1))
@@ -86,7 +85,6 @@ def test_the_script_for_a_shell_is_printed(cli: Cli, monkeypatch: pytest.MonkeyP
 
 
 def test_completion_loads_little(root: Path) -> None:
-    """Completion imports no large package."""
     code = (
         "import sys\nfrom mutator.cli.app import main\nassert main() == 0\n"
         "print(sorted({'jinja2', 'libcst', 'numpy', 'pandas', 'yaml', 'rich'} & set(sys.modules)))"

@@ -115,7 +115,6 @@ def work(tmp_path: Path) -> Path:
 
 
 def work_through(page: Path, folder: Path) -> list[tuple[str, str]]:
-    """Follow the page in `folder` and return the commands with their output."""
     printed = []
     for what, text in steps(page):
         if isinstance(text, list):
@@ -208,7 +207,6 @@ def test_what_costs_little_is_always_tried(cli: Cli, command: str, monkeypatch: 
 
 
 def test_the_readme_shows_the_table_of_the_tutorial() -> None:
-    """README and tutorial run the same campaign and show the same numbers."""
     [table] = TABLE.findall(README.read_text(encoding="utf-8"))
     [shown] = [said for command, said in sessions(TUTORIAL) if command.startswith(CAMPAIGN)]
     assert table.replace("runs/quickstart", "runs/first").splitlines() == shown
@@ -285,7 +283,6 @@ def test_editors_are_told_of_every_schema() -> None:
 
 
 def test_every_benchmark_is_told_of() -> None:
-    """The table of benchmarks has exactly one line for each benchmark."""
     told = re.findall(r"^\| `(\w+\.py)` ", BENCHMARKS.read_text(encoding="utf-8"), re.MULTILINE)
     assert sorted(told) == sorted(file.name for file in BENCHMARKS.parent.glob("*.py"))
 

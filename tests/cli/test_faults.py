@@ -26,7 +26,6 @@ def test_diff_shows_one_diff_for_each_variant(cli: Cli, root: Path) -> None:
 
 
 def test_a_value_of_ones_own_is_taken_exactly(cli: Cli, root: Path) -> None:
-    """`--value` replaces the drawn values."""
     answer = cli("diff", "sensor/distance", "--variant", "longer", "--value", "12.5")
     assert "sensor/distance/longer 12.5 m\n" in answer.out
     assert "gap = gap + 12.5  # fi:" in answer.out
@@ -41,7 +40,6 @@ def test_a_whole_diff_can_be_applied(cli: Cli, root: Path) -> None:
 
 
 def test_a_spec_file_need_not_be_in_the_library(cli: Cli, root: Path) -> None:
-    """A spec file outside the library works by its path as by its name."""
     own = Path("own.yaml")
     shutil.move(root / "fault_library" / "faults" / "sensor" / "distance.yaml", own)
     assert cli("diff", own).code == 0

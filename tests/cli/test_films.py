@@ -118,7 +118,6 @@ def test_what_the_command_complains_of_is_told(cli: Cli, name: str) -> None:
 
 
 def test_a_target_without_films_says_so(cli: Cli, root: Path) -> None:
-    """Without `film` in the manifest, the error says what to write there."""
     manifest = root / "fault_library/targets/toycar.yaml"
     before, rest = manifest.read_text().split("film:\n")
     manifest.write_text(before + "trace:" + rest.split("trace:")[1])

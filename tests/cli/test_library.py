@@ -10,7 +10,6 @@ Cli = Callable[..., Any]  # runs `mutator WORDS...`; returns code, out, err, jso
 
 
 def test_list_shows_every_kind(cli: Cli, root: Path) -> None:
-    """`list` shows everything in the library under its kind, with counts."""
     answer = cli("list")
     assert answer.code == 0
     for wanted in ("specs (3)", "sensor/distance", "scenarios (2)", "campaigns (", "models (", "offset"):
@@ -119,13 +118,11 @@ def test_check_drive_fails_for_a_clock(cli: Cli, root: Path) -> None:
 
 
 def test_scenarios_are_for_drives(cli: Cli, root: Path) -> None:
-    """A scenario without `--drive`, or an unknown one, is refused."""
     assert "add --drive" in cli("check", "--scenario", "A").err
     assert cli("check", "--drive", "--scenario", "nowhere").code == 2
 
 
 def test_doctor_is_content_with_this_machine(cli: Cli, root: Path) -> None:
-    """On a machine that runs the tests, `doctor` reports no failure."""
     answer = cli("doctor")
     assert answer.code == 0
     assert answer.out.endswith("ready\n")

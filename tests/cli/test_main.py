@@ -21,7 +21,6 @@ HEAVY = ("pandas", "libcst", "matplotlib", "pydantic", "rich", "jinja2", "pyarro
 
 
 def test_every_verb_is_in_the_help_under_a_heading(cli: Cli) -> None:
-    """The help lists every verb once, under a group heading."""
     answer = cli("--help")
     assert answer.code == 0
     registered = [*app.registered_commands, *app.registered_groups]
@@ -40,17 +39,14 @@ def test_each_verb_explains_itself(cli: Cli, verb: str) -> None:
 
 
 def test_no_word_at_all_is_a_call_for_help(cli: Cli) -> None:
-    """`mutator` alone prints the help."""
     assert cli() == cli("--help")
 
 
 def test_the_version_is_told(cli: Cli) -> None:
-    """`--version` prints name and version."""
     assert cli("--version").out == f"mutator {__version__}\n"
 
 
 def test_help_needs_no_heavy_package() -> None:
-    """Help and usage errors import no slow package."""
     code = (
         "import sys, mutator.cli.app as m; m.main(['--help']);"
         f"print([x for x in {HEAVY} if x in sys.modules])"
@@ -71,7 +67,6 @@ def test_listing_needs_neither_splicer_nor_plots_nor_tables() -> None:
 
 
 def test_python_m_mutator_is_mutator() -> None:
-    """`python -m mutator` works with the same exit codes."""
     done = subprocess.run(
         [sys.executable, "-m", "mutator", "lst"], capture_output=True, text=True, check=False
     )
@@ -116,7 +111,6 @@ def test_a_library_that_is_missing_is_told(cli: Cli, nowhere: Path, monkeypatch:
 
 
 def test_library_and_templates_are_found_by_options(cli: Cli, root: Path, nowhere: Path) -> None:
-    """The library options work before and after the verb."""
     place = ["--root", root.parent, "--library", root / "fault_library", "--templates", root / "templates"]
     before, after = cli(*place, "list", "specs"), cli("list", "specs", *place)
     assert before.code == after.code == 0
@@ -125,8 +119,6 @@ def test_library_and_templates_are_found_by_options(cli: Cli, root: Path, nowher
 
 
 def fail_with(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
-    """Make `list` fail with `error`."""
-
     def broken(_: object) -> None:
         raise error
 
@@ -189,7 +181,6 @@ def test_a_closed_pipe_is_no_error(words: str) -> None:
 
 
 def test_main_returns_the_code_of_a_verb(root: Path) -> None:
-    """`main` returns its exit code, so that a program can call it."""
     assert main(["list", "targets"]) == 0
 
 

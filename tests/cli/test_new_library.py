@@ -24,7 +24,6 @@ def test_init_writes_a_library_that_is_then_used(
 
 
 def test_the_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
-    """The five commands in the README are verbs of the command line."""
     cli("init", "faults")
     readme = (nowhere / "faults" / "README.md").read_text()
     block = readme.split("```sh\n")[1].split("```")[0]
@@ -34,7 +33,6 @@ def test_the_readme_names_commands_that_exist(cli: Cli, nowhere: Path) -> None:
 
 
 def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
-    """A folder with content is wrong input and stays unchanged."""
     (nowhere / "thesis.tex").touch()
     answer = cli("init", ".")
     assert answer.code == 2
@@ -43,7 +41,6 @@ def test_init_refuses_a_folder_with_content(cli: Cli, nowhere: Path) -> None:
 
 
 def test_init_for_a_program(cli: Cli, nowhere: Path) -> None:
-    """With `--json`, `init` prints the folder."""
     assert cli("init", "faults", "--json").json == {"folder": "faults"}
 
 

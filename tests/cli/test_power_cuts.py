@@ -53,7 +53,6 @@ def cut(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch, driven: list[Any]
 
 @pytest.fixture
 def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
-    """Return the seal of the same run without a power cut."""
     if not driven[1:]:
         shutil.copytree(cut, "whole")
         whole = cli(*("whole" if word == "run" and place else word for place, word in enumerate(WORDS)))
@@ -65,7 +64,6 @@ def seal(cli: Cli, cut: Path, driven: list[Any]) -> str:
 
 
 def last_block(path: Path) -> int:
-    """Return the offset of a file's last block."""
     data = path.read_bytes()
     return data.rindex(b"FIB1", 0, read_blocks(path).blocks[-1].offset)
 
@@ -73,7 +71,6 @@ def last_block(path: Path) -> int:
 def test_records_are_synced_after_what_they_refer_to(
     cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Before a record is synced, its patch and series are on the disk."""
     synced: dict[str, int] = {}
     looks = []
     fsync = os.fsync

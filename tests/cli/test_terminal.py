@@ -51,14 +51,12 @@ def test_a_diff_is_coloured_line_by_line(cli: Cli, root: Path, terminal: None) -
 
 
 def test_a_table_fits_the_terminal(cli: Cli, root: Path, terminal: None) -> None:
-    """A table is no wider than the terminal and has a rule under its heads."""
     lines = ANSI.sub("", cli("list", "models").out).splitlines()
     assert all(len(line.rstrip()) <= 120 for line in lines)
     assert any(set(line.strip()) == {"─"} for line in lines)
 
 
 def test_json_stays_plain_in_a_terminal(cli: Cli, root: Path, terminal: None) -> None:
-    """With --json the output is plain JSON even in a terminal."""
     assert cli("list", "specs", "--json").json["specs"]
 
 
@@ -95,7 +93,6 @@ def test_progress_in_a_log(capsys: pytest.CaptureFixture[str]) -> None:
     [(0.4, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")],
 )
 def test_durations(seconds: float, words: str) -> None:
-    """Durations are printed in a suitable unit."""
     assert duration(seconds) == words
 
 
@@ -168,7 +165,6 @@ def test_a_pipe_gets_lines_of_100_columns(
 
 
 def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], terminal: None) -> None:
-    """In a terminal of 120 columns, lines are folded to 120 columns."""
     Terminal().say(f"{LONG}; or {COMMAND}")
     lines = ANSI.sub("", capsys.readouterr().out).splitlines()
     assert all(len(line) <= 120 for line in lines)
@@ -177,7 +173,6 @@ def test_a_terminal_gets_lines_of_its_width(capsys: pytest.CaptureFixture[str], 
 
 
 def test_json_is_never_folded(cli: Cli, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """JSON is not folded, however narrow the terminal is."""
     wide = cli("list", "specs", "--json").out
     monkeypatch.setenv("COLUMNS", "20")
     assert cli("list", "specs", "--json").out == wide

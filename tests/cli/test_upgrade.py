@@ -68,7 +68,6 @@ def test_what_is_compared_and_plotted_is_an_actuator(cli, path: Path) -> None:
 
 
 def test_line_breaks_and_links_stay(cli, path: Path) -> None:
-    """A file with Windows line breaks keeps them, and a link stays a link."""
     path.write_bytes(path.read_bytes().replace(b"\n", b"\r\n"))
     link = path.with_name("link.yaml")
     link.symlink_to(path.name)

@@ -41,7 +41,6 @@ MOMENTS = [Moment(1.5 + 0.05 * k, 40.0 + 1.34 * k, 26.8) for k in range(20)]
 
 
 def digests() -> Iterator[tuple[str, str]]:
-    """Return names and digests."""
     yield from ((name, digest(picture)) for name, picture in roads().items())
     for detector in DETECTORS:
         for level in (4, 9):

@@ -24,7 +24,6 @@ def results(out: Path) -> Bytes:
 
 
 def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) -> list[str]:
-    """Return the words with which a user of pytest starts a campaign."""
     plain = ["-m", "pytest", "-p", "no:cacheprovider", "-p", "no:hypothesispytest", "--assert=plain"]
     return [*plain, "--campaign", str(campaign), "--campaign-out", str(out), "-n", str(workers)]
 
@@ -48,12 +47,10 @@ class Command:
         )
 
     def wait_for_records(self, count: int) -> None:
-        """Wait until that many experiments have a record."""
         files = self.out / "records"
         self._wait(lambda: sum(p.read_bytes().count(b"\n") - 1 for p in files.glob("*.jsonl")) >= count)
 
     def wait_for(self, path: Path) -> None:
-        """Wait until this path exists."""
         self._wait(path.exists)
 
     def _wait(self, reached: Callable[[], bool]) -> None:

@@ -38,7 +38,6 @@ class Machines:
             time.sleep(0.05)
 
     def add(self, name: str, **environment: str) -> None:
-        """Start a worker with that name and one thread."""
         words = ["--scheduler-file", str(self.file), "--name", name, "--nthreads", "1", "--no-dashboard"]
         words += ["--host", "127.0.0.1", "--memory-limit", "0", "--nanny" if self.nanny else "--no-nanny"]
         words += ["--local-directory", str(self.folder / name / "dask"), "--death-timeout", "60"]

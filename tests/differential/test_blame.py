@@ -256,14 +256,12 @@ class Blamed:
         return [finished.record for finished in runner.run(experiments)]
 
     def record(self, fault: Fault, trigger: Trigger = FROM_2_S, scenario: str = "A") -> Record:
-        """The record of an experiment, which every engine must agree on."""
         experiment = self.experiment(fault, trigger, scenario)
         reference, *others = [record for name in ENGINES for record in self.run(name, [experiment])]
         assert others == [reference, reference]
         return reference
 
     def line(self, fault: Fault, place: str) -> str:
-        """Return the line of the mutant at that place."""
         path, _, number = place.partition(":")
         files = build(self.manifest, self.models, fault, FROM_2_S).files
         data = files.get(path) or self.manifest.tree.files[path]
@@ -341,7 +339,6 @@ WORLD = Anchor(kind=AnchorKind.BEFORE_ASSIGN, name="offset")
 def test_an_injected_line_raises(
     blamed: Blamed, injected: Fault, scenario: str, code: str, error: str
 ) -> None:
-    """If an injected line raises, the mutant is invalid and the line is named."""
     record = blamed.record(injected, scenario=scenario)
     assert record.status is Status.INVALID_MUTANT
     named, _, rest = record.detail.partition(": the injected ")
@@ -384,7 +381,6 @@ def test_a_statement_of_the_target_raises_once_more(
     ],
 )
 def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -> None:
-    """Nothing that happens before the activation is blamed on the fault."""
     record = blamed.record(sensed("fail"), scenario=f"early{number}")
     place = f" ({record.error.place})" if record.error else ""
     assert (record.error is not None) is (number < 2)
@@ -394,7 +390,6 @@ def test_before_the_first_activation(blamed: Blamed, number: int, detail: str) -
 
 @pytest.mark.slow
 def test_a_hang_after_the_activation(blamed: Blamed) -> None:
-    """A run that hangs after the activation is a timeout."""
     record = blamed.record(sensed("hang"))
     assert (record.status, record.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
@@ -417,7 +412,6 @@ def test_a_mutant_overwrites_its_probe(blamed: Blamed, mood: str, detail: str) -
 
 
 def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
-    """A damaged report costs one experiment. Those before and after it keep their results."""
     experiments = [blamed.experiment(f) for f in (at_gap("offset", by=1.0), sensed("damage_the_counts"))]
     experiments.append(blamed.experiment(at_gap("offset", by=2.0)))
     for engine in blamed.engines:

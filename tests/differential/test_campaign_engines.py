@@ -35,7 +35,6 @@ def expected(
 def test_every_engine_gives_the_same_tables(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], engine: str, workers: int
 ) -> None:
-    """The tables of a campaign are the same bytes for each engine and any number of workers."""
     summary = run_campaign(toy, "toy", tmp_path / "run", engine=engine, workers=workers)
     assert (summary.exit_code, summary.problem) == (0, "")
     assert summary.proof == Proof(sampled=20, same=20)

@@ -27,7 +27,6 @@ CopyToycar = Callable[[Path], Workspace]
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, with cached checks."""
     return toy
 
 

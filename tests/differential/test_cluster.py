@@ -29,7 +29,6 @@ INT, TERM, KILL, STOP = signal.SIGINT, signal.SIGTERM, signal.SIGKILL, signal.SI
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, with cached checks."""
     return toy
 
 
@@ -90,7 +89,6 @@ def test_two_workers_give_the_same_bytes(
 def test_pytest_deals_out_to_a_cluster(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
-    """`pytest --campaign ... --campaign-cluster WHERE` gives the same tables."""
     words = [*pytest_words(tmp_path / "run", workers=0), "--campaign-cluster", str(two.file)]
     words = [word for word in words if word not in ("-n", "0")]
     command = Command(toy, tmp_path / "run", *words)

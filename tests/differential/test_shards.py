@@ -46,7 +46,6 @@ def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path],
 
 @pytest.fixture
 def copies(runs: Runs, tmp_path: Path) -> Runs:
-    """Copies of these runs that a test may damage."""
     return {name: Path(shutil.copytree(path, tmp_path / path.name)) for name, path in runs.items()}
 
 
@@ -233,7 +232,6 @@ def test_a_shard_whose_proof_failed_is_told(
 
 
 def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> None:
-    """The folder of another run stays unchanged."""
     before = (runs["whole"] / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match="holds a run"):
         merge([runs["1/2"], runs["2/2"]], runs["whole"])

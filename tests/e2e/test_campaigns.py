@@ -39,7 +39,6 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture
 def toy(toy: Workspace, kept_checks: None) -> Workspace:
-    """The toy, with cached checks."""
     return toy
 
 
@@ -247,7 +246,6 @@ def test_the_users_pytest_is_another_matter(
 
 
 def test_scenarios_in_a_folder_of_the_library(toy: Workspace, tmp_path: Path) -> None:
-    """A scenario in a subfolder runs like any other."""
     (toy.library / "scenarios" / "more").mkdir()
     shutil.move(toy.scenario("A"), toy.library / "scenarios" / "more" / "A.yaml")
     path = toy.campaign("small")
@@ -285,7 +283,6 @@ def test_choices_are_frozen(toy: Workspace, finished: Path) -> None:
 
 
 def test_a_changed_target_is_refused(toy: Workspace, finished: Path) -> None:
-    """A finished run is refused if its target was edited afterwards."""
     with (toy.library.parent / "tree" / "toycar" / "driver.py").open("a") as file:
         file.write("# edited\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):

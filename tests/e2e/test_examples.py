@@ -26,7 +26,6 @@ FORKED = 0.95
 
 @pytest.fixture(scope="module", params=INSTALLED)
 def example(request: pytest.FixtureRequest) -> str:
-    """An example with its packages installed."""
     name: str = request.param
     for package in (INSTALLED[name], ALSO.get(name, "numpy")):
         if find_spec(package) is None:
@@ -74,7 +73,6 @@ def test_only_a_contact_has_a_contact_speed(run: Path) -> None:
 
 
 def test_nearly_all_are_forked(run: Path) -> None:
-    """At least 95 % of the experiments that do not crash are forks of the golden run."""
     ended = {row["experiment_id"] for row in rows(run) if row["status"] == "ok"}
     timings = RunFolder.open(run).timings()
     forked = {name for name in ended if timings[name]["engine"] == RunMode.FORK}
@@ -97,7 +95,6 @@ def own_lines(folder: Path, suffix: str) -> Counter[str]:
 
 
 def scene_lines(folder: Path) -> Counter[str]:
-    """Return the lines of the manifest's scene."""
     (manifest,) = folder.glob("fault_library/targets/*.yaml")
     (scene,) = re.findall(r"(?m)^scene:.*\n(?:[ #].*\n?)+", manifest.read_text())
     return counted(scene)

@@ -84,7 +84,6 @@ def started(folder: Path, root: Path) -> tuple[subprocess.Popen[str], str]:
 
 
 def descendants(pid: int) -> set[int]:
-    """Return all descendants of a process, in any session."""
     parents = {}
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -147,7 +146,6 @@ def kill(server: Server, number: int) -> int:
 
 @pytest.fixture
 def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Server]:
-    """A server of the toy without any run."""
     shutil.rmtree(toycar.library / "faults" / "hostile")
     (tmp_path / "runs").mkdir()
     started = Server.start(tmp_path, toycar.library.parent)
@@ -160,7 +158,6 @@ def server(tmp_path: Path, toycar: Workspace, kept_checks: None) -> Iterator[Ser
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
 @pytest.mark.parametrize("stage", ["planning", "experiments", "tables"])
 def test_a_campaign_ends_with_the_server(server: Server, stage: str, number: int) -> None:
-    """A campaign ends with its server at any stage and signal. The same campaign then completes."""
     server.ask("/api/jobs", CAMPAIGN)
     server.wait_for(lambda job: job["message"].startswith(stage) or bool(job["ended"]))
     assert kill(server, number)

@@ -30,7 +30,6 @@ Cli = Callable[..., tuple[int, str, str]]
 
 @pytest.fixture(scope="module", params=FIXTURES, ids=lambda path: path.name)
 def fixture(request: pytest.FixtureRequest) -> Path:
-    """A fixture. No test may write to it."""
     path: Path = request.param
     return path
 
@@ -81,7 +80,6 @@ def assert_same_cells(new: Path, old: Path) -> None:
 
 
 def test_there_is_one_for_each_schema() -> None:
-    """Every run-folder schema has a fixture."""
     schemas = [RunFolder.open(path / "small").head["schema"] for path in FIXTURES]
     assert [path.name.replace("-", "/") for path in FIXTURES] == schemas
     assert schemas == [f"run/{number}" for number in range(1, len(schemas) + 1)] and schemas[-1] == SCHEMA

@@ -68,7 +68,6 @@ def half(toy: Workspace, tmp_path: Path, python: Callable[[str], None]) -> Path:
 
 @pytest.fixture
 def python(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
-    """Pretend to be a Python of this version."""
     return lambda version: monkeypatch.setattr("platform.python_version", lambda: version)
 
 

@@ -53,7 +53,6 @@ def files(wheel: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def built(clone: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the clone's sdist and the wheel built from it."""
     out = tmp_path_factory.mktemp("built")
     call(sys.executable, "-m", "build", "--outdir", out, clone, here=out)
     return out

@@ -44,7 +44,6 @@ class ModuleWriter(StatementWriter):
     """Writes one module: the same bytes for the same seed on one version of Python."""
 
     def module(self) -> bytes:
-        """The module, in any encoding and with any line endings."""
         encoding = self._drawn(_ENCODINGS)
         lines = self._head(encoding)
         scope = Scope(level=0, kind="module", known=[*GLOBALS], pool=("m0", "m1"))
@@ -101,7 +100,6 @@ class ModuleWriter(StatementWriter):
     # Blocks
 
     def block(self, scope: Scope, indent: str) -> list[str]:
-        """The lines of a block, deeper than `indent`."""
         inner = indent + self.rng.choice(_UNITS)
         lines: list[str] = []
         for _ in range(self.rng.randint(1, 3)):

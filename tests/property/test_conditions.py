@@ -63,7 +63,6 @@ def test_no_observation_raises(text: str, a: str, b: str, values: dict[str, floa
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=40) | st.text(alphabet="gap speed<=>()[].'_+-*/0123456789,:andort", max_size=40))
 def test_any_text_is_answered(text: str) -> None:
-    """Any text is an allowed condition or a MutatorError."""
     try:
         code = to_code(check_condition(text, variables=VARIABLES))
     except MutatorError:

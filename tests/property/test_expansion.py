@@ -61,7 +61,6 @@ def test_no_value_twice_and_no_zero(seed: int, decimals: int) -> None:
 def test_more_ranges_leave_earlier_values_alone(
     seed: int, ranges: tuple[tuple[float, float], ...], count: int
 ) -> None:
-    """A spec extended at its end keeps its earlier values."""
     whole = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges)
     part = Draw(key="k", name="x", unit="m", kind="reals", ranges=ranges[:count])
     assert draw_values(part, seed) == draw_values(whole, seed)[:count]
@@ -79,6 +78,5 @@ def test_readings_are_matched(seed: int) -> None:
 @settings(max_examples=10, deadline=None)
 @given(SEEDS, st.permutations(SPECS), st.sampled_from(CLONE.readings().names))
 def test_order_does_not_matter(seed: int, specs: list, reading: str) -> None:
-    """A fault does not depend on the order of expansion or on the other specs."""
     found = {f.id for s in specs for f in expand(s, seed, reading, models=MODELS, manifest=MANIFEST)}
     assert found == {f.id for f in library(seed, reading)}

@@ -59,7 +59,6 @@ class WithoutProbe(ast.NodeTransformer):
 
 
 def probe(ids: Sequence[str]) -> Any:
-    """A probe that is active from time 1 until 2."""
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 2")

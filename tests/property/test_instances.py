@@ -29,7 +29,6 @@ SHAPES = (
 
 
 def statements(file: ParsedFile) -> Iterator[FaultLocation]:
-    """Every statement of a file that assigns and can be guarded."""
     for function, known in file.functions.items():
         seen = Counter(name for one in known for s in one.statements if not s.reason for name in s.assigns)
         for name, count in seen.items():

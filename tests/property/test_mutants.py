@@ -40,7 +40,6 @@ def paper() -> tuple[TargetManifest, FaultModels]:
 
 @cache
 def faults() -> list[Fault]:
-    """Every fault of the library, in both readings."""
     manifest, models = paper()
     specs = Workspace.find(root=ROOT).specs()
     return [

@@ -72,7 +72,6 @@ def test_the_standard_library(part: int | None) -> None:
 
 
 def test_a_seed_makes_one_module() -> None:
-    """A seed reproduces its module, so failures can be reproduced."""
     assert ModuleWriter(7).module() == ModuleWriter(7).module() != ModuleWriter(8).module()
 
 

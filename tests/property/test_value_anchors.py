@@ -67,7 +67,6 @@ def module(name: str) -> ParsedFile | None:
 
 
 def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
-    """Every expression of a file, by each of its anchors."""
     for function, known in file.expressions.items():
         seen = Counter[tuple[AnchorKind, str, str | None]]()
         for expression in known:
@@ -79,7 +78,6 @@ def anchors(file: ParsedFile) -> Iterator[tuple[Expression, FaultLocation]]:
 
 
 def active(node: ast.expr) -> bool:
-    """Whether the node asks the probe if a fault is active."""
     return isinstance(node, ast.Call) and ast.unparse(node.func) == "_fi.active"
 
 
@@ -117,7 +115,6 @@ def edit_of(file: ParsedFile, case: Case, number: int) -> ValueEdit:
 
 
 def apart(cases: Sequence[Case]) -> Iterator[list[Case]]:
-    """The cases in groups of expressions that do not contain each other."""
     left = list(cases)
     while left:
         group: list[Case] = []
@@ -177,7 +174,6 @@ def test_a_changed_value_is_all_that_differs_at_large() -> None:
 
 
 def mutations(file: ParsedFile) -> Iterator[Mutation]:
-    """All operators' mutations of a module."""
     tree = SourceTree(root=Path(), files={file.path: file.data}, digest="", _entries={})
     facts = facts_of(tree, file.path)
     for function in file.functions:

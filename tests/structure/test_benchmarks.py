@@ -10,6 +10,5 @@ FOLDER = Path(__file__).resolve().parents[2] / "benchmarks"
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in FOLDER.glob("*.py")))
 def test_every_benchmark_can_be_imported(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every benchmark has a `main` and measures nothing when it is imported."""
     monkeypatch.syspath_prepend(FOLDER)
     assert callable(importlib.import_module(name).main)

@@ -132,12 +132,10 @@ def test_what_runs_inside_a_target_needs_little() -> None:
 
 
 def test_no_function_bears_its_modules_name() -> None:
-    """No function has its module's name, so `package.name` has one meaning."""
     assert not namesakes(CLONE)
 
 
 def test_every_package_says_what_it_is_for() -> None:
-    """The docstring of each package says what belongs there and what does not."""
     for path in (CLONE / "mutator").rglob("__init__.py"):
         text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8")))
         assert text and len(text) > 60, path
@@ -170,7 +168,6 @@ VIOLATIONS = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", VIOLATIONS)
 def test_a_violation_fails_the_lint(name: str, tmp_path: Path) -> None:
-    """The linter reports a violation of each contract."""
     ignored = shutil.ignore_patterns("__pycache__", "*.npz")
     for folder in ("mutator", "target"):
         shutil.copytree(CLONE / folder, tmp_path / folder, ignore=ignored)

@@ -20,8 +20,6 @@ STRANGE: tuple[object, ...] = (
 
 
 def _bytes(change: Callable[[bytes, Chance], bytes]) -> Damage:
-    """A damage of the bytes of a file."""
-
     def damage(path: Path, others: Sequence[Path], chance: Chance) -> None:
         path.write_bytes(change(path.read_bytes(), chance))
 
@@ -29,8 +27,6 @@ def _bytes(change: Callable[[bytes, Chance], bytes]) -> Damage:
 
 
 def _lines(change: Callable[[list[bytes], Chance], None]) -> Damage:
-    """A damage of the list of its lines."""
-
     def damage(path: Path, others: Sequence[Path], chance: Chance) -> None:
         lines = path.read_bytes().splitlines(keepends=True)
         if lines:
@@ -149,7 +145,6 @@ def change_json(path: Path, others: Sequence[Path], chance: Chance) -> None:
 
 
 def changed(value: Any, chance: Chance, strange: Sequence[object] = STRANGE) -> Any:
-    """Return the value with one nested value changed, at any depth."""
     inside = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     if not inside or chance.random() < 0.1:
         return chance.choice(strange)

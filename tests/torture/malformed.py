@@ -42,7 +42,6 @@ def insert_a_shape(text: str, chance: Chance) -> str:
 
 
 def repeat_a_line(text: str, chance: Chance) -> str:
-    """Repeat a line thousands of times."""
     lines = text.splitlines(keepends=True) or ["a\n"]
     place = chance.randrange(len(lines))
     return "".join([*lines[:place], lines[place] * chance.choice([2, 3000]), *lines[place + 1 :]])

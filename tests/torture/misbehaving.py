@@ -122,7 +122,6 @@ class Misdeed:
 
 
 def misdeeds() -> dict[str, Misdeed]:
-    """All misdeeds, by name."""
     _, *parts = re.split(r"^== ", LISTED.read_text(), flags=re.MULTILINE)
     found = {}
     for part in parts:

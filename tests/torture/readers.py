@@ -80,7 +80,6 @@ def _told(words: tuple[object, ...], *files: Path, printed: bool = False) -> Tol
 
 
 def run(place: Place) -> Told:
-    """Use `run` or `resume`, which are the same command."""
     code, out, err = cli("run", *place.campaign, "--out", place.run, "-n", "0", "--json")
     if code != 0:
         return Told(code=code, said=out + err)
@@ -164,7 +163,6 @@ def verify(place: Place) -> Told:
 
 
 def _table(path: Path, genuine: Path) -> str | bytes:
-    """Return a table's content. If the table is missing, return the genuine table's."""
     place = path if path.is_file() else genuine
     return pd.read_parquet(place).to_csv() if place.suffix == ".parquet" else place.read_bytes()
 

@@ -147,7 +147,6 @@ def _damaged(home: Path) -> Path:
 
 
 def _written(place: Place) -> Told:
-    """A report as it was written."""
     text = (place.run / "report" / "REPORT.md").read_text()
     tables = sorted((place.run / "report" / "tables").glob("[!.]*"))  # a kill leaves half-written files
     return Told(code=0, said="", result=[HOW.sub("", text), *(table.read_text() for table in tables)])

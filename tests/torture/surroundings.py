@@ -69,8 +69,6 @@ def clock(chance: Chance, at: Path) -> Iterator[Surrounding]:
 
 
 def _limit(name: str, least: int, most: int) -> Callable[..., AbstractContextManager[Surrounding]]:
-    """A limit of the processes of the command."""
-
     @contextmanager
     def limit(chance: Chance, at: Path) -> Iterator[Surrounding]:
         number = int(least * (most / least) ** chance.random())
@@ -139,7 +137,6 @@ MOUNTED = ("full disk", "read-only")
 
 @contextmanager
 def mounted(place: Path, options: str) -> Iterator[None]:
-    """A separate disk at that place."""
     place.mkdir()
     _mount("-t", "tmpfs", "-o", options, "tmpfs", str(place))
     try:
@@ -150,7 +147,6 @@ def mounted(place: Path, options: str) -> Iterator[None]:
 
 
 def may_mount(at: Path) -> bool:
-    """Whether this process may mount a disk."""
     try:
         with mounted(at / "tried", "size=1m"):
             return True

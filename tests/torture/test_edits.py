@@ -124,7 +124,6 @@ class Edits:
 
 
 def commit(root: Path, text: str) -> None:
-    """Commit another file."""
     (root / "NOTES").write_text(text)
     who = ("-c", "user.name=a", "-c", "user.email=a@b")
     for words in (("init", "-q"), ("add", "-A"), (*who, "commit", "-q", "-m", text)):
@@ -132,7 +131,6 @@ def commit(root: Path, text: str) -> None:
 
 
 def make_edits(toy: Workspace, folder: Path) -> Edits:
-    """The edits, after one undisturbed run."""
     root = toy.library.parent
     commit(root, "first")
     began = time.monotonic()

@@ -82,7 +82,6 @@ class Inputs:
 
 
 def approve() -> None:
-    """Approve all mutants, so that there is a file of decisions."""
     code, out, err = cli("review", "list", "--json")
     assert code == 0, err
     done("review", "approve", *(group["group"] for group in json.loads(out)), "--by", "nobody")

@@ -127,7 +127,6 @@ def test_two_at_once(
 
 
 def make_pair(toy: Workspace, folder: Path) -> Pair:
-    """The pair, after one undisturbed run."""
     genuine = folder / "genuine"
     done("run", *WORDS, "--out", genuine, "-n", "0")
     began = time.monotonic()

@@ -114,7 +114,6 @@ def judged(told: Told, right: Told, touched: Iterable[str]) -> tuple[End, str]:
 
 
 def _difference(told: Told, right: Told) -> str:
-    """Return a short description of the difference."""
     if isinstance(right.result, list) and isinstance(told.result, list):
         pairs = [pair for pair in zip(told.result, right.result, strict=False) if pair[0] != pair[1]]
         return "; ".join(f"{_first(*pair)}" for pair in pairs)

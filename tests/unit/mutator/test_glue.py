@@ -33,7 +33,6 @@ class Ball(Run):
 
 @pytest.fixture
 def arguments(tmp_path: Path) -> list[str]:
-    """The arguments that start a run of the ball."""
     scenario = tmp_path / "drop.yaml"
     scenario.write_text(
         "about: A drop: from 4 m  # not far\n\n# times\nduration_s: 0.6\nheight_m: 4\ncaught: false\n"
@@ -81,7 +80,6 @@ def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
 
 
 def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path: Path) -> None:
-    """If an engine steps a run and writes it into another folder, the bytes are the same."""
     driven(arguments)
     run = Ball.open(arguments)
     while not run.done:
@@ -137,7 +135,6 @@ def test_values_of_a_scenario(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("line", ["- a", "a:", "  b: 1", "a 1", "first: 2"])
 def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> None:
-    """A line that is not `key: value`, or that repeats a key, is reported with file and line."""
     path = tmp_path / "a.yaml"
     path.write_text(f"first: 1\n{line}\n")
     with pytest.raises(GlueError, match=r"a\.yaml:2: '.*'; expected `key: value`"):
@@ -146,7 +143,6 @@ def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> N
 
 @pytest.mark.parametrize("later", [{"b": 1.0}, {}, {"a": 1.0, "b": 2.0}])
 def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
-    """A step that does not record the same channels as the first step is an error."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0)
     with pytest.raises(GlueError, match=r"at 0.5 s: channels [ab]"):
@@ -158,7 +154,6 @@ def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     [None, "1", "near", b"1", [1.0], np.zeros(1), np.zeros((2, 3)), 1j, pytest.param(10**400, id="huge")],
 )
 def test_what_is_recorded_is_a_number(value: object) -> None:
-    """A value that is not a number is reported with its channel and time."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0, gap=2.0)
     with pytest.raises(GlueError, match=r"^at 0.5 s: gap is .*; expected a number$"):
@@ -244,7 +239,6 @@ def test_time_is_recorded_anyhow() -> None:
 
 @pytest.mark.parametrize("rows", [0, 2])
 def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A step that records nothing, or twice, is an error."""
     monkeypatch.setattr(Ball, "step", lambda run: [run.record(a=1.0) for _ in range(rows)])
     with pytest.raises(GlueError, match=f"recorded {rows} rows"):
         Ball.main(arguments)
@@ -262,7 +256,6 @@ def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
 
 
 def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
-    """A subclass without `step` gets an error."""
     with pytest.raises(NotImplementedError, match="Run has no step"):
         Run(step_s=1.0, duration_s=1.0).step()
 

@@ -9,7 +9,6 @@ import mutator
 
 
 def test_every_public_name_is_there() -> None:
-    """Each name in `__all__` is available, has a docstring, and is in `dir`. No other name is."""
     assert list(mutator.__all__) == sorted(mutator.__all__, key=lambda n: (n.lower() == n, n))
     for name in mutator.__all__:
         assert getattr(mutator, name).__doc__, name

@@ -28,8 +28,6 @@ SOURCES = Path(mutator.__file__).parent
     ],
 )
 def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
-    """The label has the spec, the value and the unit. A plain number has no unit. The label of a fault
-    without a value is its spec."""
     assert fault_label("radar/chaff/distance", value, unit) == label
 
 
@@ -37,7 +35,6 @@ def test_a_fault_has_one_label(value: Value, unit: str, label: str) -> None:
 def test_a_fault_and_its_row_of_the_results_have_the_same_label(
     experiment: Callable[..., Experiment], record: Callable[..., object], value: float
 ) -> None:
-    """The label of a fault is the same from the plan and from results.csv."""
     one = experiment(value=value)
     assert row_of(one, record(one.id), ("H1",)).fault == one.fault.label  # type: ignore[arg-type]
 

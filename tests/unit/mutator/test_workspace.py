@@ -95,7 +95,6 @@ def test_names_and_paths(toy: Workspace) -> None:
 
 
 def test_names_do_not_lead_out(toy: Workspace) -> None:
-    """Dots in a name do not lead out of the library."""
     with pytest.raises(MutatorError, match="no fault spec"):
         toy.spec("../targets/toy")
 
@@ -136,7 +135,6 @@ def test_faults_to_iterate_over(toycar: Workspace) -> None:
 
 
 def test_the_only_target_is_meant(toycar: Workspace) -> None:
-    """If there is only one target, it need not be named."""
     assert toycar.target_name() == "toycar"
     other = toycar.library / "targets" / "other.yaml"
     other.write_bytes((toycar.library / "targets" / "toycar.yaml").read_bytes())

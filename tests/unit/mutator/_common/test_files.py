@@ -50,7 +50,6 @@ def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
 
 
 def test_newer_schema_is_refused() -> None:
-    """A newer schema version is refused with a remedy; an older one is read."""
     check_schema("run/1", "run/2", Path("run.json"))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/3' .*newer mutator.*update mutator"):
         check_schema("run/3", "run/2", Path("run.json"))
@@ -134,7 +133,6 @@ def test_several_write_one_file_at_once(tmp_path: Path) -> None:
 
 
 def test_other_failures_are_not_called_a_full_disk(tmp_path: Path) -> None:
-    """A missing folder is not reported as a full disk."""
     with pytest.raises(FileNotFoundError):
         write_atomic(tmp_path / "nosuch" / "file", b"")
 

@@ -12,13 +12,11 @@ from mutator.errors import MutatorError
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
 def test_results_come_in_the_order_of_the_work(processes: int) -> None:
-    """Results keep the order of the work for any number of processes and any amount of work."""
     for count in (0, 1, 7):
         assert list(shared(lambda n: n * n, range(count), processes)) == [n * n for n in range(count)]
 
 
 def test_the_work_is_done_by_others() -> None:
-    """Two processes do the work, neither of which is this one."""
     found = list(shared(lambda _: os.getpid(), range(6), 2))
     assert found == found[:2] * 3 and len({*found, os.getpid()}) == 3
 

@@ -80,7 +80,6 @@ def delete(folder: Path) -> None:
     ("change", "named"), [(edit, "selfdrive/a.py"), (add, "selfdrive/extra.py"), (delete, "templates/c.j2")]
 )
 def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
-    """An edited copy is refused. The error names the file and the remedy."""
     change(shipped_folder())
     with pytest.raises(
         MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"

@@ -37,5 +37,4 @@ def test_shortages(error: Exception, said: str) -> None:
     "error", [ValueError("x"), ImportError("No module named 'x'"), OSError(errno.ENOENT, "")]
 )
 def test_other_errors(error: Exception) -> None:
-    """No other error counts as a shortage."""
     assert shortage(error) is None

@@ -12,7 +12,6 @@ def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
 
 
 def test_a_table_without_rows_is_its_heads() -> None:
-    """An empty table is printed with its column heads."""
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
     assert table.as_markdown() == "| a | b |\n|---|---|"
@@ -56,7 +55,6 @@ def test_html_shows_markup_as_it_is() -> None:
 
 
 def test_html_has_heads_of_rows_and_columns_of_numbers() -> None:
-    """Tables of facts have row heads and optional column heads. Numbers have a class."""
     html = Table(heads=("", ""), rows=[("runs", "7")], right=(1,), named=True).as_html()
     assert '<tr><th scope="row">runs</th><td class="number">7</td></tr>' in html
     assert "<thead>" not in html

@@ -40,7 +40,6 @@ def test_problems_of_a_library_are_a_list(toycar: Workspace) -> None:
 
 
 def test_the_doctor_knows_a_library_that_is_missing(toycar: Workspace, tmp_path: Path) -> None:
-    """A missing library is reported as a finding and raises no error."""
     found = {f.name: f.level for f in mutator.doctor(tmp_path / "none")}
     assert found["library"] == "failed"
     assert {f.name for f in mutator.doctor(toycar)} >= {"library"}

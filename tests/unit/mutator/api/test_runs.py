@@ -49,7 +49,6 @@ def run(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Run:
-    """A toy run with made-up records."""
     folder = tmp_path_factory.mktemp("load")
     toycar = copy_toycar(folder)
     return mutator.load_run(write_run(toycar, folder / "first", became), workspace=toycar)
@@ -287,7 +286,6 @@ def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: C
 
 
 def test_reports_and_exports(run: Run) -> None:
-    """A run writes its report and its exports. The CSV export equals results.csv."""
     assert run.export("csv").read_bytes() == (run.path / "results.csv").read_bytes()
     with pytest.raises(MutatorError, match=r"'xls'.*expected one of mutation-elements, junit, csv, parquet"):
         run.export("xls")

@@ -54,7 +54,6 @@ def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
 
 
 def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
-    """Without `out`, the temporary folder is deleted together with the trial."""
     trial = mutator.try_fault("sensor/lane/shifted", "A", 5.0, workspace=toycar)
     folder = trial.folder
     assert folder.is_dir()

@@ -32,7 +32,6 @@ canary: {spec: sensor/lane/shifted, scenario: A, hazard: H3, at_s: 1.0}
 
 
 def test_a_campaign_is_read(tmp_path: Path) -> None:
-    """Every key is read, and a missing key has its default."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
     campaign = load_campaign(path)
@@ -104,7 +103,6 @@ def in_library(toycar: Workspace, old: str, new: str) -> Path:
 
 
 def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
-    """One arming time means the same as a mapping that gives that time for each reading."""
     path = in_library(toycar, "{as_described: 1.5, as_coded: 0.0}", "1.25")
     campaign = load_campaign(path)
     check_readings(campaign, toycar.readings())
@@ -153,7 +151,6 @@ def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
 def test_readings_are_those_of_the_library(
     toycar: Workspace, old: str, new: str, line: int, told: str
 ) -> None:
-    """An undeclared or missing reading is reported with its line and with the declared readings."""
     path = in_library(toycar, old, new)
     with pytest.raises(MutatorError) as error:
         make_plan(toycar, path)

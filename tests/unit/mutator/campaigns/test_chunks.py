@@ -25,7 +25,6 @@ from mutator.workspace import Workspace
     ],
 )
 def test_cut(groups: str, size: int, lengths: tuple[int, ...]) -> None:
-    """No chunk exceeds its size or contains two groups."""
     assert cut(groups, size) == lengths
 
 
@@ -35,7 +34,6 @@ def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
 
 
 def test_everything_is_pending_at_first(folder: RunFolder) -> None:
-    """Without records, every experiment of every chunk is pending."""
     left = pending(folder, {})
     assert [item.chunk for item in left] == list(range(8))
     assert sum(len(item.places) for item in left) == 24

@@ -60,14 +60,12 @@ def test_expressions(text: str, expected: bool) -> None:
     ],
 )
 def test_anything_else_is_refused(text: str) -> None:
-    """Any other syntax is an error that shows the text."""
     with pytest.raises(MutatorError) as error:
         compile_filter(text, ROW)
     assert "filter" in str(error.value)
 
 
 def test_unknown_column_lists_the_known_ones() -> None:
-    """The error for a misspelt column lists the existing columns."""
     with pytest.raises(MutatorError, match=r"unknown column `speed`.*fault_type.*value"):
         compile_filter("speed > 1", ROW)
 

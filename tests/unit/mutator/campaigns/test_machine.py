@@ -37,7 +37,6 @@ def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPa
 
 
 def test_where_mutator_is_not_installed_every_package_counts(monkeypatch: pytest.MonkeyPatch) -> None:
-    """If mutator is not installed, its requirements are unknown, so every package counts."""
     monkeypatch.setattr(machine, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
     assert machine.required() == {"numpy", "stranger"}
 
@@ -90,6 +89,5 @@ def test_the_state_of_a_clone(tmp_path: Path) -> None:
 
 
 def test_without_git_nothing_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """Without git, no commit is reported."""
     monkeypatch.setenv("PATH", str(tmp_path))
     assert machine.clone_state(Path(__file__).parent) is None

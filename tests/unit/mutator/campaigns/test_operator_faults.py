@@ -86,7 +86,6 @@ def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
 
 
 def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaign: Path) -> None:
-    """A mutant that is permanent in one selection and transient in another runs both ways."""
     both = {one.id for one in make_plan(toycar, campaign).experiments}
     entry = ENTRY.removesuffix("}")
     _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
@@ -94,7 +93,6 @@ def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaig
 
 
 def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
-    """Another seed draws other mutants."""
     drawn = [
         {one.fault.id for one in make_plan(toycar, campaign, Choices(seed=seed)).experiments}
         for seed in (3, 4)

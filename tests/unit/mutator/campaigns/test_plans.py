@@ -55,7 +55,6 @@ def test_triggers_are_armed_as_the_reading_says(whole: Workspace) -> None:
 
 
 def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> None:
-    """The random times of a fault are drawn separately for each scenario and row."""
     experiments = [e for e in make_plan(whole, "toy").experiments if e.method is Method.RANDOM]
     silent = [e for e in experiments if e.fault.fault_type == "silence"]
     assert len({e.trigger.condition for e in silent}) == len(silent) == 4
@@ -87,7 +86,6 @@ def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
 
 
 def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
-    """Experiments with the same golden run are adjacent, and no chunk has two golden runs."""
     plan = make_plan(whole, "toy")
     keys = [(e.scenario, e.fault.changes) for e in plan.experiments]
     assert len(dict.fromkeys(keys)) == 1 + sum(a != b for a, b in pairwise(keys))
@@ -200,7 +198,6 @@ def test_faults_for_a_time(toycar: Workspace) -> None:
 
 
 def test_some_values_of_a_variant(whole: Workspace) -> None:
-    """`values` sets how many values of each variant are taken."""
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
     faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
@@ -282,7 +279,6 @@ def test_published_plans_keep_their_digests(
 def test_the_run_schema_is_no_part_of_the_plan_digest(
     toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A new run-folder schema does not change a plan's digest."""
     before = make_plan(toycar, "small").digest
     monkeypatch.setattr("mutator.store.run_head.SCHEMA", "run/9")
     monkeypatch.setattr("mutator.campaigns.plans.SCHEMA", "run/9", raising=False)  # where it is imported

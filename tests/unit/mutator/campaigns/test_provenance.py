@@ -68,7 +68,6 @@ def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
 def test_before_anything_was_driven_any_version_will_do(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A plan without records can be run with any versions."""
     use(monkeypatch, numpy="2.1.0")
     assert check_versions(folder) == ()
 
@@ -105,7 +104,6 @@ def test_other_versions_are_refused_unless_accepted(
 def test_another_python_is_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error gives both versions of Python."""
     monkeypatch.setattr("platform.python_version", lambda: "3.11.7")
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     monkeypatch.setattr("platform.python_version", lambda: "3.12.1")

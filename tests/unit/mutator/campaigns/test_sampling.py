@@ -58,8 +58,6 @@ def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> 
 def test_runs_that_stop_are_a_sample_of_the_same_faults(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
-    """A campaign that stops runs at a hazard has the same sample as one that does not, so that they can be
-    compared."""
     stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
     picked = [many.index(e) for e in draw(many, 11, seed=1)]
     assert [stopping.index(e) for e in draw(stopping, 11, seed=1)] == picked

@@ -60,7 +60,6 @@ def test_a_limit_is_of_all_seeds(toycar: Workspace, campaign: Callable[..., Path
 def test_a_filter_may_leave_a_seed_without_experiments(
     toycar: Workspace, campaign: Callable[..., Path]
 ) -> None:
-    """A filter may leave out whole seeds. It is an error only if no experiment is left."""
     plan = make_plan(toycar, campaign(), Choices(only="seed == 4"))
     assert plan.experiments == alone(toycar, campaign(), 4).experiments
     with pytest.raises(MutatorError, match="no experiment is left"):
@@ -81,7 +80,6 @@ def test_each_seed_has_golden_runs_of_its_own(
 def test_a_plan_that_is_written_part_by_part_is_the_one_in_memory(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A plan that is written part by part has the same bytes in each file and can be read back."""
     path = campaign()
     parts, whole = tmp_path / "parts", tmp_path / "whole"
     freeze(Planning(toycar, path), parts, toycar)

@@ -40,7 +40,6 @@ def test_a_spec_file_is_found_from_the_campaign(
 
 
 def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
-    """A missing spec file is reported at the campaign's line."""
     (mine.parent / "specs" / "drifting.yaml").unlink()
     with pytest.raises(
         MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected a spec file"
@@ -62,7 +61,6 @@ def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> Non
 
 
 def test_a_missing_campaign_file_is_told(toycar: Workspace) -> None:
-    """A name that ends in .yaml is a file. A name without the ending may be a campaign."""
     with pytest.raises(MutatorError, match=r"no file nosuch\.yaml; expected a campaign: the path of a YAML"):
         toycar.campaign("nosuch.yaml")
     with pytest.raises(MutatorError, match=r"no file smal\.yaml.*did you mean 'small'\?"):

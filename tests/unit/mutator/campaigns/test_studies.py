@@ -179,7 +179,6 @@ def test_every_campaign_that_asks_for_a_missing_study_is_told(toycar: Workspace)
 def test_a_run_opens_without_its_study(
     installed: None, toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run can be opened after its study was uninstalled. Planning it again is refused."""
     asking(toycar, "crash_tests")
     folder = freeze(make_plan(toycar, "small"), tmp_path / "planned", toycar)
     monkeypatch.setattr(studies, "entry_points", EntryPoints().select)
@@ -189,5 +188,4 @@ def test_a_run_opens_without_its_study(
 
 
 def test_the_parts_asked_for_are_those_of_a_study() -> None:
-    """Loading checks only those parts of a study that a report uses."""
     assert set(studies.PARTS) == {field.name for field in dataclasses.fields(Study)}

@@ -142,7 +142,6 @@ def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
 
 
 def test_only_some(runs: tuple[Path, Path]) -> None:
-    """A filter selects experiments of both runs."""
     found = compare(*runs, only='fault_type == "lane"')
     assert len(found.pairs) == lanes(found) > 0
     assert found.unmatched == ()
@@ -157,7 +156,6 @@ def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
 def test_a_failed_proof_is_not_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """A run with a failed proof is refused."""
     after = shutil.copytree(runs[1], tmp_path / "after")
     (after / "proof").mkdir()
     lines = (after / "records" / "0001-a.jsonl").read_text().replace('"outcome":"masked"', '"outcome":"sdc"')

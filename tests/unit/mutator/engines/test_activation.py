@@ -48,7 +48,6 @@ def start_of(probe: str, seen: Observed) -> Start | None:
     ],
 )
 def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
-    """The result is the first step in which the probe is active, or None if it never is."""
     start = start_of(probe(trigger), SEEN)
     assert (start.step if start else None) == step
     if start:

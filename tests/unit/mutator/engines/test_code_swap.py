@@ -73,7 +73,6 @@ def test_functions_that_changed_are_found(changes: Changes) -> None:
 
 
 def test_imports_of_injected_lines(changes: Changes) -> None:
-    """The modules that injected lines import are known, so that they can be loaded in advance."""
     lines = 'if _fi.active("abc"):\n    from car.rain import Rain\n    y = Rain(y)'
     assert changes(("return [value", lines)).imports == ("car.rain",)
 
@@ -126,7 +125,6 @@ def test_files_that_are_read_by_the_run(changes: Changes) -> None:
 
 
 def test_more_than_inserted_lines(changes: Changes) -> None:
-    """A file that differs by more than inserted lines is not swapped."""
     manifest = SimpleNamespace(
         package="car",
         reads_itself=(),

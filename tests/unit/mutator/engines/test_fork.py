@@ -95,7 +95,6 @@ def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
 
 
 def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
-    """If the first process is killed, all waiting processes and their guard end."""
     fork.run(fork.job(at_time(2.0)))
     guard, first, *waiting = fork.processes()
     assert guard == fork.pool._process.pid

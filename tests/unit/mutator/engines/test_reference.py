@@ -50,7 +50,6 @@ def run(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> Run:
 
 
 def entry(body: str) -> dict[str, str]:
-    """The target with a different entry module."""
     return {"toycar/go.py": body}
 
 
@@ -101,7 +100,6 @@ def test_a_good_run_leaves_its_files(run: Run) -> None:
     ],
 )
 def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
-    """Each way of failing has a status and a reproducible message."""
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (status, detail)
 
@@ -114,20 +112,17 @@ def test_a_target_that_does_not_parse_crashes(run: Run) -> None:
 
 
 def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
-    """An endless loop times out after its CPU time."""
     execution = run(entry("while True: pass"), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_who_ignores_the_cpu_limit_is_killed(run: Run) -> None:
-    """A run that ignores the signal for the CPU limit is killed."""
     body = "import signal; signal.signal(signal.SIGXCPU, signal.SIG_IGN)\nwhile True: pass"
     execution = run(entry(body), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
 def test_sleeping_hits_the_wall_limit(run: Run) -> None:
-    """A run that waits for ever times out after its wall time."""
     execution = run(entry("import time; time.sleep(100)"), replace(LIMITS, wall_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
 
@@ -159,7 +154,6 @@ def test_steps_are_limited(run: Run) -> None:
 
 
 def test_a_huge_file_is_refused(run: Run) -> None:
-    """A run cannot fill the disk with one large file."""
     body = "f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()"
     execution = run(entry(body))
     assert execution.status is Status.CRASHED
@@ -179,7 +173,6 @@ def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManif
 
 
 def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
-    """A run on files other than the job's is a harness error."""
     body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -188,7 +181,6 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
 
 
 def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp_path: Path) -> None:
-    """Bytecode that a run writes into its own tree does not affect later runs."""
     body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
     assert run(entry(body)).status is Status.OK
     (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
@@ -290,7 +282,6 @@ def test_what_a_run_printed_is_kept(run: Run) -> None:
 
 
 def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
-    """Background processes of a run are killed when the run ends."""
     note = tmp_path / "pid"
     body = (
         "import subprocess, pathlib\n"
@@ -331,7 +322,6 @@ engine.execute(job, folder / "work" / "x")
 
 
 def test_a_run_dies_with_its_engine(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
-    """If the engine's process is killed, the run is killed, too."""
     note = tmp_path / "pid"
     (tmp_path / "work").mkdir()
     prepare_base(manifest, tmp_path / "base")

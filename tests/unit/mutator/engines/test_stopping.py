@@ -102,7 +102,6 @@ def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> 
 def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
     stopping: Fork, edit: Edit, terminal: str, at: float
 ) -> None:
-    """Golden has a terminal hazard before the fault, so no run is forked after it."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP, at) for one in (stopping.engine.reference, stopping.engine)

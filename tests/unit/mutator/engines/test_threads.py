@@ -11,7 +11,6 @@ from mutator.engines.in_target.threads import others
 
 
 def test_threads_are_found_by_name() -> None:
-    """Every thread except the main one is listed by its Python name."""
     before = others()
     done = threading.Event()
     started = [threading.Thread(target=done.wait, name=name) for name in ("poll", "radar")]

@@ -77,7 +77,6 @@ def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
 
 
 def stepped(row: int, height: float = 1.0) -> np.ndarray:
-    """An array of zeros, with `height` from the given row on."""
     return np.where(np.arange(20) >= row, height, 0.0)
 
 
@@ -120,7 +119,6 @@ def test_never_active(judged: Callable[..., Record]) -> None:
 
 @pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
 def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], ran: dict, told: str) -> None:
-    """A difference before the activation, or without an activation, is a harness error."""
     record = judged(ran=ran, trace={"gas": stepped(3)})
     assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
     assert told in record.detail

@@ -36,7 +36,6 @@ IDLE = {"outcome": Outcome.NOT_ACTIVATED, "activation": None}
 def report(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_run: Write
 ) -> dict[str, Any]:
-    """The report of a toy run in which lane faults are hazardous."""
     tmp_path = tmp_path_factory.mktemp("report")
     toycar = copy_toycar(tmp_path)
     run = write_run(toycar, tmp_path / "run", lambda e: HAZARD if e.fault.fault_type == "lane" else {})
@@ -49,7 +48,6 @@ def report(
 
 
 def mutants(report: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield each mutant with the source of its file."""
     for file in report["files"].values():
         yield from ((file["source"], mutant) for mutant in file["mutants"])
 
@@ -147,7 +145,6 @@ def test_killed_means_hazard(report: dict[str, Any]) -> None:
 
 
 def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Sources that differ from those of the run are refused."""
     run = write_run(toycar, tmp_path / "run")
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):

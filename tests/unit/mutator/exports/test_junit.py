@@ -77,7 +77,6 @@ def test_a_hazard_is_data(run: Path) -> None:
 
 
 def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
-    """With the option, hazards are failures that name the hazard and its time."""
     found = cases(export(run, Format.JUNIT, tmp_path / "j.xml", parts=Parts(failures=["hazard"])))
     assert {c.find("failure").get("message") for c in found["lane"]} == {"H3 at 4.00 s"}  # type: ignore[union-attr]
     assert not any(list(c.iter("failure")) for c in found["distance"])

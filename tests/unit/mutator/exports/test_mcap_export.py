@@ -171,7 +171,6 @@ def test_a_kept_trace_of_another_run_is_refused(
 
 
 def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
-    """Exporting a run twice writes the same bytes."""
     parts = Parts(only=f'experiment_id == "{hazardous(run)[0]}"')
     first, again = (next(export(run, Format.MCAP, tmp_path / x, parts=parts).iterdir()) for x in "ab")
     assert first.read_bytes() == again.read_bytes()
@@ -204,13 +203,11 @@ def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> Non
 def test_what_a_format_has_no_use_for_is_refused(
     run: Path, tmp_path: Path, format: Format, parts: Parts, name: str
 ) -> None:
-    """An option that has no effect on a format is refused."""
     with pytest.raises(MutatorError, match=f"leave `{name}` out"):
         export(run, format, tmp_path / "x", parts=parts)
 
 
 def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
-    """Tables that a run folder has only as Parquet are also exported as CSV, with the same cells."""
     parts = Parts(table=Table.PROPAGATION)
     written = export(run, Format.CSV, tmp_path / "p.csv", parts=parts)
     rows = pd.read_csv(written)
@@ -226,7 +223,6 @@ def test_other_tables_are_exported(run: Path, tmp_path: Path) -> None:
 
 
 def test_a_run_folder_with_exports_can_be_cleaned(run: Path) -> None:
-    """Every file that `export` writes into a run folder counts as a file of the run."""
     for table in Table:
         export(run, Format.CSV, None, parts=Parts(table=table))
         export(run, Format.PARQUET, None, parts=Parts(table=table))

@@ -161,6 +161,5 @@ def test_a_missing_template(folder: Path) -> None:
 
 
 def test_an_empty_folder(tmp_path: Path) -> None:
-    """A folder without models is refused as a folder of templates."""
     with pytest.raises(MutatorError, match="no fault model"):
         load_fault_models(tmp_path)

@@ -32,8 +32,6 @@ def test_the_first_reading_is_the_default(toy: Workspace) -> None:
 
 
 def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
-    """A library without the file has one reading. Its faults have the same ids as when that reading is the
-    first of several."""
     spec = next(iter(toy.spec_files()))
     spec.write_text(spec.read_text().partition("  both:")[0])
 

@@ -69,7 +69,6 @@ def test_both_readings_share_their_draws(toy: Workspace) -> None:
 
 
 def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
-    """A fault declares that it latches, and which changes of the scenario it needs."""
     (silent,) = of(faults(toy), "silent")
     assert silent.hold is Hold.TO_END
     assert silent.changes == ("alone",)
@@ -324,7 +323,6 @@ def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) ->
 
 
 def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Workspace) -> None:
-    """A spec file outside the library is read like any other."""
     path = tmp_path / "mine.yaml"
     path.write_text((toy.library / "faults" / "sensor" / "distance.yaml").read_text())
     assert load_spec(path, toy.readings()).count == toy.spec(path).count == 6

@@ -92,7 +92,6 @@ def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> Non
 
 
 def test_runs_without_any_hazard_or_time_are_drawn(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """A campaign without hazards or times still has its figures."""
     nothing = results({}, BLUR | {"scenario": "S2"})
     write_drawings(drawings(nothing), tmp_path)
     assert len(list((tmp_path / "figures").iterdir())) == 6

@@ -26,7 +26,6 @@ TIME = np.arange(300) * 0.01
 
 @pytest.fixture
 def manifest() -> SimpleNamespace:
-    """The parts of a manifest that a plot needs."""
     gas, speed = Channel(name="gas", unit="0..1"), Channel(name="v_ego", unit="m/s")
     gone = Channel(name="not_recorded", unit="m")
     return SimpleNamespace(compared=(gas,), plotted=(speed, gone), time_channel="t", path=Path("m.yaml"))
@@ -39,7 +38,6 @@ def trace(offset: float = 0.0) -> dict[str, np.ndarray]:
 
 
 def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Every channel that both runs have is a panel with its unit. Every mark is shown with its time."""
     mark = Mark(kind=MarkKind.HAZARD, t=1.5, label="H1")
     figure = draw_run(trace(), trace(0.1), manifest, title="chaff 35 m", marks=[mark])
     save(figure, [tmp_path / "p.svg"])

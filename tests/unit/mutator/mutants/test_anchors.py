@@ -168,7 +168,6 @@ def test_no_hit_or_several_is_an_error(
 
 
 def test_entry_goes_below_the_docstring() -> None:
-    """The entry of a function is after its docstring, even if the function has no other statement."""
     assert lines(AnchorKind.ENTRY, "") == (15, 14)
     assert lines(AnchorKind.ENTRY, "", "empty") == (37, 36)
     assert lines(AnchorKind.ENTRY, "", "A.width", 2) == (11, 10)

@@ -25,7 +25,6 @@ CLOSING = Trigger(name="closing", condition="hwt <= 3.0 and rs > 0.0", armed_aft
 
 
 def toy_faults(toy: Workspace, reading: str = "as_described") -> dict[str, Fault]:
-    """One fault of each variant."""
     found = expand(
         toy.spec("sensor/distance"), 3, reading, models=toy.fault_models(), manifest=toy.manifest("toy")
     )
@@ -128,7 +127,6 @@ def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
 
 
 def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
-    """A hold that the fault sets overrides the trigger's."""
     assert b'HOLD = "while"' in build(toy, toy_faults(toy)["longer"]).files["toycar/_fi.py"]
     assert b'HOLD = "to_end"' in build(toy, toy_faults(toy)["silent"]).files["toycar/_fi.py"]
 

@@ -46,7 +46,6 @@ def file() -> ParsedFile:
     ],
 )
 def test_a_change_of_a_function(file: ParsedFile, line: int, text: bytes, known: bool) -> None:
-    """A change that compiles in its function compiles in the file. All other changes are undecided."""
     edits = [
         probe_import(file, None),
         Edit(index=line, rank=Rank.INSTEAD, lines=(text,)),

@@ -51,7 +51,6 @@ def location(
 
 
 def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
-    """The source with changed values. Their tags count from `a0`."""
     file = parsed(source)
     edits = [
         value_change(file, file.resolve_value(place), text, f"a{number}")

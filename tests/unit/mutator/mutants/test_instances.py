@@ -87,7 +87,6 @@ def test_what_acts(
 
 
 def test_executions_count_anew_in_each_stretch(clone: Workspace) -> None:
-    """Executions are counted separately for each active stretch and each run."""
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "of the newest run"

@@ -103,7 +103,6 @@ def test_each_is_found_again(listed: list[ListedPlace]) -> None:
 
 
 def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[ListedPlace]) -> None:
-    """Each model produces an edit at each place for which it is listed."""
     file, models, tried = parse_file("m.py", SOURCE, Path("x")), shipped.fault_models(), Counter[bool]()
     for one in listed:
         if one.location.function == "other":

@@ -185,7 +185,6 @@ def test_the_target_raises_where_order_matters(toy: Make) -> None:
     ],
 )
 def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
-    """Statements that cannot be exchanged are refused with the line and the reason."""
     with pytest.raises(MutatorError, match=rf"m.py:2: .*{said}"):
         toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
 
@@ -269,7 +268,6 @@ def test_an_exception(toy: Make, kind: AnchorKind, name: str) -> None:
 
 
 def test_none_is_what_a_call_gives(toy: Make) -> None:
-    """The call is made, and its result is discarded."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "none")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, None, 3]

@@ -35,7 +35,6 @@ def test_what_counts_as_a_number(text: str, kept: str) -> None:
 
 
 def test_ids_stay_apart() -> None:
-    """After normalization, equal ids are still equal, and different ids are still different."""
     ids = ("00000001", "deadbeef")
     text = "a('00000001'); b('deadbeef', '00000001')"
     assert normalized(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
@@ -55,7 +54,6 @@ def test_where_the_value_matters() -> None:
 @given(st.sampled_from(AROUND), NUMBERS)
 @example("x = {}", "07")
 def test_numbers(around: str, number: str) -> None:
-    """If the normalized source compiles, so does the source with any number."""
     text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, ()).encode()):
         compile(text, "x", "exec")

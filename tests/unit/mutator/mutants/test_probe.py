@@ -76,7 +76,6 @@ def test_report(clone: Workspace) -> None:
 
 
 def test_nothing_before_the_first_observation(clone: Workspace) -> None:
-    """Injected statements that run before the first observation are inactive."""
     fi = probe(clone, condition="True")
     assert not fi.active("a")
     assert fi.report()["triggered"] is None

@@ -29,7 +29,6 @@ def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
 
 
 def module(clone: Workspace) -> Any:
-    """Load a new probe as a module."""
     made = types.ModuleType("_fi")
     exec(source(clone), made.__dict__)
     return made
@@ -78,7 +77,6 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
 
 
 def test_a_hold_time_is_needed(clone: Workspace) -> None:
-    """A trigger with a hold for a time needs the length of that time."""
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="holds for a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
@@ -99,7 +97,6 @@ RAN = {"first": 0.5, "last": 2.0, "count": 3}
     "report", [{}, {"injections": {}}, {"injections": {"a": NEVER}}, {"injections": None}]
 )
 def test_no_activation(report: dict[str, Any]) -> None:
-    """If no injection was executed, the report has no activation."""
     assert contract.activation_of(report) is None
 
 

@@ -77,7 +77,6 @@ def test_names_are_checked(name: Value) -> None:
 
 @pytest.mark.parametrize("name", ["os;x", "a.b c", "a..b", ".a", "a.import", 1, None])
 def test_imported_names_are_checked(name: Value) -> None:
-    """An imported name is accepted only as a chain of identifiers."""
     imports = ParamSchema(name="what", type="import", about="")
     made = replace(model("from {{ what }} import x\n"), params=(imports,))
     assert snippet(made, {"what": "a.b"}, "ab12") == ("from a.b import x",)
@@ -129,7 +128,6 @@ def test_a_template_that_fails(template: str, pieces: list[str]) -> None:
 
 
 def test_a_guard_opens_a_block() -> None:
-    """The last line of a guard must open a block for the statement."""
     assert rendered("if not {{ target }}:\n", SnippetKind.GUARD) == ("if not x:",)
     with pytest.raises(MutatorError, match="a guard's last line must open a block"):
         rendered("x = 1\n", SnippetKind.GUARD)

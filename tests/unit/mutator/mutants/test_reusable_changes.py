@@ -87,7 +87,6 @@ def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
 
 
 def test_a_change_that_compiles_only_with_some_values() -> None:
-    """A change that compiles only with some values is not marked as one that always compiles."""
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
 
 

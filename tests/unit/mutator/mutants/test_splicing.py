@@ -160,7 +160,6 @@ def test_edits_at_one_boundary() -> None:
 
 
 def test_two_guards_around_one_statement() -> None:
-    """A second omission of the same statement is refused."""
     file = parsed("def f(x):\n    g(1)\n")
     guard = edit(file, AnchorKind.BEFORE_CALL, "g", guard=True)
     with pytest.raises(MutatorError, match="two guards around one statement"):

@@ -55,7 +55,6 @@ def run(controller, world):
 
 
 def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
-    """The candidates in these modules, by name."""
     modules = tuple(Module(path=f"{name}.py", tree=ast.parse(text)) for name, text in sources.items())
     return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
 
@@ -90,7 +89,6 @@ def test_values_are_numbers_that_have_a_name() -> None:
 
 
 def test_values_of_inner_functions_are_not_the_steps() -> None:
-    """Variables of loops and branches belong to the step; variables of inner functions do not."""
     (step,) = candidates(
         a="def step(x):\n    def inner():\n        deep = x + 1\n    while x:\n        x = x - 1\n    try:\n"
         "        y = abs(x)\n    except ValueError:\n        z = x * 2\n    return inner\n"

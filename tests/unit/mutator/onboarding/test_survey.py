@@ -63,7 +63,6 @@ def test_a_src_layout(tree: Tree) -> None:
 
 
 def test_an_empty_folder(tree: Tree) -> None:
-    """An empty folder has no modules."""
     assert look_at(str(tree())).packages == ()
 
 
@@ -79,7 +78,6 @@ def test_what_cannot_be_read_is_told(tree: Tree) -> None:
 
 
 def test_nothing_is_imported(tree: Tree) -> None:
-    """The survey does not run a tree's harmful imports."""
     tree(harm_py="raise SystemExit('imported')\n")
     assert look_at(str(tree())).packages == ("harm.py",)
     assert "harm" not in sys.modules

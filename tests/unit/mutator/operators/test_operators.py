@@ -107,7 +107,6 @@ def make(tmp_path: Path, clone: Workspace) -> Make:
 
 @pytest.mark.parametrize("operator", CHANGES)
 def test_changes_of_operator(operator: str, make: Make) -> None:
-    """Each operator makes exactly the changes that its documentation lists."""
     for body, expected in CHANGES[operator].items():
         assert [one.text for one in make(body, operator)] == expected, body
 
@@ -118,7 +117,6 @@ def test_yield_is_not_calculated_again(make: Make) -> None:
 
 
 def test_equal_code_is_dropped(make: Make) -> None:
-    """A mutant is dropped if it compiles to the same code as the original or an earlier mutant."""
     assert [one.text for one in make("while True: a()", "branch")] == ["True -> not True"]
     denied = make("return not a", "comparison", "return")
     assert [(one.operator.value, one.now) for one in denied] == [
@@ -148,7 +146,6 @@ def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
 
 
 def test_long_change_shows_what_differs(make: Make) -> None:
-    """A change in a long expression has a short text that shows the difference."""
     [long] = make(f"{'a' * 80}(b, limit=a)", "argument")
     assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 

@@ -199,7 +199,6 @@ def test_which_call_was_one_too_many_is_chance() -> None:
 
 
 def test_a_probe_that_cannot_report_failed() -> None:
-    """If there is no probe report, the exception is the one that the probe had to report."""
     assert assign_blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
 
 

@@ -62,7 +62,6 @@ def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
 
 
 def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
-    """The sentence names each alert and scenario once, regardless of changes. Without alerts, it is empty."""
     fcw = {"hazards": {}, "alerts": [{"name": "fcw", "t": 3.5}]}
     late = {"hazards": {}, "alerts": [{"name": "late", "t": 3.5}]}
     runs = fault_free_runs(
@@ -73,7 +72,6 @@ def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
 
 
 def test_a_golden_run_that_is_gone_is_an_error(tmp_path: Path) -> None:
-    """A missing golden run is an error that gives its path."""
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
     (made.golden("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):

@@ -43,7 +43,6 @@ def trace(**channels: list[float]) -> dict[str, np.ndarray]:
 
 
 def test_equal_traces_do_not_differ() -> None:
-    """Equal numbers, equal infinities and two NaNs do not differ."""
     same = trace(gas=[0.0, -0.0, np.nan, np.inf, -np.inf])
     difference = compare(same, trace(gas=[-0.0, 0.0, np.nan, np.inf, -np.inf]), [GAS], "t")
     assert difference.t_first is None
@@ -81,8 +80,6 @@ def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
 
 
 def test_first_and_largest_difference() -> None:
-    """The result has the time of the first difference in any channel, and the largest difference of each
-    channel."""
     golden = trace(gas=[0, 0, 0, 0, 0], brake=[1, 1, 1, 1, 1])
     faulty = trace(gas=[0, 0, 0, 0.5, -2], brake=[1, 1, 1.25, 1, 1])
     difference = compare(golden, faulty, [GAS, BRAKE], "t")
@@ -123,14 +120,12 @@ def test_other_length_differs_where_one_ends(golden: int, faulty: int) -> None:
 
 
 def test_flags_and_integers_compare_too() -> None:
-    """Channels of integers or flags are compared as numbers."""
     golden = {"t": T[:2], "gas": np.array([True, False])}
     faulty = {"t": T[:2], "gas": np.array([True, True])}
     assert compare(golden, faulty, [GAS], "t").t_first == T[1]
 
 
 def test_key_of_a_golden_run() -> None:
-    """The key of a golden run consists of its scenario and changes."""
     assert GoldenRun("S1").key == "S1"
     assert GoldenRun("S1", ("no_lead",)).key == "S1+no_lead"
 

@@ -164,8 +164,6 @@ def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None)
 
 
 def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> None:
-    """There is no delta-v without a contact. There is none if another hazard ended the drive, even with a
-    contact later."""
     found = judged(write(CONTACT.replace("OUT_ENDS", "true")))
     assert (found.t_end, found.hazards) == (2.0, (("HIT", 3.0), ("OUT", 2.0)))
     assert dict(found.metrics) == {"margin_hit": 1.0, "margin_out": -1.0, "impact": -1.0}

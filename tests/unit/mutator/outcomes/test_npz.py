@@ -51,7 +51,6 @@ def test_what_is_not_as_usual_is_left_to_numpy(data: bytes) -> None:
 
 
 def headed(header: bytes) -> bytes:
-    """A file with one array that has this text in its header."""
     data = written(t=np.arange(3.0))
     there = data[data.index(b"{'descr'") : data.index(b"\n", data.index(b"{'descr'"))]
     with zipfile.ZipFile(io.BytesIO(data)) as file:

@@ -145,7 +145,6 @@ def test_a_fault_that_an_estimator_held() -> None:
 
 
 def test_a_fault_that_a_controller_held() -> None:
-    """The fault reached the estimator, and the controller after the estimator stopped it."""
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
     assert passages(found)["picture"] is Passage.THROUGH

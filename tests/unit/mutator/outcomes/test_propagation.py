@@ -59,7 +59,6 @@ def test_channels_with_times_of_their_own() -> None:
 
 
 def test_a_channel_that_was_not_recorded_is_left_out() -> None:
-    """A channel that is missing in one run is left out."""
     assert left({"a": ZEROS}, {"b": ZEROS}, channel("a"), channel("b")) == ()
 
 

@@ -55,7 +55,6 @@ def became(e: Experiment) -> dict[str, Any] | None:
 
 @pytest.fixture
 def run(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> Path:
-    """A run of the crane with made-up records."""
     return write_run(crane, tmp_path / "run", became)
 
 
@@ -104,8 +103,6 @@ def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> Non
 def test_numbers_have_the_units_of_their_metric_or_channel(
     crane: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """A metric has the unit from the manifest. A difference has the unit of its channel, also one up to
-    the end of the drive."""
     path = crane.library / "targets" / "toycar.yaml"
     hazards = "hazards: {DROPPED: {when: speed > 90, terminal: true, unit: m/s}, "
     hazards += "CRUSHED: {when: speed > 91}, TOO_FAST: {when: speed > 92}}\n"
@@ -140,7 +137,6 @@ def test_of_a_crash_it_is_not_known_whether_a_hazard_would_have_come(run: Path) 
 
 
 def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A target that checks no hazards has none, and their time is NaN."""
     head = run / "run.json"
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
@@ -155,7 +151,6 @@ def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None
 
 
 def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> None:
-    """Exports and the report use the target's names of hazards."""
     table = Results.up_to_date(run)
     assert export(run, Format.CSV).read_bytes() == table.csv()
     assert export(run, Format.PARQUET).read_bytes() == table.parquet()
@@ -213,7 +208,6 @@ def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
 
 
 def test_nothing_else_opens_the_tables() -> None:
-    """No other module parses or opens the tables, so that they are verified in one place."""
     allowed = {"outcomes/reader.py", "outcomes/trace_files.py"}
     opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
     named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")

@@ -213,7 +213,6 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
 
 
 def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
-    """Tables that are rebuilt, or built from the same records in other files, have the same bytes."""
     tables = results.build(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())

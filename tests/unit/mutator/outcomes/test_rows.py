@@ -37,7 +37,6 @@ def write_table(path: Path, *lines: dict[str, str]) -> Path:
 
 
 def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
-    """Each experiment enters exactly the counts that follow from its row."""
     hazard = SEEN | {"outcome": "hazard", "h1": "1", "t_h1": "18.3", "alerts": ""}
     warned = hazard | {"alerts": "can_error;fcw", "t_alert": "7.2", "h3": "1", "t_h3": "19.0"}
     idle = {k: v for k, v in SEEN.items() if not k.startswith("t_")} | {"outcome": "not_activated"}
@@ -87,8 +86,6 @@ def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> N
 
 
 def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
-    """A hazard that the target checks is listed even if it never occurred. A hazard that it does not check
-    is not listed."""
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
     assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 

@@ -27,7 +27,6 @@ def manifest(toycar: Workspace) -> TargetManifest:
 
 
 def rounded(values: Any) -> list[float]:
-    """The values in single precision, rounded to 20 significant bits."""
     words = np.asarray(values, dtype="<f4").view("<u4")
     return ((words + 8) // 16 * 16).view("<f4").tolist()
 
@@ -125,7 +124,6 @@ def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
 
 
 def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """A run without any step has no values."""
     faulty = stored(Sampler(manifest, trace()), trace(np.zeros(0)), record())[1]
     assert (len(faulty.t), len(faulty.points.t)) == (0, 0)
 
@@ -133,7 +131,6 @@ def test_a_run_without_a_step_has_no_values(manifest: TargetManifest, record: Ca
 def test_a_run_that_lasts_longer_has_more_times(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """After the end of golden, the times are those of the longer run."""
     time = np.arange(700) / 100
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     assert faulty.t[-1] == 6.99
@@ -154,7 +151,6 @@ def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
 def test_a_channel_with_its_own_times_has_its_newest_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """A channel with its own times has no value before its first one."""
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
     golden = stored(Sampler(manifest, {**trace(), **own}), {**trace(), **own}, record())[0]
     gap = dict(zip(golden.times(3).tolist(), golden.rows[3], strict=True))

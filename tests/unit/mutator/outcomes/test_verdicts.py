@@ -38,7 +38,6 @@ def test_truth_table(case: tuple[bool, bool, bool]) -> None:
     ("time", "counts"), [(0.0, False), (1.99, False), (2.0, True), (2.01, True), (9.0, True)]
 )
 def test_events_before_the_activation_do_not_count(time: float, counts: bool) -> None:
-    """An event counts from the time of the activation on, including that time."""
     assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
 
 
@@ -48,7 +47,6 @@ def test_no_event_counts_without_activation() -> None:
 
 
 def test_first_of_each_name_sorted_by_time() -> None:
-    """The first event of each name at or after the activation is kept, sorted by time, then by name."""
     events = [("fcw", 1.0), ("b", 5.0), ("fcw", 4.0), ("fcw", 3.0), ("a", 5.0)]
     assert first_events(events, ACTIVE) == (("fcw", 3.0), ("a", 5.0), ("b", 5.0))
 

@@ -38,7 +38,6 @@ SCENARIOS = {"S1", "S2", "S3", "S4", "S5"}
 
 @pytest.fixture(scope="module")
 def library() -> Workspace:
-    """The shipped library."""
     return Workspace.find(root=ROOT)
 
 

@@ -29,7 +29,6 @@ def workspace(tmp_path: Path) -> Workspace:
 
 
 def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
-    """The shipped cited numbers pass the check."""
     assert list(check_paper(workspace)) == []
 
 

@@ -42,7 +42,6 @@ def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path)
 
 
 def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Path) -> None:
-    """The query of a claim is in the file and in the page. The table has a line for each query."""
     text, page = study_forms(run)
     file, table = run / "report/observations.md", run / "report/tables/observations.csv"
     query = "share(runs, of='method == \"guided\" and is_activated', part='not is_alert')"
@@ -54,7 +53,6 @@ def test_the_observations_have_a_file_a_table_and_a_place_in_both_forms(run: Pat
 
 
 def test_without_a_library_there_are_no_observations(run: Path) -> None:
-    """Without a library, the report is written without the published observations."""
     written = building.write(run, None)
     assert "observation" not in written.markdown.read_text() + written.page.read_text()
     assert not (run / "report" / "observations.md").exists()

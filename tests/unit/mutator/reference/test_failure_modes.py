@@ -11,7 +11,6 @@ _MODEL = re.compile(r"\[(\w+)\]\(\.\./reference/fault-models\.md#(\w+)\)")
 
 
 def rows(heading: str) -> list[list[str]]:
-    """The cells of the table below a heading, without the head row."""
     section = PAGE.read_text().partition(f"\n## {heading}\n")[2].partition("\n## ")[0]
     lines = [line for line in section.splitlines() if line.startswith("|")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[2:]]

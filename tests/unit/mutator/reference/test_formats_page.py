@@ -26,12 +26,10 @@ def test_every_schema_of_the_code_is_in_the_page() -> None:
 
 
 def test_every_schema_in_the_page_is_in_the_code() -> None:
-    """The page does not name any removed format."""
     assert set(IN_PAGE.findall(PAGE)) - in_code() == set()
 
 
 def test_every_module_in_the_page_exists() -> None:
-    """All writers and readers are existing modules."""
     modules = set(re.findall(r"`((?:mutator|selfdrive)\.[\w.]+)`", PAGE))
     assert len(modules) > 40
     assert sorted(name for name in modules if importlib.util.find_spec(name) is None) == []

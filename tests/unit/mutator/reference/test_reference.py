@@ -63,7 +63,6 @@ def test_nothing_else_says_that_it_is_generated() -> None:
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_every_model_and_key_is_described(kind: Format) -> None:
-    """Each model of a file format has a title, and each key has a sentence."""
     parts = described(kind)
     assert parts
     for name, part in parts.items():
@@ -80,14 +79,12 @@ def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
 
 
 def test_every_verb_is_in_a_group() -> None:
-    """Help and page list verbs in groups, so every verb must be in a group."""
     command: Any = get_command(app)
     assert sorted(name for _, names in GROUPS for name in names) == sorted(command.commands)
 
 
 @pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
 def test_library_files_follow_their_schema(kind: Format) -> None:
-    """The editors' schema accepts each file of the library that the program accepts."""
     files = sorted(CLONE.glob(kind.files))
     assert files
     check = validator(kind.name)

@@ -229,7 +229,6 @@ def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) 
 
 
 def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
-    """The same run, with these experiments only."""
     return replace(
         run,
         texts=run.texts[run.texts["experiment_id"].isin(names)].reset_index(drop=True),
@@ -238,7 +237,6 @@ def part_of(run: ReportedRun, names: set[str]) -> ReportedRun:
 
 
 def names_of(run: ReportedRun, empty: str) -> set[str]:
-    """The ids of the experiments for which this column is empty."""
     return {row["experiment_id"] for row in lines_of(run.texts) if not row[empty]}
 
 
@@ -264,7 +262,6 @@ def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None
 
 
 def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
-    """A crash is not a hazard and is counted separately."""
     frame = run.frame.assign(outcome=run.frame["outcome"].where(run.frame["kind"] != "car/steer", ""))
     found = {answer.name: answer for answer in answers_of(replace(run, frame=frame))}
     assert found["survived"].says == (

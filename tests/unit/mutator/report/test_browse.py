@@ -68,7 +68,6 @@ def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str],
 
 
 def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
-    """The page has no empty column of alerts if the target has no alerts."""
     line = {"experiment_id": "a", "alerts": "", "t_alert": "", "reaction_time": "", "detail": ""}
     names = [
         {made["name"] for made in table([row("a")], [line], alerts=has)["columns"]} for has in (True, False)

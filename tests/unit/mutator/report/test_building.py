@@ -51,7 +51,6 @@ def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
 
 
 def carried(page: Path, name: str) -> Any:
-    """The data in the page's script element `name`."""
     [text] = re.findall(rf'id="{name}">([^<]*)</script>', page.read_text())
     return json.loads(gzip.decompress(base64.b64decode(text)))
 
@@ -66,7 +65,6 @@ def test_the_page_needs_no_other_file(run: Path) -> None:
 
 
 def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> None:
-    """The page has all columns of the results, the diff without the probe, and the image."""
     page = building.write(run, None).page
     table = carried(page, "table")
     columns = {column["name"]: column for column in table["columns"]}
@@ -118,7 +116,6 @@ def test_the_report_is_the_same_each_time(run: Path) -> None:
 
 
 def test_no_report_without_a_run(tmp_path: Path) -> None:
-    """A folder that is not a run folder is reported as a user's error."""
     with pytest.raises(MutatorError, match="not a run folder"):
         building.write(tmp_path, None)
 

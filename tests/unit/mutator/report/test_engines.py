@@ -87,7 +87,6 @@ def summary(run: Path) -> engines.EngineSummary | None:
 
 
 def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
-    """There is a line for each way of running, and a line for each reason against forking."""
     told = summary(finish(4))
     assert told is not None
     ways = dict(told.table.rows)
@@ -97,7 +96,6 @@ def test_each_way_is_counted_and_each_reason_told(finish: Finish) -> None:
 
 
 def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
-    """Rare reasons share a line, and every experiment is counted."""
     run = finish(None)
     more = [timing(f"{i}") | {"engine": "reference", "why": f"crash {i:02}"} for i in range(30)]
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, more)

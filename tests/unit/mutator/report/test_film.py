@@ -7,7 +7,6 @@ from mutator.workspace import Workspace
 
 
 def test_a_film_says_of_a_hazard_what_the_page_says() -> None:
-    """The film describes hazards as the manifest and the report do, not as the hazard analysis does."""
     workspace = Workspace.find(root=Path(__file__).parents[4])
     manifest = workspace.manifest("openpilot")
     assert hazards_in_words(workspace, manifest) == {rule.name: rule.about for rule in manifest.rules}

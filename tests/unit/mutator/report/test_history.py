@@ -44,7 +44,6 @@ def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
 
 
 def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
-    """The name of a run is quoted if it has a space."""
     (folder / "before").rename(folder / "the night before")
     written = write_history(folder)
     assert (
@@ -54,7 +53,6 @@ def test_a_command_can_be_copied_whatever_a_run_is_called(folder: Path) -> None:
 
 
 def test_a_folder_without_results_is_named(folder: Path) -> None:
-    """A folder without results is named, and the other folders are shown."""
     written = write_history(folder)
     [why] = written.left_out
     assert why.startswith("broken: ")
@@ -63,7 +61,6 @@ def test_a_folder_without_results_is_named(folder: Path) -> None:
 
 
 def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) -> None:
-    """The page links only to existing reports and to comparisons of neighbouring runs."""
     for page in ("after/report/index.html", "after/report/compare-before/index.html"):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / page).write_text("")
@@ -73,6 +70,5 @@ def test_the_page_links_to_reports_and_comparisons_that_are_there(folder: Path) 
 
 
 def test_no_run_is_an_error(folder: Path) -> None:
-    """A folder without runs is an error that names it."""
     with pytest.raises(MutatorError, match="no run folder, and none in it"):
         write_history(folder / "before" / "plots")

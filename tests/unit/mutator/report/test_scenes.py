@@ -8,7 +8,6 @@ from mutator.workspace import Workspace
 
 
 def names(tree: Tree) -> Iterator[str]:
-    """The names of the channels in a tree."""
     if isinstance(tree, str):
         yield tree
     elif isinstance(tree, list):

@@ -105,7 +105,6 @@ def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> Non
 
 
 def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) -> None:
-    """If the source has changed, its lines are not shown, and the score is."""
     path = toycar.library.parent / "tree" / DRIVER
     path.write_text("# one more line\n" + path.read_text())
     reported = ReportedRun.open(

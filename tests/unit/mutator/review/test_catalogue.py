@@ -102,7 +102,6 @@ def test_what_a_decision_is_bound_to(
 
 
 def test_drawn_values_are_not_bound(toycar: Workspace, groups: Groups) -> None:
-    """Another seed draws other values, but the groups stay the same."""
     other = of_library(toycar, toycar.manifest("toycar"), specs=SENSOR, seed=1)
     assert [group.bound for group in other] == [group.bound for group in groups.values()]
     assert [group.values for group in other] == [group.values for group in groups.values()]

@@ -18,7 +18,6 @@ OFFSET = "templates/offset.py.j2"
 
 
 def git(folder: Path, *words: str) -> str:
-    """Run git as Git Smith."""
     names = {"AUTHOR_NAME": "Git Smith", "AUTHOR_EMAIL": "smith@example.org"}
     names |= {"COMMITTER_NAME": "A Robot", "COMMITTER_EMAIL": "robot@example.org"}
     env = os.environ | {f"GIT_{name}": value for name, value in names.items()}
@@ -27,7 +26,6 @@ def git(folder: Path, *words: str) -> str:
 
 
 def commit(root: Path, path: str, author: str) -> str:
-    """Change a file, commit it as the author, and return the commit."""
     with (root / path).open("a") as file:
         file.write("{# more #}\n" if path.endswith("j2") else "# more\n")
     git(root, "commit", "-qam", "more", f"--author={author}")

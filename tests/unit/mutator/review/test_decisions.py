@@ -223,7 +223,6 @@ def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
     ],
 )
 def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, argument: str) -> None:
-    """A change has its author's name, and its content is text."""
     with pytest.raises(MutatorError) as caught:
         record(toycar, "toycar", [Change(group=group("a"), kind=kind, by=by, text=text)], {})
     assert caught.value.argument == argument
@@ -231,7 +230,6 @@ def test_no_name_or_no_text(toycar: Workspace, kind: Kind, by: str, text: str, a
 
 
 def test_a_remark_is_one_line(toycar: Workspace) -> None:
-    """Line breaks in a remark are replaced by spaces."""
     found = say(toycar, Kind.REMARK, "a", text="one\n two\ttabs")
     assert found.remarks("a" * 12)[0].text == "one two tabs"
 

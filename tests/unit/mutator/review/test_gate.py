@@ -77,7 +77,6 @@ def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Pl
 
 
 def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: Path) -> None:
-    """A campaign is named by its path if its name or its text is not in the library."""
     mine = tmp_path / "my own.yaml"
     mine.write_text(toycar.campaign("small").read_text() + "\n# mine\n")
     with pytest.raises(CheckFailed) as caught:

@@ -107,7 +107,6 @@ def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
     ],
 )
 def test_any_text_is_given_back(patch: str) -> None:
-    """Text that is not a mutant's patch is a separate shape."""
     (shape,) = shapes([("a", "", patch), ("b", "", patch)])
     assert shape.patch(1) == patch
 

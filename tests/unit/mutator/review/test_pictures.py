@@ -34,7 +34,6 @@ def lit(toycar: Workspace, give_eyes: Callable[..., None]) -> Lit:
 
 @pytest.fixture
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of the runs made so far."""
     made: list[str] = []
     execute = ReferenceEngine.execute
 
@@ -151,7 +150,6 @@ def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None
 
 
 def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
-    """A run that ends before the injected place is reported immediately."""
     workspace, _ = lit()
     sensing = workspace.library.parent / "tree/toycar/sensing.py"
     text = sensing.read_text()
@@ -162,7 +160,6 @@ def test_a_place_that_no_run_comes_to(lit: Lit) -> None:
 
 @pytest.mark.slow
 def test_every_image_effect_of_the_library_has_pictures(clone: Workspace, tmp_path: Path) -> None:
-    """Each effect changes the image at every level."""
     manifest = clone.manifest("openpilot")
     wanted = [g for g in of_library(clone, manifest, specs=["vision_*/*"]) if pictures.has_pictures(g)]
     found = pictures.of_groups(clone, manifest, wanted)

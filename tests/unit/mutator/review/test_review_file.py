@@ -99,7 +99,6 @@ def old(tmp_path: Path) -> Path:
 
 
 def edited(path: Path, group: str, old: str, new: str) -> dict[str, Entry]:
-    """The entries by `what`, after an edit in the block of that group."""
     head, block, rest = path.read_text().partition(f'group: "{group}"')
     assert old in rest
     path.write_text(head + block + rest.replace(old, new, 1))
@@ -157,7 +156,6 @@ def test_old_remarks_are_kept(old: Path) -> None:
 
 
 def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
-    """A mistake in an old file is reported at its line."""
     with pytest.raises(MutatorError, match=r"toycar\.yaml:8: 'aproved' for 'decision'"):
         edited(old, "08a4799889df", "approved", "aproved")
     old.write_text('schema: review/1\ntarget: "toycar"\ndecisions: 1.5\n')
@@ -166,7 +164,6 @@ def test_an_old_mistake_is_told_at_its_line(old: Path) -> None:
 
 
 def test_writing_upgrades_the_file(old: Path) -> None:
-    """Writing an old file converts it to the new schema with the same content."""
     found = review_file.load(old, "toycar")
     review_file.write(old, "toycar", found)
     assert f"schema: {review_file.SCHEMA}\n" in old.read_text()

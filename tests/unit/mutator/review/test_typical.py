@@ -56,7 +56,6 @@ def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: W
 
 
 def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """If a run was resumed, its results are read again."""
     group = next(g for g in of_plan(toycar, make_plan(toycar, "toy", Choices())) if g.faults)
     write_run(toycar, tmp_path / "run", lambda e: None)
     with pytest.raises(MutatorError, match="no results here"):

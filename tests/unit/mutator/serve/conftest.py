@@ -101,7 +101,6 @@ class Client:
         return self.ask("POST", path, body=body)
 
     def ended(self, job: str, within_s: float = 300.0) -> dict[str, Any]:
-        """Wait until the job ends, and return it."""
         deadline = time.monotonic() + within_s
         while time.monotonic() < deadline:
             found = next(one for one in self.get("/api/jobs").json["jobs"] if one["id"] == job)

@@ -69,7 +69,6 @@ def test_a_spec_is_no_path(client: Client, spec: str) -> None:
     ["run.json", "digests.json", "campaign.yaml", "plan/faults.jsonl", "owner.lock", "report/made_from.json"],
 )
 def test_only_what_a_report_shows_is_served(client: Client, name: str) -> None:
-    """Other files of a run folder are not served."""
     path = client.place / "runs/night" / name
     path.parent.mkdir(exist_ok=True)
     if not path.exists():
@@ -105,7 +104,6 @@ def linked(client: Client) -> Iterator[Path]:
     "name", ["plots/a.svg", "report/tables/a.csv", "results.csv", "series/index.js", "series/kept/a.js"]
 )
 def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: str) -> None:
-    """A link in a run folder is not followed, wherever its target is."""
     path = linked / name
     path.parent.mkdir(parents=True, exist_ok=True)
     for end in (client.place / "secret.csv", linked / "plan.csv"):
@@ -148,7 +146,6 @@ def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linke
 
 
 def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
-    """A link in the folder of runs is not served as a run."""
     elsewhere = client.place / "elsewhere"
     elsewhere.mkdir()
     make_run(elsewhere)

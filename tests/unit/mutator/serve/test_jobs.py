@@ -135,7 +135,6 @@ def test_what_a_job_prints_is_text() -> None:
 
 
 def test_progress_is_that_of_the_stage() -> None:
-    """The progress of a stage that counts is a share. Other stages have none."""
     made = job()
     made.hear(b"golden runs 1/4, 2.0 a second\n")
     assert made.progress == 0.25

@@ -75,7 +75,6 @@ def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
 
 
 def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
-    """After a timeout, the command and all its children are killed."""
     keeper, hold = kept(tmp_path, COMMAND.format("pass"), patience_s=0.2)
     child = child_of(tmp_path)
     os.close(hold)
@@ -84,7 +83,6 @@ def test_a_command_that_does_not_end_is_killed(tmp_path: Path) -> None:
 
 
 def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
-    """If the keeper is killed, the kernel kills the command."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     [command] = Path(f"/proc/{keeper.pid}/task/{keeper.pid}/children").read_text().split()

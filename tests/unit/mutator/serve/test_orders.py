@@ -151,7 +151,6 @@ def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
 
 
 def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
-    """A campaign does not run into a link in the folder of runs, or into a link inside an existing folder."""
     (tmp_path / "runs" / "new").symlink_to(tmp_path)
     with pytest.raises(MutatorError, match="a link"):
         work(desk, **CAMPAIGN)

@@ -111,7 +111,6 @@ NO_DECISIONS: tuple[tuple[Any, int], ...] = (
 
 
 def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """An invalid decision is refused, and nothing is written."""
     client, (first, *_) = reviewed
     for body, status in NO_DECISIONS:
         sent = json.dumps(body).replace("ID", first)
@@ -144,7 +143,6 @@ def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[st
 
 
 def test_a_review_file_is_no_link(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """A review file that is a link is neither shown nor written."""
     client, (first, *_) = reviewed
     other = client.place / "secret.txt"
     other.write_text(SECRET)

@@ -104,7 +104,6 @@ def test_a_length_that_is_told_is_believed(client: Client, length: str) -> None:
 
 
 def test_a_body_within_the_limit_is_read(client: Client) -> None:
-    """A body within the limit is read, in one part or several, and its errors are reported."""
     body = b'{"kind": "' + b"x" * (MOST_BYTES - 100) + b'"}'
     for chunked in (False, True):
         assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 400

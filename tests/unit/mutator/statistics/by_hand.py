@@ -77,7 +77,6 @@ def hazard_at(row: Row) -> float | None:
 
 
 def counts(rows: Sequence[Row]) -> dict[str, int]:
-    """The counts, by the names in the summary."""
     hazard = [hazard_at(row) is not None for row in rows]
     alert = ["t_alert" in row for row in rows]
     return {
@@ -208,7 +207,6 @@ def sign_test(first: int, second: int) -> float:
 def bootstrap(
     clusters: Sequence[Sequence[Row]], rate: Callable[[Sequence[Row]], float], draws: int
 ) -> tuple[float, float]:
-    """Percentiles of a rate, from resamples with the same number of clusters."""
     draw = random.Random(99)
     found = sorted(
         rate([row for cluster in draw.choices(clusters, k=len(clusters)) for row in cluster])

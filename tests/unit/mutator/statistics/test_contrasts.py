@@ -20,7 +20,6 @@ HIT = RAN | {"h3": 1, "t_h3": 9.0}
 
 
 def pair(fault: str, guided: dict[str, object], random: dict[str, object]) -> list[dict[str, object]]:
-    """A guided run of a fault and its random partner."""
     same = {"fault_id": fault, "trigger": "C1"}
     return [same | guided, same | random | {"method": "random", "trigger": "random/C1"}]
 
@@ -138,7 +137,6 @@ def test_an_interval_needs_both_methods_in_every_draw() -> None:
 
 
 def test_a_difference_needs_runs_of_both_methods() -> None:
-    """Without random runs, there is no difference and no interval."""
     found = contrasts.resampled(results(HIT, RAN), "activated")
     assert math.isnan(found.difference)
     assert math.isnan(found.low)

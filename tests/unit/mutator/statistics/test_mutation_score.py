@@ -20,7 +20,6 @@ HEADS = ("of", "counted", "fault", "number", "not activated", "actuator changed"
 
 
 def drive(mutant: str, became: dict[str, Any], **given: str) -> dict[str, Any]:
-    """A drive with a permanent mutant of an operator, with the given changes."""
     told = {"module": OPERATORS, "fault_type": "arithmetic", "trigger": "always", "fault_id": mutant}
     return told | became | given
 
@@ -44,8 +43,6 @@ def lines(sheet: Any) -> dict[tuple[str, str, str], dict[str, Any]]:
 
 
 def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]) -> None:
-    """A mutant with two drives, one of which has a hazard, counts as one mutant with a hazard, and as two
-    drives with one hazard."""
     frame = results(drive("a", HIT), drive("a", ACTIVE), drive("b", CHANGED), drive("c", {}))
     found = lines(score_sheet(frame, faults, GOLDEN))
     total = found["all", "mutants", "permanent"]
@@ -114,7 +111,6 @@ def test_the_note_tells_of_several_draws(faults: dict[str, Fault]) -> None:
 
 
 def test_by_operator(faults: dict[str, Fault]) -> None:
-    """Each operator has a line. Faults of specs have none."""
     frame = results(drive("a", HIT), drive("b", ACTIVE, fault_type="branch"), {"fault_id": "x"} | HIT)
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["arithmetic", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -123,13 +119,10 @@ def test_by_operator(faults: dict[str, Fault]) -> None:
 
 
 def test_a_run_without_operators_has_no_score(faults: dict[str, Fault]) -> None:
-    """Without operators there is no table, so the report does not change."""
     assert not score_sheet(results(HIT), {"a": replace(faults["a"], module="radar")}, GOLDEN).lines
 
 
 def test_intervals_of_drives_are_between_mutants(faults: dict[str, Fault]) -> None:
-    """Drives of one mutant are similar. So 20 drives of two mutants have a wider interval than 20
-    independent drives."""
     frame = results(*(drive(name, HIT if name == "a" else ACTIVE) for name in "ab" for _ in range(10)))
     found = lines(score_sheet(frame, faults, GOLDEN))["all", "drives", "permanent"]["hazard"]
     assert (found.low, found.high) == (0.0, 1.0)

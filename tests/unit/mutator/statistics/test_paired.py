@@ -41,7 +41,6 @@ def test_whole_faults_are_drawn_anew() -> None:
 
 
 def test_one_fault_has_no_interval() -> None:
-    """With a single fault, nothing can be resampled."""
     found = rate_difference(flags("00"), flags("10"), pd.Series(["a", "a"]))
     assert found.difference == 0.5
     assert math.isnan(found.low)
@@ -58,7 +57,6 @@ def test_times_of_pairs() -> None:
 
 
 def test_equal_and_missing_times() -> None:
-    """If no time differs, there is no test. Without times, there are no numbers."""
     same = pd.Series([1.0, 0.1 + 0.2])
     assert math.isnan(times(same, pd.Series([1.0, 0.3])).p)
     none = times(pd.Series([None], dtype=float), pd.Series([1.0]))

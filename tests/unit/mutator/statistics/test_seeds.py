@@ -15,7 +15,6 @@ COLUMNS = ("share", "low", "high", "least", "its", "largest", "other", "seeds")
 
 
 def seed(number: int, hazards: int, runs: int = 10, **more: Any) -> list[dict[str, Any]]:
-    """This number of activated runs of a seed, of which the first ones have H1."""
     ran = {"seed": number, "t_activation": 1.0, **more}
     return [ran | ({"h1": 1, "t_h1": 2.0} if i < hazards else {}) for i in range(runs)]
 

@@ -96,7 +96,6 @@ def test_without_censoring_the_median_is_the_ordinary_one(size: int) -> None:
 
 
 def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> None:
-    """If the end of the half is unknown, the median is its beginning, and not infinity."""
     assert reaction(LIFELINES["one half to the end"]).median == 2.0
 
 

@@ -29,7 +29,6 @@ def test_times_count_from_activation() -> None:
 
 
 def test_no_reaction_time_without_an_alert_that_came_first() -> None:
-    """If the alert comes with the hazard or after it, the reaction time is empty, not 0 or negative."""
     frame = results(run(9.0, 9.0), run(9.5, 9.0), run("", 9.0))
     assert times.propagation(frame)["alert to hazard"].n == 0
     found = times.reaction(frame, ENDS, DRIVER_S)
@@ -64,7 +63,6 @@ def test_the_censored_lengthen_the_median() -> None:
 
 
 def test_alerts_without_any_hazard_are_no_median() -> None:
-    """If all runs are censored, there is no median."""
     found = times.reaction(results(run(10.0, "")), ENDS, DRIVER_S)
     assert (found.survival, found.at_risk, found.events) == (1.0, 1, 0)
     assert math.isnan(found.median)
@@ -108,7 +106,6 @@ def test_hazards_in_the_order_in_which_they_came() -> None:
 
 
 def test_the_sheets_are_by_method_and_scenario() -> None:
-    """Each method has its scenarios, then their total. Every line has a cell for each head."""
     frame = results(run(8.0, 9.0), run(8.0, "", scenario="S2"), run("", 7.0, method="random"))
     sheets = (
         propagation_sheet(frame, None),

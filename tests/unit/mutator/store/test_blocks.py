@@ -44,7 +44,6 @@ def test_a_block_cut_short_is_no_damage(file: Path) -> None:
 
 
 def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
-    """A changed byte in a head, a key or the content loses only its block."""
     whole = file.read_bytes()
     second = len(as_block(0, "one", CONTENT["one"]))
     for place in range(second, second + len(as_block(1, "two", CONTENT["two"]))):
@@ -54,6 +53,5 @@ def test_a_changed_byte_costs_its_block_alone(file: Path) -> None:
 
 
 def test_no_file_is_written_to_twice(file: Path) -> None:
-    """Only one process can write a file."""
     with pytest.raises(FileExistsError):
         BlockWriter(file)

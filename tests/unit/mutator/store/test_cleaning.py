@@ -111,7 +111,6 @@ def test_the_reference_lists_what_may_be_in_it() -> None:
 
 
 def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
-    """Links to a run folder, and links in one, are not followed. Their targets stay."""
     link = tmp_path / "latest"
     link.symlink_to(run)
     with pytest.raises(MutatorError, match=r"a link to .*; name the link.s target"):

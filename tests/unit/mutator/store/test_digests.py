@@ -105,7 +105,6 @@ def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_a_kill_while_a_file_is_rewritten(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """At any point of a kill, the file is the old or the new one, and both are valid."""
     assert kills(run, lambda: digests.rewrite(run, "a", b"new a"), monkeypatch) == 3
     assert accepted(run) and (run / "a").read_text() == "new a"
     assert digests.read(run).rewriting == {}

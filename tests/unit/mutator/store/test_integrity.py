@@ -26,7 +26,6 @@ Make = Callable[..., object]
 def made(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace], write_finished: Write
 ) -> Path:
-    """A finished, made-up run."""
     place = tmp_path_factory.mktemp("made")
     return write_finished(copy_toycar(place), place / "run")
 
@@ -116,7 +115,6 @@ def test_lost_lines_are_counted(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["records/0002-a.jsonl", "proof/x.jsonl", "golden/A/more", "plan/old"])
 def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
-    """A finished run accepts no new files."""
     (run / name).write_bytes(b"")
     assert str(problem(run)).startswith(f"{run / name}: not named in digests.json")
 
@@ -132,7 +130,6 @@ def test_what_is_outside_the_seal_is_left_alone(run: Path, name: str) -> None:
 
 
 def test_swapped_files_are_told(run: Path) -> None:
-    """If two files are swapped, both are reported."""
     a, b = run / "golden" / "A" / "log.npz", run / "golden" / "A" / "said.json"
     content = a.read_bytes()
     a.write_bytes(b.read_bytes())
@@ -169,7 +166,6 @@ def test_records_of_another_plan_are_told(run: Path) -> None:
 
 
 def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
-    """The record of an experiment that is not planned is refused: no run finishes 25 of 24."""
     path = unsealed(run, {"experiment_id": "0" * 16, "status": "ok"})
     assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
 

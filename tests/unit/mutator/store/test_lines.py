@@ -44,7 +44,6 @@ def test_lines_come_back_as_they_were(tmp_path: Path) -> None:
 
 
 def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
-    """Other programs can read the file without its checksums."""
     for line in path.read_text().splitlines():
         assert next(iter(json.loads(line))) == "sum" and len(json.loads(line)["sum"]) == 16
 
@@ -87,7 +86,6 @@ def test_lines_that_are_not_where_they_were_are_found(path: Path, change: str) -
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
 def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
-    """After a kill, any part of the last line may be there. Only the lines before it count."""
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
     segment = read_segment(path)
@@ -140,7 +138,6 @@ def test_a_full_disk_on_sync_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """100 records need only a few syncs, not 100."""
     synced = []
     monkeypatch.setattr(os, "fsync", synced.append)
     write(tmp_path / "a.jsonl", *range(100))

@@ -18,7 +18,6 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
-    """A patch that exists has a file, whichever worker its record names."""
     assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 

@@ -39,7 +39,6 @@ def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> N
 
 
 def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
-    """The line of a record equals that of `asdict`, with and without nested records."""
     activation = Activation(first=1.0, last=2.0, count=3)
     error = RunError(kind="ValueError", message="no", place="a.py:3")
     for one in (record(), replace(record(), activation=activation), replace(record(), error=error)):
@@ -58,7 +57,6 @@ def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeR
 
 @pytest.mark.parametrize("keep", [1, 20, -1, -2])
 def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: int) -> None:
-    """After a kill, any part of the last line may be there. Only the lines before it count."""
     path = write(tmp_path, "0001-gw0.jsonl", record("a" * 16), record("b" * 16))
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-1]) + lines[-1][:keep])
@@ -67,14 +65,12 @@ def test_a_torn_last_line_is_skipped(tmp_path: Path, record: MakeRecord, keep: i
 
 @pytest.mark.parametrize("content", [b"", b'{"sche'])
 def test_a_file_killed_at_birth_is_empty(tmp_path: Path, content: bytes) -> None:
-    """A file with an unfinished head has no records."""
     (tmp_path / "records").mkdir()
     (tmp_path / "records" / "0001-gw0.jsonl").write_bytes(content)
     assert read_records(tmp_path) == {}
 
 
 def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
-    """If a line has a valid checksum and is not a record, the error gives its line."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append({"experiment_id": 3})
     writer.close()
@@ -83,7 +79,6 @@ def test_a_line_that_is_no_record_is_told(tmp_path: Path) -> None:
 
 
 def test_newer_schema_is_refused(tmp_path: Path) -> None:
-    """Records of a newer version are refused."""
     LineWriter(tmp_path / "records" / "0001-gw0.jsonl", {"schema": "records/99"}).close()
     with pytest.raises(MutatorError, match="newer mutator"):
         read_records(tmp_path)
@@ -102,7 +97,6 @@ def test_any_record_goes_before_a_harness_error(
 
 
 def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: MakeRecord) -> None:
-    """Two different results of one experiment are an error."""
     write(tmp_path, "0001-gw0.jsonl", record())
     write(tmp_path, "0003-gw0.jsonl", record(outcome=Outcome.SDC, t_manifest=2.5))
     with pytest.raises(CheckFailed, match="two records that differ"):

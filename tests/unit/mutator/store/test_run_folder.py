@@ -57,7 +57,6 @@ def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Worksp
 
 
 def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
-    """A run folder of a newer mutator is left unchanged."""
     path = folder.path / "run.json"
     path.write_text(json.dumps(json.loads(path.read_text()) | {"schema": "run/4"}))
     with pytest.raises(MutatorError, match=r"run\.json: schema 'run/4' was written by a newer mutator"):
@@ -65,7 +64,6 @@ def test_a_newer_schema_is_refused(folder: RunFolder) -> None:
 
 
 def test_no_run_folder(tmp_path: Path) -> None:
-    """A folder without run.json is reported as not being a run folder."""
     with pytest.raises(MutatorError, match="not a run folder"):
         RunFolder.open(tmp_path)
 
@@ -94,7 +92,6 @@ def test_one_owner(folder: RunFolder) -> None:
 
 
 def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
-    """A new command waits for workers that are still finishing, and names them if they do not finish."""
     process = holder(folder, "worker", "1")
     assert locks.living_workers(folder.path) == [process.pid]
     with pytest.raises(MutatorError, match=rf"workers of an earlier run .* {process.pid}\)"):

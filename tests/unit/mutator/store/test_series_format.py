@@ -48,7 +48,6 @@ def test_what_equals_golden_takes_no_room() -> None:
 
 
 def test_points_come_back() -> None:
-    """Points between the times are read back, for both runs."""
     single = np.array([np.inf], dtype="<f4")
     points = Points(channel=np.array([2]), t=np.array([0.013]), golden=single, faulty=-single)
     values = np.zeros((3, 6), dtype="<f4")

@@ -102,7 +102,6 @@ def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) ->
 
 
 def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) -> None:
-    """The series of shards, packed or not, give the same files as those of one run."""
     shards = [tmp_path / name for name in "ab"]
     for shard, part in zip(shards, (IDS[:25], IDS[25:]), strict=True):
         append(shard, "0001-main", part)
@@ -127,7 +126,6 @@ def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
 
 
 def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
-    """A kill in the middle of a block loses only that block."""
     append(tmp_path, "0001-main", IDS[:3])
     [segment] = segments(tmp_path)
     segment.write_bytes(segment.read_bytes()[:-100])

@@ -92,7 +92,6 @@ def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path)
 
 
 def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A cache entry made by hand is ignored."""
     run = made[1]
     RunFolder.open(run)
     key = integrity.content_key(run)

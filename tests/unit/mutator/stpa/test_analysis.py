@@ -36,7 +36,6 @@ def folder(clone: Workspace, tmp_path: Path) -> Path:
 
 
 def spoil(folder: Path, file: str, old: str, new: str) -> int:
-    """Replace the first `old` in a file; return its line."""
     text = (folder / file).read_text()
     assert old in text
     (folder / file).write_text(text.replace(old, new, 1))
@@ -212,7 +211,6 @@ def test_a_category_or_a_hazard_that_is_left_out(
 def test_an_unsafe_action_without_a_cause(
     folder: Path, specs: tuple[FaultSpec, ...], manifest: TargetManifest
 ) -> None:
-    """An unsafe action without a cause is reported."""
     text = (folder / FACTORS).read_text()
     (folder / FACTORS).write_text(text.replace(", UCA13", ""))
     (problem,) = check_analysis(load_analysis(folder), specs, manifest)

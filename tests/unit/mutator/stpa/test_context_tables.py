@@ -23,7 +23,6 @@ def test_rows_become_triggers(toy: Workspace) -> None:
 
 
 def test_an_unknown_row(toy: Workspace) -> None:
-    """The error for an unknown row lists the existing rows."""
     with pytest.raises(MutatorError, match="context 'C1'; expected one of near, far"):
         toy.context_table("pedals").triggers(rows=("C1",))
 
@@ -59,7 +58,6 @@ def test_rows_ask_for_what_a_target_observes(toy: Workspace) -> None:
 
 
 def test_hazards_lead_to_known_accidents(toy: Workspace) -> None:
-    """A hazard with an unknown accident is refused at its line."""
     assert toy.hazards().leads_to == {"H1": ("A1",)}
     path = toy.library / "stpa" / "hazards.yaml"
     path.write_text(path.read_text().replace("leads_to: [A1]", "leads_to: [A2]"))
@@ -95,7 +93,6 @@ def test_the_table_that_ships(clone: Workspace) -> None:
 
 
 def test_the_safe_headway_is_data(clone: Workspace, tmp_path: Path) -> None:
-    """A change of one number in the file changes the safe headway."""
     text = (clone.library / "stpa" / "contexts" / "accelerate_decelerate.yaml").read_text()
     path = tmp_path / "wide.yaml"
     path.write_text(text.replace("safe_hwt_s: 2.0", "safe_hwt_s: 3"))
@@ -113,7 +110,6 @@ def test_the_table_in_the_docs_can_be_used(clone: Workspace, tmp_path: Path) -> 
 
 
 def test_rows_judge_the_same_actions(toy: Workspace) -> None:
-    """A row that lacks one of the control actions is reported at its line."""
     path = toy.library / "stpa" / "contexts" / "pedals.yaml"
     head, _, tail = path.read_text().rpartition("accelerate:")
     path.write_text(f"{head}brake:{tail}")

@@ -48,7 +48,6 @@ def test_a_wrong_table_is_told_where(conditions: tuple[str, ...], place: str, ro
 
 
 def test_neighbouring_numbers_leave_no_cell_between() -> None:
-    """No cell is searched between two adjacent floats."""
     found = prove("rs <= 1.0", "rs >= 1.0000000000000002")
     assert found.place is None and found.cells == 4
 

@@ -31,7 +31,6 @@ def meets(box: Box, start: Point, end: Point) -> bool:
 
 
 def test_boxes_stand_apart_and_inside(layout: Layout) -> None:
-    """No box overlaps another box or leaves the diagram."""
     for one, other in combinations(layout.boxes.values(), 2):
         assert not meets(one, (other.x, other.y), (other.x + other.width, other.bottom))
     for box in layout.boxes.values():
@@ -50,7 +49,6 @@ def test_arrows_join_their_boxes_and_cross_no_other(analysis: Analysis, layout: 
 
 
 def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
-    """Parallel parts of two arrows keep their distance."""
     for (one, first), (other, second) in combinations(layout.arrows.items(), 2):
         for a, b in pairwise(first.points):
             for c, d in pairwise(second.points):
@@ -63,7 +61,6 @@ def test_no_two_arrows_lie_on_each_other(layout: Layout) -> None:
 
 
 def test_labels_are_clear_of_boxes_arrows_and_each_other(analysis: Analysis, layout: Layout) -> None:
-    """The two lines of text at each arrow do not overlap any box, other arrow or other label."""
     areas = {}
     for name, link in analysis.structure.links.items():
         arrow, width = layout.arrows[name], 7.0 * len(link.label)

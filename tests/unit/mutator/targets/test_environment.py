@@ -37,7 +37,6 @@ def test_both_engines_set_them(fork: Fork) -> None:
 
 
 def test_films_have_them(toycar: Workspace, tmp_path: Path) -> None:
-    """The command that shows a film also has the variable."""
     with_env(toycar, "{ROAD: wet}")
     show = toycar.library.parent / "tree" / "toycar" / "show.py"
     show.write_text("import os, sys; open(sys.argv[4], 'w').write(os.environ['ROAD'])")

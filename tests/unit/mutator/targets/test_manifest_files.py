@@ -28,7 +28,6 @@ def test_a_manifest_is_read(toy: Workspace) -> None:
 
 
 def test_actuators_are_exact_and_rounding_counts_for_no_other_channel(toy: Workspace) -> None:
-    """A channel without a tolerance has that of its role. 0 is a valid tolerance."""
     path = toy.library / "targets" / "toy.yaml"
     kept = "{unit: m/s, role: actuator, tolerance: 0.5}"
     more = ("pedal: {unit: '-', role: actuator}", "wish: {unit: m}", "gap: {unit: m, tolerance: 0}")
@@ -135,7 +134,6 @@ def test_a_target_may_say_how_it_is_filmed(toy: Workspace) -> None:
 
 
 def test_the_root_can_be_given(toy: Workspace, tmp_path: Path) -> None:
-    """An option overrides the root in the manifest."""
     path = toy.library / "targets" / "toy.yaml"
     other = tmp_path / "other"
     (other / "toycar").mkdir(parents=True)

@@ -49,7 +49,6 @@ def test_an_installed_package(pole: Workspace, site: Path) -> None:
 
 
 def test_an_installed_module(pole: Workspace, site: Path) -> None:
-    """A module outside all packages is also found."""
     installed(pole, root="installed:aside_of_poles", packages="[aside_of_poles.py]")
     manifest = pole.manifest("pole")
     assert manifest.root == site.resolve()

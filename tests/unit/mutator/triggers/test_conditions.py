@@ -105,7 +105,6 @@ def test_what_is_no_formula_is_refused(text: str) -> None:
 
 
 def test_names_come_in_the_order_of_the_text() -> None:
-    """Functions and keywords are not listed as names."""
     assert names_in("rs > 0.0 and min(hwt, inf) < abs(rs) or True") == ("rs", "hwt")
 
 

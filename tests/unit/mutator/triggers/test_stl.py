@@ -57,7 +57,6 @@ def far(formula: Formula) -> int:
 
 
 def defined(formula: Formula, i: int, values: dict[str, list[float]]) -> float:
-    """The robustness of the formula at step i."""
     match formula:
         case ("<=", name, limit):
             return limit - values[name][i]

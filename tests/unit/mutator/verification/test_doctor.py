@@ -12,7 +12,6 @@ NO_LIBRARY = MutatorError("no fault library", remedy="say --root")
 
 
 def test_this_machine_can_run_campaigns_but_for_the_library() -> None:
-    """On a machine that can run the tests, only the missing library fails, with a remedy."""
     findings = doctor.examine(NO_LIBRARY)
     failed = [f for f in findings if f.level is Level.FAIL]
     assert [(f.name, f.found, f.remedy) for f in failed] == [("library", "no fault library", "say --root")]
@@ -36,9 +35,6 @@ def test_another_version_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_folder_without_locks_is_a_warning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder without locks or write permission is a warning. It cannot have runs, but another folder
-    can."""
-
     def refuse(*_: object) -> None:
         raise OSError(95, "Operation not supported")
 

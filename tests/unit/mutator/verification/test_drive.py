@@ -17,14 +17,12 @@ SCENARIO = ["A"]
 
 @pytest.fixture
 def toy(toycar: Workspace) -> Workspace:
-    """The toy without the deliberately broken parts."""
     for path in [*(toycar.library / "faults" / "hostile").iterdir(), toycar.campaign("hostile")]:
         path.unlink()
     return toycar
 
 
 def change(toy: Workspace, file: str, old: str, new: str) -> None:
-    """Edit a file in the toy's tree or library."""
     root = toy.library.parent
     path = root / file if file.endswith(".yaml") else root / "tree" / "toycar" / file
     assert old in path.read_text()
@@ -32,7 +30,6 @@ def change(toy: Workspace, file: str, old: str, new: str) -> None:
 
 
 def line_of(toy: Workspace, text: str, file: str = "driver.py") -> int:
-    """The line number of this text in the toy's file."""
     lines = (toy.library.parent / "tree" / "toycar" / file).read_text().splitlines()
     (number,) = (n for n, line in enumerate(lines, 1) if text in line)
     return number
@@ -244,7 +241,6 @@ def test_a_trigger_that_no_scenario_reaches_is_told(toy: Workspace) -> None:
 
 
 def test_a_canary_that_does_no_harm_is_told_with_all_values(toy: Workspace) -> None:
-    """Each value of the canary is tried and named."""
     change(toy, "fault_library/campaigns/small.yaml", "at_s: 1.0", "at_s: 5.9")
     toy.campaign("toy").unlink()
     found = driven(toy)["canary small"]
@@ -278,6 +274,5 @@ def test_a_target_without_steps_is_told_what_it_lacks(toy: Workspace) -> None:
 
 
 def test_an_unknown_scenario_is_refused(toy: Workspace) -> None:
-    """A scenario that is not in the library is an error of the caller."""
     with pytest.raises(MutatorError, match="nowhere"):
         check_drive(toy, "toycar", ["nowhere"])

@@ -49,7 +49,6 @@ def proven(toycar: Workspace, tmp_path: Path) -> Path:
 
 @pytest.mark.slow
 def test_a_record_that_differs_fails_the_campaign(toycar: Workspace, proven: Path, reseal: Reseal) -> None:
-    """A record that differs from the reference engine's is named, and the campaign fails."""
     (path,) = (proven / "records").iterdir()
     lines = path.read_text().splitlines()
     record = json.loads(lines[1])
@@ -76,7 +75,6 @@ def test_what_is_lost_of_a_proof_is_run_again(toycar: Workspace, proven: Path, r
 
 @pytest.mark.slow
 def test_the_reference_engine_needs_no_proof(toycar: Workspace, tmp_path: Path) -> None:
-    """A run that uses only the reference engine has no equivalence check."""
     summary = run_campaign(toycar, "small", tmp_path / "run", choices=Choices(limit=1))
     assert summary.proof is None
     assert not (tmp_path / "run" / "proof").exists()

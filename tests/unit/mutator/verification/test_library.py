@@ -53,7 +53,6 @@ def everything() -> dict[str, tuple[Fault, ...]]:
 
 @pytest.fixture(scope="module")
 def faults(everything: dict[str, tuple[Fault, ...]]) -> dict[str, tuple[Fault, ...]]:
-    """The faults of the published experiments."""
     return {name: tuple(f for f in found if f.module not in BEYOND) for name, found in everything.items()}
 
 
@@ -146,7 +145,6 @@ def test_readings(faults: dict[str, tuple[Fault, ...]]) -> None:
 
 
 def test_radar_and_camera_can_be_compared(faults: dict[str, tuple[Fault, ...]]) -> None:
-    """Distance errors of the radar, of the camera and of both have the same numbers."""
     values: dict[str, list[object]] = {}
     for fault in faults["as_described"]:
         values.setdefault(fault.spec, []).append(fault.value)

@@ -56,7 +56,6 @@ def test_a_sound_target_passes(toycar: Workspace, tmp_path: Path, monkeypatch: p
 
 
 def test_a_damaged_golden_run_is_made_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A golden run that differs from the checked one is run again."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     trace = folder.golden("A") / "log.npz"
@@ -152,7 +151,6 @@ def test_an_anchor_that_is_gone_is_told_before_anything_runs(
 def test_other_golden_runs_than_before_are_refused(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with records keeps its golden run and does not resume with another one."""
     folder = frozen(toycar, tmp_path)
     run_checks(toycar, folder)
     LineWriter(

@@ -20,7 +20,6 @@ CopyToycar = Callable[[Path], Workspace]
 
 @pytest.fixture(scope="module")
 def checked(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Workspace, RunFolder]:
-    """A toy with a folder for passed checks."""
     root = tmp_path_factory.mktemp("checked")
     toy = copy_toycar(root)
     folder = freeze(make_plan(toy, "small"), root / "run", toy)
@@ -125,7 +124,6 @@ def test_other_sources_are_checked(
 
 
 def test_a_damaged_entry_is_replaced(checked: tuple[Workspace, RunFolder], cache: Path) -> None:
-    """The next entry replaces a damaged one."""
     good = (cache / "checks.json").read_bytes()
     (cache / "checks.json").write_bytes(b"")
     preflight_cache.store(cache, checked[1].path, "checks.json", checked[1].work)

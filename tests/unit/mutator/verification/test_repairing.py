@@ -34,13 +34,11 @@ def run(made: Path, tmp_path: Path) -> Path:
 
 
 def repaired(run: Path) -> tuple[list[str], RunFolder]:
-    """Repair the run; return the output and the folder, which can be opened."""
     said = repair(RunFolder.unverified(run))
     return said, RunFolder.open(run)
 
 
 def edit(path: Path, change: Callable[[list[bytes]], list[bytes]]) -> None:
-    """Change the lines of a file in the run."""
     path.write_bytes(b"".join(change(path.read_bytes().splitlines(keepends=True))))
 
 
@@ -83,7 +81,6 @@ def test_who_computed_checksums_anew_is_not_believed(run: Path) -> None:
 
 
 def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
-    """If lines were added to a closed file, its original lines stay."""
     head, *lines = [json.loads(line) for line in (run / RECORDS).read_text().splitlines()]
     values = [{k: v for k, v in line.items() if k != "sum"} for line in [*lines, lines[0]]]
     (run / RECORDS).write_bytes(written(run / RECORDS, {k: head[k] for k in ("schema", "plan")}, values))
@@ -92,7 +89,6 @@ def test_lines_that_were_added_by_such_a_hand_go(run: Path, made: Path) -> None:
 
 
 def test_a_segment_that_is_gone_is_forgotten(run: Path) -> None:
-    """The experiments of a missing segment are run again."""
     (run / RECORDS).unlink()
     said, folder = repaired(run)
     assert folder.records() == {} and said == [f"{RECORDS} is gone"]
@@ -229,7 +225,6 @@ def test_what_is_no_file_is_put_aside(run: Path, name: str, is_link: bool) -> No
 
 
 def test_a_file_of_patches_that_is_a_link_is_put_aside(run: Path, put_patches: Callable[..., None]) -> None:
-    """If a file of patches is a link, the link's target stays unchanged."""
     name = next(plan_file.ids(run))
     put_patches(run, {name: b"not the patch of the record"})
     [file] = Patches(run).files()

@@ -30,7 +30,6 @@ def made(
 
 @pytest.fixture
 def run(made: Path, tmp_path: Path) -> Path:
-    """A finished run, which a test may change."""
     return Path(shutil.copytree(made, tmp_path / "another place"))
 
 

@@ -44,12 +44,10 @@ def test_a_set_that_is_gone_through_is_found(line: str) -> None:
     ],
 )
 def test_what_needs_no_order_is_not(line: str) -> None:
-    """Sorting, counting and membership tests do not depend on the order."""
     assert places(line.encode()) == []
 
 
 def test_a_place_has_its_line_and_function() -> None:
-    """A place is reported with line, function and expression."""
     source = (
         b"class A:\n    def f(self):\n        names = {'a', 'b'}\n        for n in names:\n            g(n)\n"
     )

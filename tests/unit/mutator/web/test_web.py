@@ -25,7 +25,6 @@ def test_carried_data_come_back_and_are_the_same_each_time() -> None:
 
 
 def test_plain_data_cannot_end_their_element() -> None:
-    """Plain JSON cannot end its script element, whatever it contains."""
     element = web.plainly_embedded({"text": "</script><!--"}, "here")
     assert element.count("<") == 2
     text = element.removeprefix('<script type="application/json" id="here">').removesuffix("</script>")
@@ -43,5 +42,4 @@ def test_what_json_does_not_know_is_refused() -> None:
     sorted({*report.STYLES, *report.SCRIPTS, *review.STYLES, *review.SCRIPTS, *SERVED}),
 )
 def test_assets_stay_small_and_cannot_end_their_element(name: str) -> None:
-    """`asset` refuses a script that could end its element. A script has at most 300 lines."""
     assert len(web.asset(name).splitlines()) <= 300

@@ -19,7 +19,6 @@ MESSAGES = [(path, name) for path in (CAR_DBC, RADAR_DBC) for name in load(path)
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
 def test_pack_and_decode_agree_with_cantools(path, name, data):
-    """Cantools decodes a packed frame to the same values, and the codec decodes a frame as cantools does."""
     message = load(path)[name]
     reference = load_reference(path).get_message_by_name(name)
     signals = [n for n in message.fields if n not in (COUNTER, CHECKSUM)]

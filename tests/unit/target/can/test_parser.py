@@ -29,7 +29,6 @@ def wheels():
 
 
 def test_values_before_the_first_frame(parser):
-    """Before any frame a message has its initial values, and the bus is not valid."""
     parser.update([], 0.0)
     assert parser.values == {"ENGINE_DATA": (-1,), "WHEEL_SPEEDS": (0,)}
     assert not parser.valid
@@ -84,7 +83,6 @@ def test_slower_messages_are_waited_for_longer(parser, speed, wheels):
 
 
 def test_a_stuck_counter_is_believed_four_times(parser, speed):
-    """Frames with a stuck counter are rejected from the fifth wrong counter on."""
     for repeat in range(8):
         parser.update([speed.pack((float(repeat),), 0)], repeat / 100)
     assert parser.values["ENGINE_DATA"] == pytest.approx((4.0,))

@@ -50,7 +50,6 @@ def test_brake_rises_slowly_and_falls_at_once(rig):
 
 
 def test_brake_is_quantised_and_never_full(rig):
-    """Brake commands are truncated to steps of 1/256 and never exceed 255 steps."""
     assert rig.send(cycles=200, brake=5.0).brake == 255 / 256
     rig.send(brake=0.0)
     assert rig.send(cycles=60, brake=0.3).brake == 74 / 256  # 0.29 is 74.24 counts
@@ -80,7 +79,6 @@ def test_steering_torque(rig, steer, taken):
 
 
 def test_no_torque_while_the_eps_refuses(rig):
-    """The EPS gets no torque request while it does not allow torque."""
     rig.car = CarState(steer_not_allowed=True)
     assert rig.send(steer=0.5).steer == 0.0
 
@@ -93,7 +91,6 @@ def test_disabled_means_zero(rig):
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), float("-inf")])
 def test_a_demand_that_is_no_number_is_zero(rig, bad):
-    """A NaN demand is sent as zero, and later demands work."""
     taken = rig.send(gas=bad, brake=bad, steer=bad)
     assert (taken.gas, taken.brake, taken.steer) == (0.0, 0.0, 0.0)
     assert rig.send(cycles=20, brake=0.1).brake > 0.0

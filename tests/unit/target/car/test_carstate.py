@@ -143,5 +143,4 @@ def test_brake_switch_needs_two_frames(reader, bench):
     ("code", "gear"), [(1, "park"), (2, "reverse"), (4, "neutral"), (8, "drive"), (63, "unknown")]
 )
 def test_gears(reader, code, gear):
-    """Each known gear code has a name, and an unknown code has none."""
     assert reader.update([pack("GEARBOX", 0, GEAR_SHIFTER=code)], 0.0).gear == gear

@@ -30,10 +30,6 @@ def test_no_events_without_cause(car, bench):
 
 
 def test_can_error_comes_after_the_fifth_invalid_cycle(car, bench):
-    """If CAN is lost after 0.10 s, it is invalid from 0.21 s.
-
-    From the fifth invalid cycle, at 0.25 s, it is an error until CAN returns.
-    """
     for _ in range(11):
         update(car, bench)
     first = next(step for step in range(11, 60) if "can_error" in kinds(car.update([], step / 100)))

@@ -24,7 +24,6 @@ def test_the_default_is_the_published_calibration():
 @CAMERAS
 @given(x=ahead, y=sideways)
 def test_a_point_on_the_road_is_projected_where_its_row_and_column_are(model, x, y):
-    """The image of (x, y, 0) lies in the row of x and the column of (x, y)."""
     assert model.project(x, y, 0.0) == pytest.approx((model.column(x, y), model.row(x)), abs=1e-6)
 
 
@@ -40,7 +39,6 @@ def test_row_and_distance_are_inverse(model, x):
 @CAMERAS
 @given(y=sideways, slope=turned)
 def test_a_line_of_the_road_is_a_line_of_the_picture(model, y, slope):
-    """All points of a road line lie on its line in the image, from which it can be recovered."""
     a, b = model.line_in_picture(y, slope)
     for x in (4.0, 20.0, 100.0):
         assert a * model.row(x) + b == pytest.approx(model.column(x, y + slope * x), abs=1e-6)

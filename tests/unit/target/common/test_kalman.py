@@ -19,7 +19,6 @@ def test_speed_estimate_starts_as_the_original() -> None:
 
 
 def test_distance_filter_learns_the_rate() -> None:
-    """After 5 s, the filter has learnt the rate of a distance that shrinks at 10 m/s."""
     lead = DistanceFilter(variance=1e2, q_distance=0.5, q_rate=1.0)
     lead.restart(80.0, 0.01, 1e2)
     for k in range(100):

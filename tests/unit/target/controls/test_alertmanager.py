@@ -31,7 +31,6 @@ def test_startup_is_covered_by_the_beep_and_comes_back() -> None:
 
 
 def test_higher_priority_is_shown_and_all_are_listed() -> None:
-    """The most urgent alert is shown. The list has all alerts, the most urgent first."""
     alerts = AlertManager()
     alerts.add("steer_saturated", 1.0)
     alerts.add("fcw", 1.0)
@@ -54,7 +53,6 @@ def test_the_newer_of_equals_is_shown() -> None:
 
 
 def test_sound_picture_and_text_end_one_after_the_other() -> None:
-    """Steering saturation has sound for 1 s, picture for 2 s, text for 3 s."""
     alerts = AlertManager()
     alerts.add("steer_saturated", 0.0)
     alerts.process(0.5)
@@ -102,7 +100,6 @@ SUFFIX = {
 
 @pytest.mark.parametrize("event", EVENTS, ids=lambda event: event.name)
 def test_every_event_has_its_alerts(event: Event) -> None:
-    """Every event of the car, the planner or the controls has alerts that can be shown."""
     asked = {event.name + SUFFIX[kind] for kind in event.kinds if kind in SUFFIX}
     assert asked <= set(ALERTS)
 
@@ -130,7 +127,6 @@ def test_every_alert_can_be_raised() -> None:
     ],
 )
 def test_priority_and_duration(name: str, priority: int, duration: float) -> None:
-    """Priorities and durations are the original's."""
     assert (ALERTS[name].priority, ALERTS[name].duration) == (priority, duration)
 
 

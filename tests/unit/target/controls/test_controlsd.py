@@ -141,7 +141,6 @@ def test_pre_enabled_waits_for_the_pedal(drive: Drive) -> None:
 
 
 def test_buttons_change_the_set_speed_once_engaged(drive: Drive) -> None:
-    """The release that engages keeps the set speed. Later releases change it."""
     drive.engage()
     assert drive.state.v_cruise == pytest.approx(72 * KPH_TO_MS)
     drive.run(1, buttons=(ButtonEvent("accel", True),)).run(1, ENGAGE, buttons=(ButtonEvent("accel", False),))

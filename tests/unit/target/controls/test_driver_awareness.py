@@ -9,7 +9,6 @@ def run(cycles: int) -> tuple[DriverAwareness, list[str]]:
 
 
 def test_first_alert_20_s_before_slowing_down_for_4_s() -> None:
-    """The first alert shows from 340 s to 344 s, and the second shows from 360 s."""
     _, alerts = run(36100)
     first = [k for k, a in enumerate(alerts) if a == "pre_driver_distracted"]
     second = [k for k, a in enumerate(alerts) if a == "driver_distracted"]

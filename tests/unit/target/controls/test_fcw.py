@@ -58,7 +58,6 @@ BARELY = [
 def test_each_condition_prevents_the_warning(
     car: dict, lead: dict, car_change: dict, lead_change: dict
 ) -> None:
-    """Each condition alone prevents the warning, exactly up to its limit."""
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == []
     car, lead = car | car_change, lead | lead_change
     assert warnings(replace(CAR, **car), replace(LEAD, **lead)) == [pytest.approx(3.0, abs=0.06)]
@@ -94,7 +93,6 @@ def test_planned_braking(a_plan: tuple[float, ...], a_ego: float, expected: int)
 
 
 def test_a_lead_must_have_been_seen_for_31_cycles() -> None:
-    """If the blinkers have been off for long, a lead must be seen for 31 cycles before the warning."""
     checker = FcwChecker()
     checker._no_blinker = 10.0
     warned = [checker.update(k * 0.05, CAR, LEAD, BRAKING) for k in range(31)]

@@ -79,7 +79,6 @@ def test_driver_at_the_wheel_is_not_worked_against(params: CarParams) -> None:
 
 @pytest.mark.parametrize(("v_ego", "active"), [(0.29, True), (20.0, False)])
 def test_no_torque_at_rest_or_out_of_control(params: CarParams, v_ego: float, active: bool) -> None:
-    """Nearly at rest or while control is off, there is no torque and the integral is reset."""
     lateral, car = control(params, 1.0)
     first, *_ = [lateral.update(car, True) for _ in range(100)]
     assert lateral.update(CarState(v_ego=v_ego), active) == 0.0

@@ -79,13 +79,11 @@ def test_width_unseen_is_that_of_usual_roads() -> None:
 
 
 def test_one_line_alone_tells_no_width() -> None:
-    """The width is only as certain as both lines together."""
     one = [model(probs=(1.0, 0.0)) for _ in range(10)]
     assert planned(*one, v_ego=31.0).lane_width == pytest.approx(3.8 - 0.1 * 0.95**10)
 
 
 def test_fit_answers_anew_for_each_message() -> None:
-    """A stored fit is used only for its own message."""
     fit = ModelFit()
     assert fit.polys(model(path=0.1))[2][3] == pytest.approx(0.1)
     assert fit.polys(model(path=0.2))[2][3] == pytest.approx(0.2)

@@ -47,7 +47,6 @@ def test_oncoming_may_change() -> None:
 
 
 def test_camera_clears_stationary_after_three_fusions() -> None:
-    """Three fusions with the camera make a stationary object trusted. Two do not."""
     t = track(v_rel=-20.0)
     t.fuse()
     t.fuse()
@@ -57,7 +56,6 @@ def test_camera_clears_stationary_after_three_fusions() -> None:
 
 
 def test_lead_speed_and_acceleration_follow_the_measurement() -> None:
-    """The estimated acceleration of a lead that brakes at 2 m/s^2 is -2 m/s^2."""
     t = track(v_rel=0.0)
     for k in range(1, 61):
         step(t, -0.1 * k)

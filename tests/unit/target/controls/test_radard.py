@@ -78,7 +78,6 @@ def test_closest_lead_and_the_next(params: CarParams) -> None:
 
 
 def test_path_moved_away_loses_the_lead(params: CarParams) -> None:
-    """If the path moves more than 1.5 m away from a vehicle, the vehicle is no longer a lead."""
     drive = Drive(params)
     assert drive.see(point(), cycles=3).lead_one.status
     assert not drive.see(point(), vision=model(path=2.0), cycles=3).lead_one.status
@@ -115,7 +114,6 @@ def test_standing_vehicle_is_a_lead_only_with_the_camera(params: CarParams) -> N
 
 
 def test_twenty_fusions_make_a_lead_good_for_warnings(params: CarParams) -> None:
-    """A lead can raise a collision warning after twenty fusions with the camera."""
     drive = Drive(params)
     assert not drive.see(point(), cycles=19).lead_one.fcw
     assert drive.see(point(), cycles=2).lead_one.fcw

@@ -89,7 +89,6 @@ def test_driver_beats_fault() -> None:
 
 
 def test_soft_disabling_is_active_for_300_cycles() -> None:
-    """After a soft disabling, the car is controlled for 3 s and then released."""
     drive = Drive((ENGAGE,), (DOOR,))
     active = []
     for _ in range(310):

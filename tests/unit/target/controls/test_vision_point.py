@@ -64,7 +64,6 @@ def test_filter_is_a_kalman_filter_with_the_camera_s_variance() -> None:
 
 
 def test_an_unsure_lead_matches_nothing() -> None:
-    """A lead with a probability of 70 % is not used. A lead with 71 % is used."""
     assert seen(prob=0.7).best_match([track()], ZERO) is None
     assert seen(prob=0.71).best_match([track()], ZERO) is not None
 

@@ -78,7 +78,6 @@ def test_a_flake_is_a_blurred_block():
 
 
 def test_gaussians_end_at_two_sigma():
-    """The light of a single point ends at two sigma."""
     point = np.zeros((41, 41), np.float32)
     point[20, 20] = 255.0
     for sigma, reach in ((0.6, 2), (1.5, 3), (7.0, 14)):

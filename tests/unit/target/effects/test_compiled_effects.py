@@ -223,7 +223,6 @@ def test_runs_in_weather_have_the_same_bytes(folder, tmp_path, monkeypatch, kind
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [effects.CodedRain, effects.CodedSnow])
 def test_runs_in_weather_as_coded_have_the_same_bytes(folder, tmp_path, monkeypatch, kind):
-    """The same holds for runs with the detector as coded."""
     same_runs(folder, tmp_path, monkeypatch, kind, AS_CODED)
 
 

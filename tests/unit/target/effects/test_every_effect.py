@@ -132,7 +132,6 @@ def test_moving_effects_move(effect, camera, moment, road):
 @every
 @pytest.mark.parametrize("level", [0, 255])
 def test_black_and_white_pictures_do_not_wrap_round(effect, camera, moment, level):
-    """Levels are limited: a brightened white pixel does not wrap round to black."""
     flat = np.full((camera.rows, camera.width), level, dtype=np.uint8)
     after = strongest(effect, camera).apply(flat, moment()).astype(int)
     grey = strongest(effect, camera).apply(np.full_like(flat, 128), moment()).astype(int)

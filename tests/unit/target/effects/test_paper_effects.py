@@ -72,7 +72,6 @@ def test_rain_dims_and_blurs_what_is_behind(camera, moment, road):
 
 
 def test_fog_reduces_contrast_evenly(camera, moment):
-    """Fog reduces a difference of 100 levels to 90 at thickness 1 and to 40 at 10, for the same noise."""
     for thickness, alpha in ((1, 0.9), (10, 0.4)):
         made = PaperFog(thickness, 0, camera)
         dark, bright = (

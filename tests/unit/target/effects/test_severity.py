@@ -24,7 +24,6 @@ def test_clean_pictures_lack_nothing(gauge, road):
 
 
 def test_contrast_and_psnr_follow_the_levels(gauge, road):
-    """At half the grey levels, the contrast is halved and the PSNR is that of the error."""
     psnr, contrast, _ = gauge.measure(road, road // 2)
     error = (road.astype(float) - road // 2) ** 2
     assert contrast == pytest.approx(60.0, abs=1.0)
@@ -62,7 +61,6 @@ def test_what_covers_the_road_is_what_changes_an_even_grey(gauge, road):
 
 
 def test_page_has_every_effect_and_level():
-    """The committed page has an image and a table with all levels for every effect."""
     text = (REFERENCE / "image-effects.md").read_text(encoding="utf-8")
     for effect, amounts in LEVELS.items():
         part = re.search(rf"^### {effect.__name__}$(.*?)(?=^##|\Z)", text, re.MULTILINE | re.DOTALL)

@@ -96,7 +96,6 @@ def test_start_is_moved_on_by_the_actuation_delay(lateral_mpc, lanes):
 
 
 def test_plan_continues_from_its_own_angle(lateral_mpc, lanes):
-    """The plan continues from its own angle, not the measured one. The offset is added to the result."""
     drive(lateral_mpc, lanes(1.0), offset=0.01)
     wanted = lateral_mpc.delta_desired
     assert lateral_mpc.angle_desired == pytest.approx(wanted * RATIO + 0.01)

@@ -97,7 +97,6 @@ def test_no_lead_never_limits(long_mpc):
 
 
 def test_new_lead_when_it_appears_or_jumps(long_mpc, lead):
-    """A lead is new if there was none before or if it moved by more than 2.5 m in one update."""
     seen = []
     for d_rel in (50.0, 49.0, 51.5, 54.1, 54.1):
         drive(long_mpc, 20.0, 0.0, lead(d_rel, 18.0), 1)

@@ -82,7 +82,6 @@ def test_one_iteration_is_the_full_gauss_newton_step(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_iterations_converge_to_the_optimum(case):
-    """Repeated at the same state, the iterations converge to the optimum of a nonlinear solver."""
     ocp, start, param, control = CASES[case]
     w, residuals, defects, low, high = full_problem(ocp, start, param)
     nlp = {"x": w, "f": ca.sumsqr(residuals) / 2, "g": defects}

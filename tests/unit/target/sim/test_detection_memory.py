@@ -77,7 +77,6 @@ def test_without_a_file_nothing_is_remembered(tmp_path):
 
 
 def test_a_full_disk_ends_remembering_and_no_more(tmp_path, monkeypatch):
-    """If the disk is full, a value is not remembered and the run sees no error."""
     memory = DetectionMemory(tmp_path)
 
     def full(*_):

@@ -101,7 +101,6 @@ def error(folder):
 
 
 def test_a_frame_of_another_size_is_named(folder):
-    """For a frame of another size, the error gives the file, its size and the expected size."""
     cv2.imwrite(str(folder / "7.png"), np.zeros((60, 80), np.uint8))
     assert error(folder).startswith(f"{folder}/7.png: 80x60, expected 64x48; ")
 

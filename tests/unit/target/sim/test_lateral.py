@@ -86,7 +86,6 @@ def test_the_wheel_returns_by_itself(car):
 
 
 def test_the_wheel_has_a_stop(car):
-    """On a standing car, the wheel stops at its stop and can leave it at once."""
     run(car, 30.0, 1.0, 0.0)
     assert (car.steer_angle, car.steer_rate) == (8.7, 0.0)
     run(car, 0.01, -1.0, 0.0)

@@ -42,7 +42,6 @@ def test_torque_turns_the_wheel_slowly(sign, speed):
 
 
 def test_only_every_fifth_step_moves_the_car():
-    """Only the steering of steps 0, 5, 10 and so on moves the car."""
     moved = []
     for pushed in range(10):
         lateral = CrudeLateral()

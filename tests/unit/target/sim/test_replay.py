@@ -41,7 +41,6 @@ def trace():
 
 @pytest.fixture
 def reference(trace, tmp_path):
-    """Return the trace as a reference, written and read back."""
     write_reference(tmp_path / "made" / "S1.csv", trace)
     return read_reference(tmp_path / "made" / "S1.csv")
 
@@ -117,7 +116,6 @@ def test_crossings():
 
 
 def test_messages_may_be_a_cycle_late(trace, reference):
-    """The controller's messages may be one cycle late. The state of the world may not."""
     reference.channels["v_ego_est"] = np.concatenate(([0.0], trace["v_ego"][4::5][: STEPS // 5 - 1]))
     trace["v_ego_est"] = trace["v_ego"]
     reference.channels["v_ego"] = reference.channels["v_ego_est"]
@@ -129,7 +127,6 @@ def test_messages_may_be_a_cycle_late(trace, reference):
 
 
 def test_lead_compared_while_both_see_one(trace, reference):
-    """Estimates of a lead are compared only if both see one. Whether a lead is seen is always compared."""
     trace["lead_status"] = np.where(np.arange(STEPS) < 500, 0, 1)
     trace["lead_d_rel"] = np.where(np.arange(STEPS) < 500, 99.0, 0.0)
     comparison = compare(reference, trace, NO_LIMITS)
@@ -279,7 +276,6 @@ def test_reference_saved_by_a_spreadsheet(reference, finished):
 
 
 def test_reference_of_another_length(trace, reference):
-    """A reference that ends before or after the run is refused."""
     for steps in (STEPS - 100, STEPS + 100):
         cut = {name: np.resize(values, steps) for name, values in trace.items()}
         with pytest.raises(ConfigError, match="the last row is of"):
@@ -287,7 +283,6 @@ def test_reference_of_another_length(trace, reference):
 
 
 def test_limited_channel_must_be_there(trace, reference):
-    """A channel with a tolerance must be in the reference with a value in some row."""
     tolerances = load_tolerances(TOLERANCES)
     reference.channels["d_rel"][:] = np.nan
     with pytest.raises(ConfigError, match="nothing in column 'd_rel'"):

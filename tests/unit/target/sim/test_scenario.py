@@ -35,7 +35,6 @@ def edit(old, new):
 
 
 def test_everything_arrives_in_si_units():
-    """All values are in SI units, and times are in steps."""
     scenario = parse(GOOD)
     assert (scenario.name, scenario.title, scenario.digest, scenario.steps) == ("T1", "a try", "digest", 1250)
     assert scenario.speed == pytest.approx(26.8224)

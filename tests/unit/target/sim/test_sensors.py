@@ -57,7 +57,6 @@ def radar(truth, road=None, **values):
 
 
 def test_radar_cuts_off_towards_zero(truth):
-    """Distance and speed are truncated towards zero, as in the original."""
     track = radar(truth, d_rel=97.681, v_ego=26.777, v_lead=17.8868)
     assert (track["LONG_DIST"], track["REL_SPEED"]) == (97.625, -8.875)
 

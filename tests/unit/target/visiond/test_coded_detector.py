@@ -61,7 +61,6 @@ def test_both_lines_can_be_missing(road: RoadRenderer, monkeypatch: pytest.Monke
 
 @pytest.mark.parametrize(("edges", "looked_at"), [(24, False), (25, True)])
 def test_a_window_needs_25_edges(edges: int, looked_at: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A window with fewer than 25 edges is not passed to the net."""
     crests = np.zeros((np.prod(coded.WINDOWS), 32, 32), bool)
     crests[40].reshape(-1)[:edges] = True
     monkeypatch.setattr(coded, "edges_in_windows", lambda part: crests)

@@ -11,7 +11,6 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_least_marks_all_and_the_largest_none() -> None:
-    """The lowest threshold marks all windows and the highest marks none."""
     found = coded_threshold.thresholds()
     assert [row[0] for row in found] == coded_threshold.TRIED
     marked = [row[1] for row in found]

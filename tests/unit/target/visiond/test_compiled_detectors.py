@@ -190,7 +190,6 @@ def _voted(choose, *given) -> str:
 
 @pytest.mark.parametrize("name", ["RoadView", "crests", "vote"])
 def test_code_with_other_bits_than_opencv_is_not_used(name, monkeypatch):
-    """If OpenCV filters with other bits, Python computes everything."""
     here = RoadView.map if name == "RoadView" else getattr(compiled_robust, name)
 
     def otherwise(*given):

@@ -47,7 +47,6 @@ def test_the_nearest_strip_counts():
 
 @pytest.mark.parametrize("strip", [(1.0, -9.0, 30), (1.1, 0.98, 30), (9.0, 0.7, 160)])
 def test_a_step_and_a_dark_strip_are_none(strip):
-    """A change only to darker or only to brighter, or a dark strip, is not paint."""
     assert seen(strip) == (None, None)
 
 
@@ -59,7 +58,6 @@ def test_paint_behind_such_a_step_is_found():
 @pytest.mark.parametrize("width", [0.02, 0.04, 0.08])
 @pytest.mark.parametrize("gap", [0.0, 0.03, 0.06])
 def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
-    """A dark joint on either side does not hide the paint, and a joint alone is not a line."""
     paint, half = 1.84, 0.06
     beyond = (paint + half + gap + width, paint + half + gap, 25)
     before = (paint - half - gap, paint - half - gap - width, 25)
@@ -70,7 +68,6 @@ def test_a_dark_joint_beside_the_paint_does_not_hide_it(gap, width):
 
 
 def test_less_contrast_and_other_light_change_no_edge():
-    """Haze that halves the contrast and adds light does not change the edges."""
     part = np.full((64, 96), 80, np.uint8)
     part[:, 40:46] = 180
     at, _ = edges(part)

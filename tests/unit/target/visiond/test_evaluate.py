@@ -87,7 +87,6 @@ def test_lines_win_over_centres(frames, capsys):
 
 
 def test_centres_stand_in_for_lines_that_are_null(frames, capsys):
-    """If an entry's lines are null, its centres count."""
     lines = _lines(frames)
     left, right = (lines["p1_one"][side] for side in "LR")
     lines["p1_one"] = {
@@ -116,14 +115,12 @@ def test_of_frames_with_one_name_the_camera_s_folder_has_the_right_one(frames, c
 
 
 def test_overlays_that_cannot_be_written_are_named(frames, capsys):
-    """If a file is in the way of the overlay folder, the error names it."""
     (frames / "drawn").write_text("in the way")
     assert _run(frames, "--overlays", str(frames / "drawn")) == 2
     assert "drawn/robust_p1_one.png" in capsys.readouterr().err
 
 
 def test_a_folder_s_own_camera_is_used(frames, capsys):
-    """If there is a camera.yaml next to the frames, keys can have any form."""
     (frames / "frames" / "camera.yaml").write_text(
         "schema: camera/1\nname: mine\nfiles: '*.png'\nwidth: 960\nrows: 540\n"
         "horizon_row: 318\nfocal_px: 868.5\nheight_m: 1.21\nfps: 20\n"
@@ -169,7 +166,6 @@ def test_a_missing_truth_file_is_named(frames, capsys):
 
 @pytest.mark.parametrize("width", [640, 960, 1280])
 def test_the_canonical_frame_has_its_vanishing_row_at_200(width):
-    """Any frame is converted to a width of 640 px with the camera's vanishing row at row 200."""
     rows = width * 9 // 16
     frame = np.zeros((rows, width, 3), np.uint8)
     row = round(425 / 720 * rows)

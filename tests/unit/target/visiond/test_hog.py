@@ -22,7 +22,6 @@ def pictures() -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("name", pictures())
 def test_blocks_equal_those_of_scikit_image(name):
-    """Every block has the features that scikit-image computes, to a millionth."""
     picture = pictures()[name].astype(np.uint8)
     expected = hog(picture, BINS, (CELL, CELL), (2, 2), "L2", feature_vector=False)
     blocks = Hog(*picture.shape).blocks(picture)

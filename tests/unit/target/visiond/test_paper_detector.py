@@ -79,7 +79,6 @@ def test_where_nothing_is_seen_nothing_is_claimed(level):
 
 
 def test_with_one_line_the_path_is_half_a_lane_beside_it(faded):
-    """The invisible line has probability 0, and the path follows the other."""
     found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 0.4)))
     assert found.left.prob > 0.5
     assert found.right.prob == 0.0
@@ -87,7 +86,6 @@ def test_with_one_line_the_path_is_half_a_lane_beside_it(faded):
 
 
 def test_the_middle_of_the_car_divides_left_from_right(faded):
-    """For a car that has crossed its left line, that line is the right line."""
     found = PaperDetector(CALTECH).detect(view(faded.grey(5.0, 2.6)))
     assert found.right.y == pytest.approx(1.85 - 2.6, abs=0.08)
 
@@ -124,7 +122,6 @@ def test_what_is_seen_does_not_depend_on_the_number_of_threads():
 
 
 def test_a_tile_needs_its_share_of_marked_windows():
-    """One marked window marks its four tiles only if the required number is one."""
     marked = np.zeros((3, 4), bool)
     marked[1, 2] = True
     assert tiles_with_mark(marked, 1).sum() == 4
@@ -132,7 +129,6 @@ def test_a_tile_needs_its_share_of_marked_windows():
 
 
 def test_the_windows_on_a_tile_are_those_that_can_light_it():
-    """The windows on a tile are the four that contain it. A pixel has the number of its tile."""
     tiles = np.zeros((4, 5), bool)
     tiles.ravel()[tile_numbers(64, 80)[40 * 80 + 50]] = True  # the pixel in row 40, column 50
     assert np.argwhere(tiles).tolist() == [[2, 3]]

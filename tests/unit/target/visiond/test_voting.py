@@ -11,7 +11,6 @@ VIEW = RoadView(CameraModel())
 
 
 def points_on(pose: Pose, lines: str = "LR", chance: int = 0, seed: int = 0) -> Points:
-    """Return points on both lines (or on one) in every row, and `chance` random points."""
     rng = np.random.default_rng(seed)
     rows, columns = [], []
     for side, y in (("L", pose.y_left), ("R", pose.y_right)):
@@ -47,7 +46,6 @@ def test_lines_are_found_wherever_they_are(middle, left, dip, width):
 
 @pytest.mark.parametrize(("lines", "missing"), [("L", "y_right"), ("R", "y_left")])
 def test_the_line_that_is_not_seen_is_a_lane_s_width_away(lines, missing):
-    """If only one line has points, the other is a lane width away and counts as not seen."""
     true = Pose(5.0, 0.0, 1.6, -1.8)
     found = solve(points_on(true, lines), Belief(width=(3.4, 0.1)))
     assert getattr(found, missing) == pytest.approx(getattr(true, missing), abs=0.1)

@@ -125,7 +125,6 @@ def test_exceptions_are_described(
 
 
 def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
-    """The exceptions in a group are described as its causes."""
     error = described("several")["error"]
     assert error["kind"] == "ExceptionGroup"
     assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]

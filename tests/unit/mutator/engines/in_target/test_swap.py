@@ -127,7 +127,6 @@ def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType)
 
 
 def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
-    """If one of the functions is not the loaded one, no code is swapped."""
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
     with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
@@ -136,7 +135,6 @@ def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -
 
 
 def test_a_function_that_there_are_two_of_is_left_alone(loaded: types.ModuleType) -> None:
-    """Code that two functions share is not swapped in one of them only."""
     with pytest.raises(SwapRefused, match="several of it"):
         swap_code(functions('"old twice"', '"new twice"'), PROBE)
 
@@ -153,7 +151,6 @@ def test_a_function_at_work_is_left_alone(loaded: types.ModuleType) -> None:
 
 
 def test_a_module_that_is_not_loaded(loaded: types.ModuleType) -> None:
-    """A module that is not imported yet cannot be changed."""
     changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
     with pytest.raises(SwapRefused, match="car_nobody_loaded is not loaded"):
         swap_code(changed, PROBE)

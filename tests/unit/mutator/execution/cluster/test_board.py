@@ -44,7 +44,6 @@ def clock() -> Clock:
 
 @pytest.fixture
 def ids(folder: RunFolder) -> list[str]:
-    """The ids of all planned experiments."""
     return list(plan_file.ids(folder.path))
 
 
@@ -86,7 +85,6 @@ def test_all_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> No
 
 
 def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """If there is another worker, no worker does the proof of its own experiments."""
     done = drained(board(folder, clock, tuple(ids[::7])))
     ran = {name: worker for worker, piece in done if piece.kind is Kind.RUN for name in piece.lines}
     proved = {name: worker for worker, piece in done if piece.kind is Kind.PROVE for name in piece.lines}
@@ -103,7 +101,6 @@ def test_a_worker_alone_proves_what_it_ran(folder: RunFolder, clock: Clock, ids:
 
 
 def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> None:
-    """Each worker changes its golden run at most as often as there are golden runs."""
     done = drained(board(folder, clock))
     for worker in ("alpha", "beta"):
         keys = [piece.golden for name, piece in done if name == worker]
@@ -122,7 +119,6 @@ def test_pieces_get_shorter_towards_the_end(folder: RunFolder, clock: Clock) -> 
 
 
 def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Clock) -> None:
-    """An idle worker repeats a piece that is late, and the first result counts."""
     there = board(folder, clock)
     frozen = taken(there, "alpha")
     drained_by_beta = 0
@@ -185,7 +181,6 @@ def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock
 
 
 def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, clock: Clock) -> None:
-    """If two workers do the same piece and one dies, the other continues."""
     for first in ("alpha", "beta"):
         there = board(folder, clock)
         late = taken(there, "alpha")

@@ -36,7 +36,6 @@ def test_versions_decide(change: dict[str, object], objection: str) -> None:
 
 
 def test_other_versions_can_be_accepted() -> None:
-    """The user can accept other versions of Python and of packages, but not of mutator."""
     crew = Crew(STRETCH, accept=True)
     assert crew.objection(FACTS | {"packages": {"numpy": "1.0"}}) == ""
     assert crew.objection(FACTS | {"mutator": "0.0.1"})

@@ -37,7 +37,6 @@ Work = Callable[[Piece], Result]
 
 
 def healthy(piece: Piece) -> Result:
-    """The result of a piece from a healthy worker."""
     line = {"detail": "", "hazards": [], "max_dev": [], "outcome": "masked", "status": "ok", "tree": ""}
     line |= {"activation": None, "alerts": [], "t_manifest": None, "trace_digest": ""}
     records = [json.dumps({"experiment_id": name} | line, separators=(",", ":")) for name in piece.lines]
@@ -233,8 +232,6 @@ def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> 
 
 
 def test_a_remark_that_is_an_error_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If warnings are errors, no background work continues after the first warning."""
-
     class Place:
         @asynccontextmanager
         async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]

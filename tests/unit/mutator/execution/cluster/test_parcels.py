@@ -28,7 +28,6 @@ def test_damage_is_found() -> None:
 
 
 def test_a_result_comes_back() -> None:
-    """The lines, blocks and ending of a result are read back."""
     result = Result(
         number=7,
         ending=Ending.DONE,

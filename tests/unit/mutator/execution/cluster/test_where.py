@@ -33,7 +33,6 @@ def test_an_address_is_a_scheduler(address: str) -> None:
 
 
 def test_local_names_how_many_workers() -> None:
-    """`local:4` means four worker processes."""
     assert parse("local:4") == Local(workers=4)
 
 
@@ -102,7 +101,6 @@ def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None
     ],
 )
 def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> None:
-    """Only the loopback and TLS are closed. All other networks are open to other users."""
     assert connecting.is_closed(address) is closed
 
 
@@ -118,8 +116,6 @@ def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.Mon
 def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """`dask scheduler` listens on all networks. It is refused even if its address is on the loopback."""
-
     @asynccontextmanager
     async def found(*given: Any, **more: Any) -> AsyncIterator[Any]:
         yield SimpleNamespace(scheduler_info=lambda: {"address": "tcp://10.0.0.5:8786"})

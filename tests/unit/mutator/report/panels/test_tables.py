@@ -63,7 +63,6 @@ def test_files_are_the_same_each_time(run: RunFolder) -> None:
 
 
 def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolder) -> None:
-    """A table that counts alerts is followed by the alerts of the fault-free runs, with their conditions."""
     golden = run.path / "golden" / "S1"
     drive = {name: np.ones(3000) for name in ("d_rel", "v_ego", "v_lead", "a_ego", "hwt")}
     drive |= {"t": np.arange(3000) / 100, "lateral_offset": np.linspace(-0.25, 0.5, 3000)}
@@ -80,7 +79,6 @@ def test_a_table_that_counts_alerts_tells_of_those_without_a_fault(run: RunFolde
 
 @pytest.mark.parametrize("alerts", [["fcw"], []])
 def test_alerts_are_told_only_of_a_target_that_has_some(run: RunFolder, alerts: list[str]) -> None:
-    """If the target has no alerts, the report does not explain columns of alerts."""
     head = json.loads((run.path / "run.json").read_text()) | {"alerts": alerts}
     (run.path / "run.json").write_text(json.dumps(head))
     markdown = tables_panel(ReportedRun.open(RunFolder.unverified(run.path), HERE)).markdown
