@@ -22,7 +22,7 @@ def clean(path: Path) -> None:
     """Delete the run folder. MutatorError as in `check`, and while a command or its workers use it."""
     check(path)
     with owned(path, patience_s=0.0):
-        found = check(path)  # check again, because nobody writes to the folder any more
+        found = check(path)  # check again, because now nobody else can write to the folder
         _delete(path, sorted(found, key=lambda file: file == path / HEAD))  # run.json goes last
 
 

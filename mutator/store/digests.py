@@ -132,7 +132,9 @@ def read(run: Path) -> Ledger:
     data = read_json(path, SCHEMA)
     as_written = path.read_bytes() == json_bytes(data)
     if data.pop("sum", None) != digest(data) or not as_written:
-        raise MutatorError("changed since it was written", where=path, expected="its own checksum", remedy=remedy)
+        raise MutatorError(
+            "changed since it was written", where=path, expected="its own checksum", remedy=remedy
+        )
     try:
         return Ledger(
             files={name: Digest(**value) for name, value in data["files"].items()},
