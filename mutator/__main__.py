@@ -1,5 +1,3 @@
-"""`python -m mutator` is `mutator`."""
-
 from mutator.cli.app import program
 
 if __name__ == "__main__":

@@ -13,10 +13,7 @@ EXIT_HARNESS_ERRORS = 3
 class MutatorError(Exception):
     """An error that the user can fix, shown without a traceback.
 
-    `where` is the file with the error and `line` the line in it, if known. `got` is the value found,
-    `expected` describes valid values, and `remedy` says what to do. If an argument of the API is wrong,
-    `argument` is its name and `where` is None. Names in backquotes in the remedy are arguments, too; the
-    command line shows the matching options.
+    Names in backquotes in the remedy are arguments of the API; the command line shows the matching options.
     """
 
     exit_code = EXIT_WRONG_INPUT  #: exit code of a command that ends with this error
@@ -67,7 +64,6 @@ class MutatorWarning(UserWarning):
 
 
 def _short(text: str) -> str:
-    """Cut the text: an invalid value may be megabytes long."""
     return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
 
 

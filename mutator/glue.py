@@ -45,7 +45,7 @@ class GlueError(Exception):
 
 
 class Scenario(dict[str, Any]):
-    """The values of a scenario file by key. A missing key raises GlueError, which lists the known keys."""
+    """The values of a scenario file by key. A missing key raises GlueError."""
 
     def __init__(self, values: dict[str, Any], path: Path) -> None:
         super().__init__(values)
@@ -66,7 +66,6 @@ class Run:
 
     # two underscores keep this class's attributes apart from a subclass's
     def __init__(self, *, step_s: float, duration_s: float) -> None:
-        """Set up a run of `duration_s`, rounded to whole steps. `end` ends it earlier."""
         self.__channels: tuple[str, ...] = ()
         self.__rows: list[tuple[float, ...]] = []
         self.__duration_s = _length("duration_s", duration_s)
@@ -81,15 +80,12 @@ class Run:
         self.__alerting: set[str] = set()
 
     def step(self) -> None:
-        """Advance the loop by one step and record it. The subclass defines it."""
+        """Advance the loop by one step and record it."""
         raise NotImplementedError(f"{type(self).__name__} has no step()")
 
     @property
     def step_s(self) -> float:
-        """Length of a step in s. If steps differ, set it in each step before you call `record`.
-
-        A new length applies from the current step on, until you set another.
-        """
+        """Length of a step in s. If steps differ, set it in each step before you call `record`."""
         return self.__step_s
 
     @step_s.setter
@@ -117,7 +113,7 @@ class Run:
     def record(self, **channels: float) -> None:
         """Record the current step: a number for each channel, with the same channels in each step.
 
-        Call it once, at the end of each step. After the call, `t` is the time of the next step.
+        Call it once, at the end of each step.
         """
         if not self.__rows:
             self.__channels = tuple(channels)
@@ -136,16 +132,13 @@ class Run:
     def hazard(self, name: str, now: bool) -> None:
         """Report whether a hazard is present. Call it in each step, before `record`.
 
-        Use it for hazards that the manifest names without a condition. The first step with the hazard counts.
+        Use it for hazards that the manifest names without a condition.
         """
         if self.__hazards.setdefault(name, None) is None and now:
             self.__hazards[name] = self.t
 
     def alert(self, name: str, now: bool) -> None:
-        """Report whether the controller alerts its driver. Call it in each step, before `record`.
-
-        Each start of an alert is recorded.
-        """
+        """Report whether the controller alerts its driver. Call it in each step, before `record`."""
         if not now:
             self.__alerting.discard(name)
         elif name not in self.__alerting:
@@ -169,7 +162,7 @@ class Run:
         """Return the run for `--scenario FILE --seed N --out DIR` before its first step.
 
         The manifest names this method in `stepwise`. Any other `--key value` replaces the scenario's value of
-        that key, and `--key` alone sets it to true. So changes of a scenario in the manifest need no code.
+        that key, and `--key` alone sets it to true, so changes of a scenario need no code.
         """
         given = _options(arguments)
         subclass: Any = cls
@@ -183,7 +176,7 @@ class Run:
 
     @classmethod
     def main(cls, arguments: Sequence[str] | None = None) -> None:
-        """Run all steps and write the results. `arguments` defaults to the arguments of the process."""
+        """Run all steps and write the results. `arguments` defaults to those of the process."""
         arguments = sys.argv[1:] if arguments is None else arguments
         run = cls.open(arguments)
         while not run.done:
@@ -205,8 +198,8 @@ def seed_globals(seed: int) -> None:
 def read_scenario(path: Path) -> Scenario:
     """Read a scenario file: `key: value` in each line, `#` before a comment.
 
-    This is a subset of YAML. A value is written as in JSON (a number, true, false, null, [1, 2], {"a": 1});
-    anything else is text. Raise GlueError for any other line.
+    This is a subset of YAML. A value is written as in JSON; anything else is text. GlueError for any other
+    line.
     """
     found: dict[str, Any] = {}
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -244,9 +237,7 @@ def _value(text: str) -> Any:
 
 
 def _options(arguments: Sequence[str]) -> dict[str, str | None]:
-    """Return the options `--key value`, `--key=value` and `--key` (None) by key, with `_` for `-` inside a
-    key.
-    """
+    """Return the options `--key value`, `--key=value` and `--key` (None) by key, with `_` for `-`."""
     found: dict[str, str | None] = {}
     waiting = ""
     for argument in arguments:
@@ -276,7 +267,6 @@ def _seed(given: dict[str, str | None]) -> int:
 
 
 def _scenario(given: dict[str, str | None]) -> Scenario:
-    """Read the scenario file and replace the values that other arguments give."""
     scenario = read_scenario(Path(_needed(given, "scenario")))
     for key, value in given.items():
         if key in _OPTIONS:

@@ -16,7 +16,7 @@ OPERATORS = "operators"  # the module of faults made by mutation operators
 
 
 class AnchorKind(StrEnum):
-    """Where a snippet goes relative to a target statement, or, in VALUE_ANCHORS, which value changes."""
+    """Where a snippet goes relative to a statement, or, in VALUE_ANCHORS, which value changes."""
 
     AFTER_ASSIGN = "after_assign"
     BEFORE_ASSIGN = "before_assign"
@@ -63,7 +63,7 @@ class Method(StrEnum):
 
 
 class AfterHazard(StrEnum):
-    """Whether a run goes on or stops after a terminal hazard has ended its drive."""
+    """Whether a run continues after a terminal hazard has ended its drive."""
 
     GO_ON = "go_on"
     STOP = "stop"
@@ -95,8 +95,7 @@ class Anchor:
     It is the `nth` match (from 1) of `kind` and `name`; without `nth` there must be exactly one match.
     `which` selects an argument of a call by position (from 1) or keyword. `name` depends on the kind:
 
-    * assignments, calls, arguments, returns: the name that is assigned, called or returned, as in the source:
-      `gap`, `self.angle`, `pose['x']`
+    * assignments, calls, arguments, returns: the name as in the source: `gap`, `self.angle`, `pose['x']`
     * `value`, `condition`, `return_value`: the expression
     * `constant`: `LIMIT` or `Class.LIMIT`; `default`: the parameter; neither has an `nth`
     * empty for `entry`, and to match any return or condition
@@ -124,9 +123,8 @@ class FaultLocation:
 class Injection:
     """One fault model applied at one location. `params` are sorted (name, value) pairs.
 
-    With `where`, the injection acts only in executions in which this condition holds. These executions are
-    counted from the fault's activation. With `call`, it acts only in that one of them; with `every`, in every
-    n-th one.
+    With `where`, it acts only in executions in which this condition holds. They are counted from the fault's
+    activation. With `call`, it acts only in that one of them; with `every`, in every n-th one.
     """
 
     location: FaultLocation
@@ -151,7 +149,7 @@ class Trigger:
 def fault_label(spec: str, value: Value, unit: str) -> str:
     """A fault's label for tables and messages: `sensor/bias/distance 35 m`.
 
-    `value` and `unit` are as in the spec or a table: None or '' for no value, `-` or '' for no unit.
+    `value` is None or '' for no value, `unit` is `-` or '' for no unit.
     """
     if value is None or value == "":
         return spec
@@ -160,10 +158,7 @@ def fault_label(spec: str, value: Value, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Fault:
-    """A fault with a fixed value: what it injects, where, and the hazard that it aims at.
-
-    `hold` overrides the trigger's hold, for faults that latch.
-    """
+    """A fault with a fixed value: what it injects, where, and the hazard that it aims at."""
 
     spec: str  #: name of the variant: `<module>/<fault_type>/<variant>`
     module: str  #: module of the controller, as the spec names it
@@ -218,7 +213,7 @@ class Experiment:
 
     @cached_property
     def plain_trigger(self) -> dict[str, Any]:
-        """The trigger as JSON types, for the id and the plan file."""
+        """The trigger as JSON types."""
         return dict(plain(self.trigger))
 
     @property
@@ -234,16 +229,13 @@ class Experiment:
 
     @cached_property
     def changes(self) -> tuple[str, ...]:
-        """All changes of the scenario without duplicates: the fault's, then the setting's."""
+        """All changes of the scenario: the fault's, then the setting's."""
         return tuple(dict.fromkeys((*self.fault.changes, *self.setting)))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Limits:
-    """Limits of one run, which is stopped when it exceeds one.
-
-    CPU and wall time in s, address space in MiB, observed simulation steps, MiB written to disk.
-    """
+    """Limits of one run: CPU and wall time in s, memory and disk in MiB, simulation steps."""
 
     cpu_s: int = 60
     wall_s: int = 300
@@ -254,7 +246,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Activation:
-    """When and how often an injected statement ran while triggered: simulation times in s, and a count."""
+    """When and how often an injected statement ran while triggered. Times in s."""
 
     first: float
     last: float
@@ -265,8 +257,7 @@ class Activation:
 class RunError:
     """An exception that ended a run.
 
-    `place` is the innermost line of the target in the traceback, `file:line` in the tree that ran; empty if
-    there is none.
+    `place` is the innermost line of the target in the traceback, as `file:line`; empty if there is none.
     """
 
     kind: str

@@ -65,9 +65,10 @@ class Workspace:
     ) -> "Workspace":
         """Find library, templates and target, each in the first of these places that names or contains it:
 
-        1. the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES
-        and MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder upward that holds fault_library/; 4. what
-        ships with the harness.
+        * the argument, or `root`, which holds library and templates
+        * MUTATOR_LIBRARY, MUTATOR_TEMPLATES and MUTATOR_TARGET, or MUTATOR_ROOT
+        * the nearest folder upward that holds fault_library/
+        * what ships with the harness.
 
         MutatorError if a named folder does not exist.
         """
@@ -91,7 +92,7 @@ class Workspace:
         return manifest
 
     def scale_of(self, manifest: TargetManifest) -> Scale | None:
-        """The severity scale for a target's contacts, from the library or the harness; None without contacts.
+        """The severity scale for a target's contacts; None without contacts.
 
         MutatorError, at the manifest's line, for an unknown scale.
         """
@@ -126,7 +127,7 @@ class Workspace:
         return tuple(sorted((self.library / "faults").rglob("*.yaml")))
 
     def spec(self, name: str | Path) -> FaultSpec:
-        """The spec `<module>/<fault_type>`, or the spec at that path."""
+        """The spec `<module>/<fault_type>`, or the spec in that file."""
         return load_spec(self._file("faults", name, "fault spec"), self.readings())
 
     def specs(self) -> tuple[FaultSpec, ...]:
@@ -154,9 +155,9 @@ class Workspace:
     ) -> tuple[Fault, ...]:
         """The faults that match `pattern`, in the library's order, with values drawn from `seed`.
 
-        `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or the
-        path of a spec file. `target` names a manifest; default: the library's only target. MutatorError if
-        nothing matches, and for a mistake in a spec.
+        `pattern` is `<module>/<fault_type>` or `<module>/<fault_type>/<variant>`, with * for any text, or a
+        spec file. `target` names a manifest; default: the library's only target. MutatorError if nothing
+        matches, and for a mistake in a spec.
         """
         check_whole("seed", seed)
         if str(pattern).endswith((".yaml", ".yml")):
@@ -220,9 +221,7 @@ class Workspace:
         return self._files("stpa/contexts")
 
     def context_table(self, name: str | Path, variables: Collection[str] | None = None) -> ContextTable:
-        """The context table `name`, or the table at that path; `variables` are the values that a target
-        observes.
-        """
+        """The context table `name`, or the one in that file; `variables` are what a target observes."""
         return load_context_table(self._file("stpa/contexts", name, "context table"), variables)
 
     def hazards(self) -> HazardList | None:
@@ -236,9 +235,7 @@ class Workspace:
         return load_analysis(folder) if (folder / "control_structure.yaml").exists() else None
 
     def structure(self, manifest: TargetManifest) -> StructureModel | None:
-        """A target's control structure; None if the library has none, or if no channel names one of its
-        components.
-        """
+        """A target's control structure; None if no channel names one of its components."""
         path = self.library / "stpa" / "control_structure.yaml"
         structure = load_structure(path) if path.exists() else None
         known = structure.components if structure else {}
@@ -248,7 +245,6 @@ class Workspace:
         return library_files(self.library, folder)
 
     def _file(self, folder: str, name: str | Path, what: str) -> Path:
-        """A file of the library by name, or the file at a path that ends in .yaml."""
         known = self._files(folder)
         if str(name).endswith((".yaml", ".yml")):
             if not Path(name).is_file():

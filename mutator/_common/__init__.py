@@ -1,4 +1,1 @@
-"""Shared helpers: files, hashing, random streams, locks, interrupts, text and tables.
-
-They do not depend on faults, targets or campaigns.
-"""
+"""Helpers that know nothing of faults, targets or campaigns: files, hashing, locks, text, tables."""

@@ -6,21 +6,19 @@ from mutator.errors import MutatorError
 
 
 def check_whole(argument: str, value: object, *, least: int = 0) -> None:
-    """Raise MutatorError unless `value` is an integer of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int) or value < least:
         expected = "a positive number" if least == 1 else f"a whole number, at least {least}"
         raise MutatorError(repr(value), argument=argument, expected=expected)
 
 
 def check_number(argument: str, value: object, *, least: float = -math.inf) -> None:
-    """Raise MutatorError unless `value` is a finite number of at least `least`."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not _fits(value, least):
         expected = "a number" if least == -math.inf else f"a number, at least {least:g}"
         raise MutatorError(repr(value), argument=argument, expected=expected)
 
 
 def check_type(argument: str, value: object, kind: type, what: str) -> None:
-    """Raise MutatorError unless `value` has the type `kind`; `what` describes what is expected."""
+    """Raise MutatorError unless `value` has the type `kind`; `what` describes it in the error."""
     if not isinstance(value, kind):
         raise MutatorError(repr(value), argument=argument, expected=what)
 

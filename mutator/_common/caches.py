@@ -46,9 +46,7 @@ class Entry:
 
 
 def folder() -> Path:
-    """The folder of all caches, which may not exist. Without a home directory, it is a path that cannot
-    exist.
-    """
+    """The folder of all caches. It may not exist; without a home directory, it cannot."""
     named = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if named.is_absolute():
         return named / "mutator"
@@ -59,32 +57,27 @@ def folder() -> Path:
 
 
 def of_checks() -> Path:
-    """The folder of passed checks."""
     return folder() / CHECKS
 
 
 def of_goldens() -> Path:
-    """The folder of golden runs that a cluster worker ran."""
     return folder() / GOLDENS
 
 
 def of_runs() -> Path:
-    """The folder of verified runs."""
     return folder() / RUNS
 
 
 def of_lines() -> Path:
-    """The folder of lines that golden runs execute."""
     return folder() / LINES
 
 
 def of_pictures() -> Path:
-    """The folder of image effects."""
     return folder() / PICTURES
 
 
 def of_target(name: str) -> Path:
-    """The folder that the runs of a target share; each name maps to one folder."""
+    """The folder that all runs of a target share."""
     return folder() / TARGETS / quote(name, safe="").replace(".", "%2E")
 
 
@@ -109,7 +102,7 @@ def make_room(target: str) -> list[Entry]:
     """Delete the least recently used files of a target until at most TARGET_BYTES remain; return the deleted
     entries.
 
-    A run of many seeds calls this before each seed, because each seed has separate images.
+    Called before each seed of a run, because each seed has its own images.
     """
     return _pruned([_entry(f"target {target}", path) for path in _files(of_target(target))], TARGET_BYTES)
 

@@ -1,5 +1,3 @@
-"""The number of processor cores that this process may use."""
-
 import os
 from pathlib import Path
 
@@ -7,7 +5,7 @@ _QUOTA = Path("/sys/fs/cgroup/cpu.max")  # a container's cgroup v2 quota: micros
 
 
 def usable_cores() -> int:
-    """The number of cores on which this process may run; fewer if a container has a smaller quota."""
+    """The number of cores that this process may use, limited by a container's quota."""
     cores = len(os.sched_getaffinity(0))
     try:
         quota, period = _QUOTA.read_text().split()

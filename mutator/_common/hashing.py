@@ -20,8 +20,7 @@ _SCALARS = frozenset((str, int, float, bool, type(None)))
 def added(default: Any) -> Any:
     """Declare a dataclass field that is added to a hashed record after the record's first release.
 
-    No id changes: `plain` omits the field while it equals `default`, and older files are read with `default`.
-    The default must be immutable and must never change.
+    Files without the field are read with `default`, which must be immutable and must never change.
     """
     return dataclasses.field(default=default, metadata={_ADDED: True})
 
@@ -37,14 +36,13 @@ def added_values(record: Any) -> dict[str, Any]:
 
 @lru_cache(maxsize=256)
 def _fields(kind: type) -> tuple[tuple[str, ...], tuple[tuple[str, Any], ...]]:
-    """The names of a dataclass's original fields, and names and defaults of its `added` fields."""
     every = dataclasses.fields(kind)
     first = tuple(f.name for f in every if _ADDED not in f.metadata)
     return first, tuple((f.name, f.default) for f in every if _ADDED in f.metadata)
 
 
 def from_json(data: bytes) -> Any:
-    """Parse JSON like `json.loads`, but four times as fast; integers of more than 64 bits become floats."""
+    """Parse JSON four times as fast as `json.loads`; integers of more than 64 bits become floats."""
     try:
         return orjson.loads(data)
     except ValueError:  # orjson also rejects e.g. nan
@@ -52,10 +50,7 @@ def from_json(data: bytes) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Convert records, tuples and enums into JSON types; floats stay as they are.
-
-    A record's `added` fields are omitted while they have their defaults.
-    """
+    """Convert records, tuples and enums into JSON types, omitting `added` fields that have their defaults."""
     if type(value) in _SCALARS:
         return value
     if isinstance(value, Enum):  # test first, because it takes long to find that an enum has no fields
@@ -83,11 +78,11 @@ def canonical(value: Any) -> str:
 
 
 def digest(value: Any) -> str:
-    """The SHA-256 of `value` in hex. Bytes are hashed as they are, any other value in its canonical text."""
+    """The SHA-256 of `value` in hex: of bytes directly, of other values in their canonical text."""
     data = value if isinstance(value, bytes) else canonical(value).encode()
     return hashlib.sha256(data).hexdigest()
 
 
 def content_id(value: Any) -> str:
-    """The first 16 hex digits of `digest`. Among 10^6 items, a clash has odds of 1 in 37 million."""
+    """The first 16 hex digits of `digest`. Among 10^6 items, the odds of a clash are 1 in 37 million."""
     return digest(value)[:16]

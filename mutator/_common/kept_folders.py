@@ -36,7 +36,6 @@ def store(place: Path, fill: Callable[[Path], object]) -> None:
 
 
 def _sum(folder: Path) -> bytes:
-    """The digest of the names and contents of all files in a folder."""
     files = sorted(path for path in folder.rglob("*") if path.is_file())
     found = sorted((path.relative_to(folder).as_posix(), digest(path.read_bytes())) for path in files)
     return digest(found).encode()

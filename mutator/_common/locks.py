@@ -1,7 +1,4 @@
-"""Locks of a run folder: one command at a time, and no worker of an earlier command.
-
-They are flocks, which the kernel releases when the process that holds them ends.
-"""
+"""Locks of a run folder, for one command at a time. They are flocks, which end with their process."""
 
 import fcntl
 import os
@@ -91,9 +88,7 @@ def living_workers(run: Path) -> list[int]:
 
 
 def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
-    """Wait until no worker is left in `run`; return the process ids of workers that are still there at the
-    end.
-    """
+    """Wait until no worker is left in `run`; return the process ids of those left at the end."""
     deadline = time.monotonic() + patience_s
     while (living := living_workers(run)) and time.monotonic() <= deadline:
         time.sleep(0.1)
@@ -101,7 +96,7 @@ def wait_for_workers(run: Path, patience_s: float = _PATIENCE_S) -> list[int]:
 
 
 def _opened(path: Path, more: int = 0) -> int:
-    """Open a file. MutatorError for a folder, a pipe or a link, so that nothing is written through a link."""
+    """Open a file; MutatorError for a folder, a pipe or a link."""
     try:
         return os.open(no_pipe(path), os.O_RDWR | os.O_NOFOLLOW | more, 0o644)
     except OSError as err:

@@ -15,22 +15,19 @@ _Given = str | Path | None
 
 def library_folder(root: _Given = None, library: _Given = None) -> Path:
     """The fault library: from an argument, the environment, the nearest folder upward, or the shipped
-    library.
-
-    The folder may not exist.
+    library. It may not exist.
     """
     named = _named(library, root, _LIBRARY, "MUTATOR_LIBRARY")
     return named or (_upward(_LIBRARY) or shipped_folder()) / _LIBRARY
 
 
 def templates_folder(root: _Given = None, templates: _Given = None) -> Path:
-    """The templates folder, found like `library_folder`. The folder may not exist."""
+    """The templates folder, found like `library_folder`. It may not exist."""
     named = _named(templates, root, _TEMPLATES, "MUTATOR_TEMPLATES")
     return named or (_upward(_LIBRARY, _TEMPLATES) or shipped_folder()) / _TEMPLATES
 
 
 def environment_path(variable: str) -> Path | None:
-    """The path in an environment variable, or None if it is unset or empty."""
     value = os.environ.get(variable)
     return Path(value) if value else None
 
@@ -51,7 +48,6 @@ def run_folders(root: Path) -> list[Path]:
 
 
 def _named(folder: _Given, root: _Given, name: str, variable: str) -> Path | None:
-    """The folder `name` from an argument (the folder or its root), or from the environment."""
     if folder or root:
         return Path(folder) if folder else Path(root or "") / name
     base = environment_path("MUTATOR_ROOT")

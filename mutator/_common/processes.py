@@ -21,16 +21,15 @@ R = TypeVar("R")
 
 
 def processes_for(experiments: int) -> int:
-    """The number of processes among which to share the work for so many experiments."""
     return min(_MOST, usable_cores()) if experiments >= _WORTH else 1
 
 
 def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[R]:
-    """Yield `made(item)` for each item, in order, computed by `processes` processes; fewer than two: by this
-    process.
+    """Yield `made(item)` for each item, in order, computed by `processes` processes (fewer than two: by this
+    one).
 
-    The processes inherit this process's memory. Each is at most one result ahead, so results need little
-    memory. Exceptions of `made` are raised here. MutatorError if a process dies.
+    Each process is at most one result ahead, which saves memory. Exceptions of `made` are raised here;
+    MutatorError if a process dies.
     """
     if processes < 2:
         yield from map(made, items)
@@ -42,8 +41,7 @@ def shared(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterat
 
 @contextmanager
 def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
-    """Run `work` in another process during the block. The block receives a function that waits for the
-    result.
+    """Run `work` in another process during the block, which receives a function that waits for the result.
 
     That function raises what `work` raised. With fewer than two processes, it does the work itself.
     """
@@ -56,9 +54,7 @@ def beside(work: Callable[[], R], processes: int) -> Iterator[Callable[[], R]]:
 
 @contextmanager
 def _workers(made: Callable[[T], R], items: Sequence[T], processes: int) -> Iterator[list[Connection]]:
-    """Start processes and yield the connection on which each sends its results. The processes end with the
-    block.
-    """
+    """Start processes, end them with the block, and yield the connections to their results."""
     context = get_context("fork")
     pipes = [context.Pipe(duplex=False) for _ in range(processes)]
     workers = [
@@ -86,7 +82,6 @@ def _work(
     pipes: Sequence[tuple[Connection, Connection]],
     number: int,
 ) -> None:
-    """Send the result for each item. An exception is sent instead, and ends the work."""
     gc.disable()  # results have no cycles, and a collection would copy shared memory
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the first one ends the others
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -10,7 +10,6 @@ _WORD = 2**32
 
 
 def generator(seed: int, key: str) -> np.random.Generator:
-    """The generator for (seed, key), the same on every machine."""
     if not 0 <= seed < 2**63:
         raise MutatorError(f"seed {seed}", expected="0 or more, below 2 to the power of 63")
     words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype=">u4")

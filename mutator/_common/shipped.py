@@ -1,7 +1,7 @@
 """The shipped controller, fault library and templates.
 
-In a clone they are folders next to the package. A wheel carries them as an archive, since pip would compile a
-target's sources and make `selfdrive` importable. It is unpacked once into $XDG_DATA_HOME or ~/.local/share.
+A clone has them next to the package. A wheel has them in an archive, since pip would compile a target's
+sources and make `selfdrive` importable. It is unpacked once into $XDG_DATA_HOME or ~/.local/share.
 """
 
 import os
@@ -25,8 +25,8 @@ _SHOWN = 3  # the most changed files that an error names
 def shipped_folder() -> Path:
     """The folder that holds the shipped target/, fault_library/ and templates/.
 
-    Compare an unpacked archive with the archive, byte for byte, once per process. MutatorError if it
-    was changed or cannot be unpacked.
+    Once per process, compare the unpacked files with the archive. MutatorError if they differ or cannot be
+    unpacked.
     """
     return _unpacked(ARCHIVE, _home()) if ARCHIVE.exists() else CLONE
 
@@ -43,10 +43,9 @@ def refuse_shipped(path: Path) -> None:
 
 
 def write_library(folder: Path) -> None:
-    """Write an editable library, templates and a README into a new or empty `folder`.
+    """Write an editable library, templates and a README into a new or empty `folder`; MutatorError otherwise.
 
-    The manifest in the copy says `root: shipped:target`, so it works wherever the folder is moved, and with
-    any installed mutator. MutatorError for a folder that is not empty.
+    Its manifest says `root: shipped:target`, so it works in any place and with any installed mutator.
     """
     shipped = shipped_folder()
     make_empty(folder)
@@ -59,7 +58,7 @@ def write_library(folder: Path) -> None:
 
 
 def make_empty(folder: Path) -> None:
-    """Create a folder, or check that it is empty; MutatorError if it is not empty or cannot be created."""
+    """Create a folder, or check that it is empty; MutatorError otherwise."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         problem = f"not empty ({sorted(folder.iterdir())[0].name})" if any(folder.iterdir()) else ""
@@ -82,7 +81,6 @@ def _home() -> Path:
 
 @lru_cache(maxsize=1)
 def _unpacked(archive: Path, home: Path) -> Path:
-    """Unpack the archive atomically into a folder in `home`, named by its digest, unless it exists."""
     folder = home / digest(archive.read_bytes())[:16]
     if not folder.is_dir():
         _unpack(archive, folder)

@@ -16,8 +16,7 @@ _MARKUP = re.compile(r"`[^`]*`|<(?=[A-Za-z/!?])|\*(?=\S)|(?<=\S)\*|(?<![A-Za-z0-
 class Table:
     """A table of texts, with one cell per head in each row. Columns in `right` are right-aligned.
 
-    A cell may be Markup, e.g. a link, which HTML shows unescaped. With `named`, the first cell of a row is
-    the row's head.
+    Markup in a cell, e.g. a link, is not escaped in HTML. With `named`, the first cell of a row is its head.
     """
 
     heads: Sequence[str]
@@ -26,7 +25,7 @@ class Table:
     named: bool = False
 
     def as_text(self) -> str:
-        """The table as text: columns padded to equal width, two spaces between them, no trailing spaces."""
+        """The table as text, without trailing spaces."""
         lines = [self.heads, *self.rows]
         widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
         return "\n".join(self._padded(line, widths) for line in lines)
@@ -46,8 +45,7 @@ class Table:
         return "\n".join([line(self.heads), rule, *map(line, self.rows)])
 
     def as_html(self, style: str = "") -> "Markup":
-        """A scrollable HTML table of class `style` with escaped text. If all heads are empty, there is no
-        head row.
+        """A scrollable HTML table of class `style`, without a head row if all heads are empty.
 
         A row with an empty first cell continues the row above and has the class `group`; cells of columns in
         `right` have the class `number`.
@@ -86,8 +84,8 @@ class Table:
 
 
 def markdown_line(text: str) -> str:
-    """Convert text to one line of Markdown that shows every character: `<class 'float'>` does not become an
-    HTML element, and `__init__` does not become bold.
+    """Convert text to one line of Markdown that shows every character, e.g. of `<class 'float'>` and
+    `__init__`.
     """
     return _MARKUP.sub(_escaped, " ".join(text.splitlines()))
 

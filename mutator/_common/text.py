@@ -7,7 +7,7 @@ from typing import Any
 
 
 def counted(count: int, noun: str, plural: str = "") -> str:
-    """A count with its noun: 1 run, 2 runs; give `plural` if adding an s is not enough."""
+    """Return a count with its noun: 1 run, 2 runs. Give irregular plurals."""
     return f"{count} {noun}" if count == 1 else f"{count} {plural or noun + 's'}"
 
 
@@ -47,7 +47,7 @@ def folded(text: str, width: int) -> str:
     """Break lines between words to at most `width` characters. Longer words and commands in backticks stay
     whole.
 
-    Continuation lines are indented; in a line `name  value` they are indented to the value.
+    Continuation lines are indented, in a line `name  value` up to the value.
     """
     return "\n".join(_folded_line(line, width) if len(line) > width else line for line in text.split("\n"))
 

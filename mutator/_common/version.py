@@ -1,3 +1,1 @@
-"""The version of this program."""
-
 VERSION = "0.2.0"

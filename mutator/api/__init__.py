@@ -1,4 +1,3 @@
-"""The public Python API behind `import mutator`, which the command line also calls.
-
-Nothing here prints, asks questions or ends the process.
+"""The public Python API, which the command line also calls. It never prints, asks questions or ends the
+process.
 """

@@ -25,11 +25,7 @@ SHOWN = 20  # differences listed on the page
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Audit:
-    """The result of an audit of a run folder.
-
-    `facts` describe the run, `checks` list what was checked, `seal` is computed from the content (None: not
-    finished, or not verifiable), `repaired` lists what was set aside.
-    """
+    """The result of an audit of a run folder."""
 
     run: Path  #: the run folder
     facts: Mapping[str, str]  #: what was audited, by name
@@ -41,7 +37,6 @@ class Audit:
         return f"<Audit of {self.run.name}: {self._outcome}>"
 
     def __str__(self) -> str:
-        """Return one page to print or attach."""
         width = max(map(len, self.facts))
         rows = [(check.what, str(check.count), str(len(check.differences))) for check in self.checks]
         table = Table(heads=("checked", "of", "differences"), rows=rows, right=(1, 2))
@@ -84,7 +79,7 @@ def verify(
     """Audit the run folder at `run`, finished or not, even if it no longer opens.
 
     `rerun` randomly drawn experiments are rerun on the reference engine. `expect` is the seal that the run
-    must have. With `repair`, damaged parts are set aside, so that running the campaign again in this folder
+    must have. With `repair`, damaged parts are set aside, and the next run of the campaign in this folder
     redoes them; otherwise nothing is written. MutatorError if `run` is not a run folder or its run.json
     cannot be read.
     """
@@ -111,7 +106,6 @@ def verify(
 
 
 def _workspace(given: WorkspaceLike) -> Workspace | None:
-    """Open the workspace; None if none is given and none is found."""
     try:
         return open_workspace(given)
     except MutatorError:
@@ -121,7 +115,6 @@ def _workspace(given: WorkspaceLike) -> Workspace | None:
 
 
 def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: dict[str, str]) -> Check:
-    """Rerun some experiments, and add their ids to the facts."""
     what = "experiments rerun on the reference engine"
     if workspace is None:
         raise MutatorError("no library found", argument="rerun", expected="the sources of the run")
@@ -134,7 +127,6 @@ def _rerun(folder: RunFolder, workspace: Workspace | None, count: int, facts: di
 
 
 def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
-    """Compute the seal; None if content that it covers is missing."""
     try:
         return seal_of(folder)
     except (MutatorError, OSError):
@@ -144,7 +136,6 @@ def _seal(folder: RunFolder, checks: list[Check]) -> str | None:
 
 
 def _facts(folder: RunFolder) -> dict[str, str]:
-    """Describe the run, and what it was made with."""
     head: Any = folder.head
     packages = package_versions(folder.stretches)
     return {

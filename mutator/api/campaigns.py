@@ -33,22 +33,21 @@ def run(
 ) -> Run:
     """Run a campaign (a name in the library, or a file) in the run folder `out`, or resume it there.
 
-    Experiments that have a result are not rerun. If `out` holds a frozen plan, the run uses it. For choices
-    that you do not give, the frozen ones apply.
+    Experiments that have a result are not rerun. A frozen plan in `out` is used, with its choices for those
+    that you do not give.
 
     * `workers`: number of processes; 0: only this one.
     * `engine`: a name from `mutator.engines.kinds`; None: the fastest that is worthwhile.
     * `reviewed`: refuse to run mutants without an approval.
     * `accept_versions`: resume with another Python or other packages than before, and note it.
-    * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. The
-      workers of that cluster run the experiments; `workers` then applies only to the checks before the
-      campaign.
+    * `cluster`: the address of a Dask scheduler, its scheduler file, `local:N`, or a cluster file. Its
+      workers run the experiments; `workers` then applies only to the checks before the campaign.
     * `insecure_network`: accept a scheduler that others on the network can reach.
     * `progress`: called about twice a second, from another thread.
 
-    `Run.summary` describes the result of this call. After harness errors, a full disk or an interruption, an
-    IncompleteRun warning is issued; the same call then resumes the run. MutatorError for invalid input;
-    CheckFailed if an approval is missing, or if the checks before the campaign or the equivalence check fail.
+    `Run.summary` describes the result. After harness errors, a full disk or an interruption, an IncompleteRun
+    warning is issued; the same call then resumes the run. MutatorError for invalid input; CheckFailed if an
+    approval is missing, or if the checks before the campaign or the equivalence check fail.
     """
     check_whole("workers", workers)
     if choices is not None:

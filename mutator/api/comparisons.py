@@ -23,7 +23,7 @@ SHOWN = 3  # tables shown in a notebook: endings, changes, rates
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RunComparison:
-    """Two runs, matched experiment by experiment; `comparison` has all details."""
+    """Two runs, matched experiment by experiment."""
 
     comparison: Comparison  #: the comparison, with all details of the pairs
 
@@ -61,10 +61,8 @@ class RunComparison:
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":
-        """One row for each experiment that both runs have; columns of the runs end in `_a` and `_b`.
-
-        The columns are those of pairs.csv: ids, fault, scenario, method, trigger, `changes` (as in `Gate`,
-        separated by semicolons), endings, and times in s since the start of the simulation.
+        """One row for each experiment that both runs have, with the columns of pairs.csv; those of the runs
+        end in `_a` and `_b`. Times are in s since the start of the simulation.
         """
         return _frame(self.comparison.pairs)
 

@@ -43,8 +43,6 @@ class TraceFrames:
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class ExperimentResult(ABC):
-    """An experiment and its record; `record` is None until the experiment has run."""
-
     experiment: Experiment  #: the experiment
     record: Record | None  #: its record; None before it has run
 
@@ -96,7 +94,7 @@ class ExperimentResult(ABC):
 
     @property
     def ending(self) -> str:
-        """The outcome, or the status if the run did not end normally: `hazard`, `crashed`, `not run`."""
+        """The outcome; without one, the status or `not run`."""
         return str(self.outcome or self.status or "not run")
 
     @property
@@ -107,7 +105,7 @@ class ExperimentResult(ABC):
     @property
     @abstractmethod
     def scale(self) -> Scale | None:
-        """The scale that maps a contact to a severity class; None for a target without one."""
+        """The severity scale; None for a target without one."""
 
     @property
     @abstractmethod
@@ -153,7 +151,7 @@ class ExperimentResult(ABC):
 def trace_frame(trace: Trace, manifest: TargetManifest) -> "pd.DataFrame":
     """Return a trace as a frame by time in s; `attrs["units"]` has the units of the manifest's channels.
 
-    A channel that has no value at a time keeps its newest one.
+    A channel without a value at a time keeps its newest one.
     """
     import pandas as pd
 

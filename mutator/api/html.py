@@ -9,18 +9,16 @@ _COLOURS = {"+": "#116329", "-": "#a40e26", "@": "#0550ae"}
 
 
 def facts_html(facts: Iterable[tuple[str, object]]) -> str:
-    """Return names and values as a table of two columns; leaves out None."""
+    """Return names and values as a table of two columns, without None."""
     rows = [[name, str(value)] for name, value in facts if value is not None]
     return str(Table(heads=("", ""), rows=rows).as_html())
 
 
 def text_html(text: str) -> str:
-    """Return a paragraph."""
     return f"<p>{escape(text)}</p>"
 
 
 def diff_html(patch: str) -> str:
-    """Return a unified diff with coloured lines."""
     return f"<pre>{''.join(map(_line, patch.splitlines()))}</pre>"
 
 

@@ -33,7 +33,7 @@ def init_library(folder: str | Path, *, target: str | PathLike[str] | None = Non
 
     `target` is a controller's source folder or `installed:NAME`. With it, write a first library for that
     controller: manifest, entry, scenario, fault and campaign, with places to fill in. The source is read,
-    never imported. Without `target`, copy the library and templates that ship with mutator.
+    never imported. Without it, copy the library and templates that ship with mutator.
 
     MutatorError for a folder that is not empty and for a missing target; MutatorWarning if nothing in the
     target looks like a controller.
@@ -51,10 +51,10 @@ def unfilled_places(folder: str | Path) -> list[MutatorError]:
 
 
 def upgrade_manifest(path: str | Path) -> Upgrade | None:
-    """Rewrite a target's manifest of an older schema in the current one; unaffected lines stay.
+    """Rewrite a target's manifest of an older schema in the current one; return None if it is current.
 
-    Returns None for a current manifest, which stays unchanged. `lost` of the result lists comments inside
-    rewritten lines. MutatorError for a file that is not a manifest, which also stays unchanged.
+    Unaffected lines stay. `lost` of the result lists comments inside rewritten lines. MutatorError for a file
+    that is not a manifest.
     """
     upgrade = manifest_files.upgrade_manifest(Path(path))
     if upgrade is not None:
@@ -63,8 +63,7 @@ def upgrade_manifest(path: str | Path) -> Upgrade | None:
 
 
 def check_library(workspace: WorkspaceLike = None, *, target: str | None = None) -> list[MutatorError]:
-    """Return every problem of library, templates and target, in the order of the files; empty if there is
-    none.
+    """Return every problem of library, templates and target, in the order of the files.
 
     `target` names a manifest; default: the library's only one.
     """
@@ -94,14 +93,13 @@ def check_target(
     drive: bool = False,
     scenarios: Sequence[str] = (),
 ) -> list[Finding]:
-    """Check a target and its faults before a campaign. The findings are what prevents them from running on
-    the fork engines, and entries of `draw` that no injection uses.
+    """Check a target and its faults before a campaign: what prevents them from running on the fork engines,
+    and entries of `draw` that no injection uses.
 
     With `drive`, also make golden runs of `scenarios` (default: those of the library's campaigns, or all).
-    The findings then also cover whether the target is deterministic (and the likely cause if not), statements
-    of faults and triggers that no run reaches, and canaries that do not reach their hazard. `target` names a
-    manifest; default: the library's only one. MutatorError for a library with problems, which `check_library`
-    lists.
+    Then also check whether the target is deterministic, whether a run reaches the statements of all faults
+    and triggers, and whether canaries reach their hazard. `target` names a manifest; default: the library's
+    only one. MutatorError for a library with problems, which `check_library` lists.
     """
     found = open_workspace(workspace)
     name = found.target_name(target)
@@ -132,8 +130,8 @@ def draw_control_structure(workspace: WorkspaceLike = None) -> str:
 def doctor(workspace: "Workspace | str | PathLike[str] | MutatorError | None" = None) -> list[Finding]:
     """Check whether this machine can run campaigns: interpreter, packages, machine, library and target.
 
-    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. A missing
-    library is a finding too; `workspace` may be the error raised by the search for it.
+    Each finding has `name`, `level` (`ok`, `warning`, `failed`), `found`, `places` and `remedy`. `workspace`
+    may be the error raised by the search for a library.
     """
     if isinstance(workspace, MutatorError):
         return examine(workspace)

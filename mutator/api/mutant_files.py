@@ -1,4 +1,4 @@
-"""Writes many mutants to a folder: patches, optionally source trees, and an index."""
+"""Write many mutants to a folder: patches, optionally source trees, and an index."""
 
 import csv
 import fnmatch
@@ -46,7 +46,8 @@ def pairs_of_specs(
     reading: str | None = None,
 ) -> list[Pair]:
     """Return every fault of the specs (names, globs, files) with every trigger; default: all contexts, or
-    `always` in a library without contexts."""
+    `always` if there are none.
+    """
     made = [bench.trigger(text) for text in triggers]
     if not made:
         armed_after_s = bench.manifest.armed_after_s
@@ -67,15 +68,13 @@ def pairs_of_specs(
 
 
 def pairs_of_campaign(workspace: Workspace, campaign: str, choices: Choices) -> tuple[Bench, list[Pair]]:
-    """Return the campaign's target, and the fault and trigger of each of its experiments."""
     plan = make_plan(workspace, campaign, choices)
     return Bench.of(workspace, plan.campaign.target), [(e.fault, e.trigger) for e in plan.experiments]
 
 
 @dataclass(frozen=True, repr=False)
 class MutantSet:
-    """Faults with triggers for one target, from specs, operators or a campaign; mutants are built when
-    written."""
+    """Faults with triggers for one target. Mutants are built when written."""
 
     bench: Bench  #: workspace and target
     pairs: tuple[Pair, ...]  #: each fault with its trigger
@@ -128,9 +127,10 @@ class MutantSet:
     def write(
         self, out: str | Path, *, trees: bool = False, step: Callable[[], None] = lambda: None
     ) -> list[dict[str, str]]:
-        """Write patches, index.csv and, with `trees`, whole source trees into a new or empty folder.
+        """Write patches, index.csv and, with `trees`, whole source trees into a new or empty folder; return
+        the index.
 
-        Returns the index: one row for each mutant. `step` is called after each pair of fault and trigger.
+        `step` is called after each pair of fault and trigger.
         """
         return write_mutants(self.bench, self.pairs, Path(out), trees=trees, step=step)
 
@@ -143,10 +143,9 @@ def write_mutants(
     trees: bool = False,
     step: Callable[[], None] = lambda: None,
 ) -> list[dict[str, str]]:
-    """Write `out`/patches, `out`/index.csv and, with `trees`, `out`/trees; returns the index.
+    """Write `out`/patches, `out`/index.csv and, with `trees`, `out`/trees; return the index.
 
-    `out` must be new or empty, so that old and new patches do not mix. `step` is called after each pair of
-    fault and trigger.
+    `out` must be new or empty. `step` is called after each pair.
     """
     make_folder(out)
     if any(out.iterdir()):
@@ -173,7 +172,6 @@ def write_mutants(
 
 
 def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
-    """Expand globs over the names of the library's specs; pass anything else on."""
     for text in wanted:
         if not any(c in text for c in "*?["):
             yield text
@@ -187,7 +185,6 @@ def _spec_names(workspace: Workspace, wanted: Iterable[str]) -> Iterator[str]:
 
 
 def _write(built_mutant: BuiltMutant, out: Path, *, trees: bool) -> dict[str, str]:
-    """Write one mutant below `out`, and return its row of the index."""
     mutant, fault, trigger = built_mutant.mutant, built_mutant.fault, built_mutant.trigger
     patch = Path("patches") / f"{mutant.id}.patch"
     (out / patch).write_bytes(mutant.patch_bytes)

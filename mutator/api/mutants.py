@@ -15,8 +15,7 @@ from mutator.targets.manifest import TargetManifest
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class BuiltMutant:
-    """A fault with a trigger, built into a target. The `id` depends only on fault, trigger, target and
-    templates."""
+    """A fault with a trigger, built into a target."""
 
     fault: Fault  #: the fault that is built in
     trigger: Trigger  #: when it is active
@@ -87,6 +86,6 @@ def build_mutant(
 
 
 def built(bench: Bench, fault: Fault, trigger: Trigger) -> BuiltMutant:
-    """Build the mutant of a fault with a trigger; mutants of one bench share parsed sources."""
+    """Build the mutant of a fault with a trigger."""
     mutant = build(bench.manifest, bench.models, fault, trigger)
     return BuiltMutant(fault=fault, trigger=trigger, mutant=mutant, manifest=bench.manifest)

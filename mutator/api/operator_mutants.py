@@ -15,11 +15,9 @@ from mutator.operators.names import operators_named
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorChoice:
-    """Chooses mutants of mutation operators.
+    """A choice of mutants of mutation operators.
 
-    `operators` are names such as `arithmetic`. `places` are `PATH::FUNCTION` or `PATH`, with `*`, and `**`
-    for nested folders. With `scenario`, only lines that its golden run with `seed` executes count. `sample`
-    mutants are drawn with `seed`, in proportion for each operator and function; default: all.
+    The `sample` is drawn in proportion for each operator and function.
     """
 
     operators: Sequence[str]  #: names of mutation operators
@@ -31,7 +29,7 @@ class OperatorChoice:
 
 
 def operator_faults(bench: Bench, choice: OperatorChoice) -> tuple[tuple[Fault, ...], str]:
-    """Return the faults in the order of files and lines, and a text with their number and what was left out.
+    """Return the faults in the order of files and lines, and a text that counts them and those left out.
 
     MutatorError for an unknown operator or place, and if no mutant is left.
     """

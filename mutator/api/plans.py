@@ -18,9 +18,7 @@ def plan(
 ) -> Plan:
     """Expand a campaign (a name in the library, or a file) into its experiments, without running any.
 
-    With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments. In
-    that case the plan is written seed by seed, and the experiments of a very large plan are read on demand.
-
+    With `out`, the plan is frozen there, and `run` with the same folder runs exactly these experiments.
     MutatorError for a mistake in campaign or choices, if no experiment is left, and for a folder with other
     content.
     """

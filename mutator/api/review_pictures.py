@@ -1,4 +1,4 @@
-"""Writes frames before and after image effects."""
+"""Write frames before and after image effects."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,8 +14,9 @@ Written = dict[str, dict[str, str]]  # by group: the file of each picture, by na
 def write_pictures(
     groups: Sequence[Group], target: str, folder: Path, *, workspace: WorkspaceLike = None
 ) -> tuple[Written, dict[str, str]]:
-    """Write `<group>-before.jpg` and one frame for each level into the folder, for each group that is an
-    image effect. Returns the files by group, and the value that each file shows."""
+    """Write `<group>-before.jpg` and one frame for each level, for each group that is an image effect. Return
+    the files by group, and the value that each file shows.
+    """
     found = open_workspace(workspace)
     drawn = of_groups(found, found.manifest(target), groups)
     written: Written = {}

@@ -20,10 +20,7 @@ from mutator.workspace import Workspace
 
 @dataclass(frozen=True, kw_only=True)
 class ReviewedGroups:
-    """Groups of mutants, new and changed ones first, and the decisions about them (`review`).
-
-    `options` are the options of `mutator review` that choose the same groups, for the commands on a page.
-    """
+    """Groups of mutants, new and changed ones first, and the decisions about them."""
 
     workspace: Workspace  #: the workspace whose review file holds the decisions
     review: Review  #: the decisions
@@ -101,7 +98,6 @@ class ReviewedGroups:
         return Path(out)
 
     def _changed(self, groups: Sequence[Group], kind: Kind, by: str, text: str = "") -> "ReviewedGroups":
-        """Record changes; raises Conflict and writes nothing if others have changed these groups since."""
         changes = [Change(group=group, kind=kind, by=by, text=text) for group in groups]
         seen = {group.id: self.review.revision(group.id) for group in groups}
         return replace(self, review=record(self.workspace, self.review.target, changes, seen))

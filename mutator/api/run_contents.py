@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
 
 def from_here(path: Path) -> Path:
-    """Return a path as typed in the current folder."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path
 
@@ -42,7 +41,7 @@ class RunContents:
 
     @cached_property
     def workspace(self) -> Workspace:
-        """The library, templates and target to read the run with."""
+        """The library, templates and target of the run."""
         return self.given_workspace or Workspace.find()
 
     @cached_property
@@ -80,17 +79,14 @@ class RunContents:
 
     @cached_property
     def results(self) -> "pd.DataFrame":
-        """One row per experiment that has a record, by experiment id: the columns of results.csv, typed.
-
-        The table is updated first.
-        """
+        """One row per experiment that has a record, by experiment id: the columns of results.csv, typed."""
         return Results.up_to_date(self.path).frame()
 
     def propagation(self) -> "pd.DataFrame":
         """Return one row for each channel of an experiment that differs from golden: the columns of
         propagation.parquet.
 
-        The table is updated first. MutatorError for a run of an older version that did not record it.
+        MutatorError for a run of an older version that did not record it.
         """
         return Results.up_to_date(self.path).propagation()
 
@@ -117,7 +113,7 @@ class RunContents:
 
     @cached_property
     def ways(self) -> Ways | None:
-        """The paths of faults through the target; None if not known."""
+        """The paths of faults through the target; None if unknown."""
         return ways_of(self.folder.head)
 
     @cached_property

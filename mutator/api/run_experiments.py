@@ -30,7 +30,7 @@ class RunExperiment(ExperimentResult):
 
     @cached_property
     def patch(self) -> str:
-        """The whole patch, including the probe: the kept one, or a new one if the experiment has not run."""
+        """The whole patch, including the probe."""
         kept = self.run.folder.read_patch(self.id, self.record)
         if kept is not None:
             return kept.decode("utf-8", "surrogateescape")
@@ -45,10 +45,9 @@ class RunExperiment(ExperimentResult):
         """Return golden and faulty run as pandas frames.
 
         By default, they are the experiment's series: the manifest's channels, at most 20 values a second (10
-        for the controller's beliefs), to six digits. A value is the newest one at its time, so shorter events
-        may be missing. With `exact`, the experiment is rerun, which takes as long as one run, and the frames
-        have all channels in every step. An experiment without a series (over the budget, or from an older
-        version) is also rerun, and its series is then kept.
+        for the controller's beliefs), to six digits, so short events may be missing. With `exact`, the
+        experiment is rerun, and the frames have all channels in every step. An experiment without a series is
+        also rerun, and its series is then kept.
 
         MutatorError if the experiment has not run. For a rerun, MutatorError if target, templates or scenario
         have changed, or if the result differs from the campaign's.
@@ -123,8 +122,9 @@ class RunExperiment(ExperimentResult):
 
     @property
     def fault_path(self) -> FaultPath | None:
-        """How far the fault propagated along the control structure; None if not known, if the fault was never
-        active, or without an outcome."""
+        """How far the fault propagated along the control structure; None if unknown, never active, or without
+        an outcome.
+        """
         ways = self.run.ways
         return ways.path(self.experiment, self.record) if ways and self.record else None
 

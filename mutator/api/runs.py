@@ -45,14 +45,13 @@ if TYPE_CHECKING:
 def load_run(path: str | Path, *, workspace: WorkspaceLike = None) -> "Run":
     """Open the run folder at `path`, finished or not. Content is read on first use.
 
-    Traces and new reports need `workspace`: a Workspace, or the folder that holds the library; default: found
-    as on the command line, when needed. MutatorError if `path` is not a run folder.
+    Traces and new reports need `workspace`; default: found when needed. MutatorError if `path` is not a run
+    folder.
     """
     return Run(RunFolder.open(Path(path)), None if workspace is None else open_workspace(workspace))
 
 
 def newest_run(root: Path) -> Path:
-    """Return the most recently used run folder in runs/, here or under `root`; MutatorError without any."""
     found = run_folders(root)
     if not found:
         raise MutatorError(
@@ -66,9 +65,8 @@ def newest_run(root: Path) -> Path:
 def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions: bool = False) -> "Run":
     """Merge the shards of a plan into the run folder `out`, with the same results as from a single machine.
 
-    MutatorError unless the shards are finished and make up one whole plan. MutatorError for shards that were
-    run with another Python or other packages, unless `accept_versions`. CheckFailed if their golden runs
-    differ.
+    MutatorError unless the shards are finished and make up one whole plan, and for other versions of Python
+    or packages, unless `accept_versions`. CheckFailed if their golden runs differ.
     """
     if isinstance(shards, str | Path):
         raise MutatorError(repr(str(shards)), argument="shards", expected="a list of run folders")
@@ -78,7 +76,7 @@ def merge_runs(shards: Sequence[str | Path], out: str | Path, *, accept_versions
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(RunContents):
-    """A run folder, read on demand. `summary` is the result of `mutator.run`; None for a loaded run."""
+    """A run folder, read on demand."""
 
     #: the result of the call of `mutator.run` that returned it; None for a loaded run
     summary: Summary | None = None
@@ -98,8 +96,7 @@ class Run(RunContents):
 
     @cached_property
     def seal(self) -> str | None:
-        """One digest of everything that matters, computed now; None for a run that is unfinished or not
-        verifiable."""
+        """The run's seal, computed now; None for a run that is unfinished or not verifiable."""
         return seal_of(self.folder)
 
     def counts(self) -> Table:
@@ -111,8 +108,8 @@ class Run(RunContents):
 
     def mutation_score(self) -> Sheet:
         """Return the mutation score: the shares of operator mutants that changed an actuator, raised a new
-        alert or caused a hazard, in total, by operator and by function. Empty for a run without such
-        mutants."""
+        alert or caused a hazard, in total, by operator and by function. Empty without such mutants.
+        """
         texts = self._texts
         if not (texts["module"] == OPERATORS).any():
             return score_sheet(prepare(texts), {}, None)
@@ -124,7 +121,7 @@ class Run(RunContents):
         return score_sheet(prepare(texts), self.faults, alerts, told)
 
     def mutation_totals(self) -> Table:
-        """Return the total mutation score, in few columns. Empty for a run without operator mutants."""
+        """Return the total mutation score. Empty without operator mutants."""
         return totals(self.mutation_score())
 
     def fault_free(self) -> tuple[FaultFreeRun, ...]:
@@ -146,8 +143,8 @@ class Run(RunContents):
     ) -> "pd.DataFrame":
         """Return the golden run of a scenario: one column per channel, by time in s.
 
-        `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the one that most experiments
-        use. `seed` chooses one of several seeds; default: the first. MutatorError if there is no such run.
+        `changes` chooses a variant of the scenario, e.g. `("alone",)`; default: the most frequent. `seed`
+        chooses one of several seeds; default: the first. MutatorError if there is no such run.
         """
         driven = [e.changes for e in self.experiments.values() if e.scenario == scenario]
         if changes is None and driven:
@@ -168,10 +165,9 @@ class Run(RunContents):
         return trace_frame(load_trace(self.bench.manifest, folder), self.bench.manifest)
 
     def report(self, *, anew: bool = False) -> building.Report:
-        """Write the report, Markdown and one HTML page, unless it is up to date.
+        """Write the report, Markdown and one HTML page, unless it is up to date; with `anew`, always.
 
-        With `anew`, write it even if it is up to date. No experiment is rerun. Without a library, the report
-        shows only the results.
+        No experiment is rerun. Without a library, the report shows only the results.
         """
         workspace = self._workspace_if_any()
         if not anew:
@@ -181,7 +177,7 @@ class Run(RunContents):
 
     def take_stills(self, progress: Notify | None = None, *, workers: int = 1) -> str:
         """Rerun the worst camera experiments, and keep the frames at the activation, the first alert and the
-        first hazard for the report. Takes one in 20 planned experiments and at most ten, `workers` at a time,
+        first hazard for the report. Takes one in 20 planned experiments, at most ten, `workers` at a time,
         and starts none after two minutes.
 
         Returns the reason for the first experiment without stills; empty if all have stills.
@@ -224,8 +220,7 @@ class Run(RunContents):
         return verify(self.path, rerun=rerun, expect=expect, repair=repair, workspace=workspace)
 
     def delete(self) -> None:
-        """Delete the run folder; MutatorError if a command or its workers use it, or if it holds files that
-        no run writes."""
+        """Delete the run folder; MutatorError if it is in use, or if it holds files that no run writes."""
         cleaning.clean(self.path)
 
     def finish_deletion(self) -> bool:
@@ -234,7 +229,6 @@ class Run(RunContents):
 
 
 def known_alerts_note(run: Run) -> str:
-    """Return the run's `alerts_note`; empty if its target or golden runs cannot be read here."""
     try:
         return run.alerts_note()
     except (MutatorError, KeyError):

@@ -1,4 +1,4 @@
-"""Resolves what a user types to a workspace, a target, faults and triggers."""
+"""Resolve what a user types to a workspace, a target, faults and triggers."""
 
 import dataclasses
 import warnings
@@ -29,7 +29,6 @@ TriggerLike: TypeAlias = "Trigger | str | float"
 
 
 def open_workspace(given: WorkspaceLike) -> Workspace:
-    """Return the given workspace, the one at the given root, or the one found from the current folder."""
     if isinstance(given, Workspace):
         return given
     return Workspace.find(None if given is None else Path(given))
@@ -46,7 +45,6 @@ class FaultChoice:
     reading: str | None = None
 
     def narrowed(self, spec: FaultSpec) -> FaultSpec:
-        """Return the spec with only the chosen variant and value."""
         variants = tuple(v for v in spec if self.variant in (None, v.name))
         if not variants:
             names = ", ".join(v.name for v in spec)
@@ -66,20 +64,18 @@ class Bench:
 
     @classmethod
     def of(cls, workspace: WorkspaceLike, target: str | None = None) -> "Bench":
-        """Return the bench of a target by name or manifest file; default: the library's only one."""
         found = open_workspace(workspace)
         return cls(found, found.manifest(found.target_name(target)))
 
     @cached_property
     def models(self) -> FaultModels:
-        """The fault models of the workspace."""
         return self.workspace.fault_models()
 
     def faults(self, choice: FaultChoice) -> tuple[Fault, ...]:
         """Return the chosen faults, at least one, in the spec's order.
 
-        MutatorError for a mistake in the spec; MutatorWarning for a chosen value that changes nothing or is
-        outside the range that the spec declares.
+        MutatorError for a mistake in the spec; MutatorWarning for a value that changes nothing or is outside
+        the declared range.
         """
         check_whole("seed", 0 if choice.seed is None else choice.seed)
         declared = self.workspace.spec(choice.spec)
@@ -94,7 +90,7 @@ class Bench:
     def fault(
         self, given: FaultLike, *, value: float | None = None, seed: int = 0, reading: str | None = None
     ) -> Fault:
-        """Return the given fault, or the middle one of the first variant that matches the name."""
+        """Return the given fault, or the middle one of the first matching variant."""
         if isinstance(given, Fault):
             if value is not None or reading is not None:
                 raise MutatorError(
@@ -123,8 +119,7 @@ class Bench:
 
 
 def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...]:
-    """Return the middle fault of each variant and the variant's number of faults, which differ only in
-    value."""
+    """Return the middle fault of each variant, and the variant's number of faults."""
     groups: dict[str, list[Fault]] = {}
     for fault in faults:
         groups.setdefault(fault.spec, []).append(fault)
@@ -132,15 +127,12 @@ def one_of_each_variant(faults: Iterable[Fault]) -> tuple[tuple[Fault, int], ...
 
 
 def context_tables(workspace: Workspace) -> tuple[ContextTable, ...]:
-    """Return the context tables of the library, sorted by name."""
     return tuple(map(workspace.context_table, workspace.context_tables))
 
 
 def find_trigger(
     workspace: Workspace, text: str, armed_after_s: float, variables: Collection[str]
 ) -> Trigger:
-    """Return the trigger for a context (`C1`), a time in s (`10`), `always`, or a condition over
-    `variables`."""
     tables = context_tables(workspace)
     named = [
         (table, row.id)
@@ -174,7 +166,6 @@ def _split(name: str) -> tuple[str, str | None]:
 
 
 def _warn_of_value(value: float, declared: FaultSpec, faults: Collection[Fault], models: FaultModels) -> None:
-    """Warn about a chosen value that changes nothing or is outside the declared range."""
     idle = [fault.label for fault in faults if changes_nothing(fault, models)]
     if idle:
         warnings.warn(f"{', '.join(idle)} changes nothing", MutatorWarning, stacklevel=4)

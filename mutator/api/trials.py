@@ -1,4 +1,4 @@
-"""Runs one fault once, outside a campaign or as a rerun of a campaign's experiment."""
+"""Run one fault once, outside a campaign or as a rerun of a campaign's experiment."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,8 +22,7 @@ from mutator.targets.severity import Scale
 class Trial(ExperimentResult):
     """An experiment that has just run, with its golden run.
 
-    `same_as_record` says whether the record equals the campaign's; None: there is none to compare with. The
-    output is in `folder`; a temporary one lives as long as this object.
+    The output is in `folder`; a temporary one lives as long as this object.
     """
 
     record: Record  #: the record of the run
@@ -56,8 +55,9 @@ class Trial(ExperimentResult):
 
     @property
     def golden_hazards(self) -> tuple[tuple[str, float], ...]:
-        """Hazards (name, time in s) that the golden run also reaches, so the fault is not their cause. A
-        campaign refuses such a scenario. MutatorError if the golden run cannot be read."""
+        """Hazards (name, time in s) that the golden run also reaches, so the fault is not their cause.
+        MutatorError if the golden run cannot be read.
+        """
         _, judged = load_judged(self.manifest, self.single.golden)
         return tuple(sorted(judged.hazards, key=lambda hazard: hazard[1]))
 
@@ -137,7 +137,6 @@ def trial_of(
     same_as_record: bool | None = None,
     temporary: ScratchFolder | None = None,
 ) -> Trial:
-    """Return the trial of a single run."""
     return Trial(
         experiment=single.experiment,
         record=single.record,

@@ -15,8 +15,7 @@ _BATCH = 10_000  # rows filtered at a time
 def worst_results(run: Path, only: str | None = None, limit: int | None = None) -> tuple[list[Row], int]:
     """Return at most `limit` results of a run folder, worst first, and the number of all that match.
 
-    `only` is a filter over the columns of the results (`severity >= "S2" and not alerts`). The table is
-    updated first. MutatorError for an invalid filter.
+    `only` is a filter over the columns of the results. MutatorError for an invalid filter.
     """
     texts = Results.up_to_date(run).texts()
     order = places(texts).argsort().tolist()  # sort all rows first, because filtering keeps the order
@@ -30,7 +29,6 @@ def worst_results(run: Path, only: str | None = None, limit: int | None = None) 
 
 
 def _typed(line: Mapping[str, str]) -> dict[str, object]:
-    """Convert cells for a filter: numbers to numbers, empty cells to None."""
     return {name: _value(name, text) if text else None for name, text in line.items()}
 
 

@@ -82,7 +82,6 @@ class Verbs(TyperGroup):
     """The verbs, grouped by purpose in the help."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Write one section of the help for each group of verbs."""
         for title, names in GROUPS:
             rows = [(name, self.commands[name].get_short_help_str(90)) for name in names]
             with formatter.section(title):
@@ -139,8 +138,9 @@ for module in (
 
 
 def program() -> int:
-    """Run the program `mutator`. If experiments are unfinished, end the process without the interpreter's
-    cleanup: a library that ran out of memory while loading may crash during cleanup."""
+    """Run `mutator`. With unfinished experiments, end the process without the interpreter's cleanup, which
+    may crash after a lack of memory.
+    """
     code = main()
     if code == EXIT_HARNESS_ERRORS:
         sys.stdout.flush()
@@ -150,7 +150,7 @@ def program() -> int:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line and return its exit code. Wrong input never causes a traceback."""
+    """Run one command line and return its exit code."""
     _open_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # standard error does the same
@@ -165,7 +165,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _open_streams() -> None:
     """Replace closed standard streams by null devices. Otherwise a file opened later could get the number of
-    a standard stream, and output meant for that stream."""
+    a standard stream, and its output.
+    """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             file = os.open(os.devnull, os.O_RDWR)
@@ -177,7 +178,7 @@ def _open_streams() -> None:
 
 
 def _answer(words: Sequence[str]) -> int:
-    """Run one command line and report errors; raises BrokenPipeError when nobody reads the output."""
+    """Run one command line and report errors; BrokenPipeError when nobody reads the output."""
     try:
         # Not `app()`, which has its own handling of errors, interrupts and closed pipes.
         command = get_command(app)
@@ -212,7 +213,7 @@ def _answer(words: Sequence[str]) -> int:
 
 
 def _known(error: Exception) -> MutatorError | None:
-    """Return a MutatorError for an error that the user can fix on the machine; None for any other error."""
+    """Return a MutatorError for an error that the user can fix on the machine, or None."""
     where = getattr(error, "filename", None)
     if is_disk_full(error):
         return disk_full(where)
@@ -235,7 +236,6 @@ def _no_text(characters: str) -> MutatorError:
 
 @contextmanager
 def _warnings_in_one_line() -> Iterator[None]:
-    """Print each of the harness's warnings as one line on standard error."""
     with warnings.catch_warnings():
         others = warnings.showwarning
 

@@ -14,7 +14,6 @@ from mutator.errors import EXIT_CHECK_FAILED
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("verify", epilog=EXAMPLES)(verify)
 
 

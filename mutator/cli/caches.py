@@ -19,7 +19,6 @@ _UNITS = {"B": 1, "KB": 10**3, "MB": 10**6, "GB": 10**9, "TB": 10**12}
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("cache", epilog=EXAMPLES)(cache)
 
 
@@ -72,7 +71,7 @@ def cache(
 
 
 def parse_size(text: str) -> int:
-    """Return the number of bytes of a size such as 2GB, 500 MB or 0; MutatorError for anything else."""
+    """Return the number of bytes of a size such as 2GB, 500 MB or 0; MutatorError otherwise."""
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*([kKMGT]?B)?", text.strip())
     if not found:
         raise MutatorError(

@@ -54,7 +54,6 @@ ONE_PER_CORE = "Default: one per usable core."
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("plan", epilog=PLAN_EXAMPLES)(plan)
     app.command("run", epilog=RUN_EXAMPLES)(run)
 
@@ -235,13 +234,11 @@ def run(
 
 
 def _take_stills(terminal: Terminal, run: "Run", notify: "Notify", workers: int) -> None:
-    """Take stills for the report; if that fails, the run still succeeds."""
     if problem := run.take_stills(notify, workers=workers):
         terminal.note(f"no stills of {problem}")
 
 
 def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
-    """Write the report of a run that has results."""
     if not (run.summary and run.summary.results):
         return None
     notify(mutator.Progress(stage="report"))
@@ -260,7 +257,6 @@ def _report(out: Path, run: "Run", notify: "Notify") -> "Report | None":
 def _print_end(
     terminal: Terminal, out: Path, run: "Run", summary: "Summary", written: "Report | None"
 ) -> None:
-    """Print the results, the report's path, and what is unfinished."""
     report = (
         [out / path.relative_to(run.path) for path in (written.markdown, written.page)] if written else []
     )
@@ -273,8 +269,8 @@ def _print_end(
     if written:
         show_counts(terminal, run)
     terminal.say(
-        f"{summary.done} of {summary.planned} experiments done, "
-        f"{summary.ran} now in {duration(summary.elapsed_s)}"
+        f"{summary.done} of {summary.planned} experiments done, {summary.ran} now; "
+        f"checks, experiments and proof took {duration(summary.elapsed_s)}"
     )
     if summary.proof_note:
         terminal.say(f"proof: {summary.proof_note}")
@@ -295,5 +291,4 @@ def _print_end(
 
 
 def resume_command() -> str:
-    """Return the command that resumes the run, which is the same one."""
     return shlex.join(["mutator", *sys.argv[1:]])

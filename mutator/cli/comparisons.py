@@ -23,7 +23,6 @@ GATES = (
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("compare", epilog=EXAMPLES)(compare)
 
 
@@ -139,7 +138,7 @@ def _as_json(compared: "mutator.RunComparison", failing: "tuple[Finding, ...]") 
 def _judge(
     terminal: Terminal, found: "Comparison", gates: "list[mutator.Gate]", failing: "tuple[Finding, ...]"
 ) -> None:
-    """Apply the gate: exit with 1 if there are findings, or with 3 if results are missing."""
+    """Exit with 1 if there are findings, or with 3 if results are missing."""
     for finding in failing[:NAMED]:
         terminal.complain(f"{finding.gate.value}: {finding.words} [{finding.experiment_id}]")
     if more := failing[NAMED:]:

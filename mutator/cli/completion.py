@@ -1,7 +1,4 @@
-"""Shell completion of names in the library, run folders and experiment ids.
-
-It must be fast, so it reads only file names, and the plan of one run as text.
-"""
+"""Shell completion of names in the library, run folders and experiment ids, fast because it reads little."""
 
 import csv
 from collections.abc import Callable, Iterable
@@ -17,7 +14,7 @@ Completer = Callable[[typer.Context, str], list[str]]
 
 
 def names_in(folder: str) -> Completer:
-    """Return a completer for the names of the library's files in this folder."""
+    """Return a completer for the library's files in this folder."""
 
     def complete(ctx: typer.Context, incomplete: str) -> list[str]:
         return _starting(library_files(_library(ctx), folder), incomplete)
@@ -32,7 +29,6 @@ targets = names_in("targets")
 
 
 def runs(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Complete the run folders in runs/."""
     return _starting(map(_from_here, run_folders(_library(ctx).parent)), incomplete)
 
 
@@ -43,12 +39,10 @@ def experiments(ctx: typer.Context, incomplete: str) -> list[str]:
 
 
 def specs_and_experiments(ctx: typer.Context, incomplete: str) -> list[str]:
-    """Complete names of specs and ids of experiments."""
     return specs(ctx, incomplete) + experiments(ctx, incomplete)
 
 
 def _library(ctx: typer.Context) -> Path:
-    """Return the library named by the options before or after the verb, or else by the environment."""
     given: dict[str, Any] = {}
     for one in (ctx.find_root(), ctx):
         given |= {name: one.params.get(name) for name in ("root", "library") if one.params.get(name)}

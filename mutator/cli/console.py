@@ -1,6 +1,6 @@
 """Output of the command line: Rich in a terminal, plain text in a pipe, JSON for programs.
 
-Rich is imported when the first line is printed, so `--help` and shell completion stay fast.
+Rich is imported late, so `--help` and shell completion stay fast.
 """
 
 import codecs
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table as RichTable
 
+NO_BREAK = "\u00a0"  # in folded text: printed as a space, at which no line ends
 PIPE_COLUMNS = 100  # line width outside a terminal, unless COLUMNS is set
 
 STYLES = {
@@ -43,7 +44,7 @@ STYLES = {
 
 @dataclass
 class Terminal:
-    """Standard output and standard error of a command. With `as_json`, only `emit` writes to the output."""
+    """Standard output and standard error of a command. With `as_json`, only `emit` writes output."""
 
     as_json: bool = False
 
@@ -111,7 +112,6 @@ class Terminal:
 
     @contextmanager
     def wait(self, text: str) -> Iterator[None]:
-        """Show a spinner and the elapsed time."""
         if self.as_json or not self.err.is_terminal:
             yield
             return
@@ -124,7 +124,7 @@ class Terminal:
 
     @contextmanager
     def count(self, total: int, what: str) -> Iterator[Callable[[], None]]:
-        """Show a progress bar of `total` equal steps; yields the function to call after each step."""
+        """Show a progress bar of `total` equal steps; yield the function to call after each step."""
         if self.as_json or not self.err.is_terminal:
             yield lambda: None
             return
@@ -156,13 +156,11 @@ _OPTIONS = {
 
 
 def option(argument: str) -> str:
-    """Return the command-line option for an argument of the API."""
     return _OPTIONS.get(argument) or "--" + argument.replace("_", "-")
 
 
 def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType({})) -> MutatorError:
-    """Return the error with options in place of API arguments; `own` has the options that have different
-    names in this command."""
+    """Return the error with options instead of API arguments; `own` has this command's other names."""
     if error.argument is None:
         return error
 
@@ -175,7 +173,6 @@ def with_options(error: MutatorError, own: Mapping[str, str] = MappingProxyType(
 
 
 def show_error(error: MutatorError) -> None:
-    """Print a user's error: place, what was found, what was expected, what to do."""
     terminal, error = Terminal(), with_options(error)
     place = short_path(error.where) + (f":{error.line}" if error.line is not None else "")
     terminal.complain(f"{place}: {error.got}" if place else error.got)
@@ -186,7 +183,6 @@ def show_error(error: MutatorError) -> None:
 
 
 def error_text(error: MutatorError) -> str:
-    """Return an error as one line, with the file as the user would type it."""
     error = with_options(error)
     where = short_path(error.where) or None
     return str(
@@ -243,7 +239,7 @@ def _console(*, stderr: bool) -> "Console":
     from rich.console import Console
 
     class Piped(Console):
-        """A console that raises BrokenPipeError, as other files do, instead of exiting with 1."""
+        """A console that raises BrokenPipeError instead of exiting with 1."""
 
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
@@ -252,14 +248,13 @@ def _console(*, stderr: bool) -> "Console":
 
 
 def _print(console: "Console", text: str, style: str | None, *, whole: bool = False) -> None:
-    """Print text without markup, folded unless `whole`."""
     if not whole:
-        text = folded(text, console.width if console.is_terminal else _columns())
+        width = console.width if console.is_terminal else _columns()
+        text = folded(text, width).replace(NO_BREAK, " ")
     console.print(text, style=style, markup=False, highlight=False, soft_wrap=True)
 
 
 def _columns() -> int:
-    """Return the line width for a pipe or a file."""
     told = os.environ.get("COLUMNS", "")
     return int(told) if told.isdecimal() and int(told) else PIPE_COLUMNS
 
@@ -282,7 +277,6 @@ def _jsonable(value: Any) -> Any:
 
 
 def _diff_style(line: str) -> str:
-    """Return the Rich style of one line of a unified diff."""
     if line.startswith(("+++", "---", "diff ", "index ", "new file")):
         return "bold"
     if line.startswith("@@"):

@@ -1,5 +1,6 @@
-"""Prints one experiment: what was injected, what happened when, the verdict."""
+"""Print one experiment: what was injected, what happened when, the verdict."""
 
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -7,7 +8,8 @@ from mutator._common.text import counted
 from mutator.api.experiment_results import describe
 from mutator.api.runs import load_run, newest_run
 from mutator.api.worst import worst_results
-from mutator.cli.console import STYLES, Terminal, short_path
+from mutator.cli.console import NO_BREAK, STYLES, Terminal, short_path
+from mutator.errors import MutatorError
 from mutator.mutants.readable_diffs import readable
 
 if TYPE_CHECKING:
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from mutator.model import Experiment, Record
     from mutator.outcomes.paths import Stage
     from mutator.outcomes.rows import Row
+    from mutator.targets.manifest import TargetManifest
     from mutator.workspace import Workspace
 
 _TIMES = {
@@ -26,14 +29,12 @@ _TIMES = {
 
 
 def find_experiment(workspace: "Workspace", run: Path | None, prefix: str) -> "RunExperiment":
-    """Find the only experiment whose id starts with `prefix`, in `run` or in the newest run."""
     return load_run(run or newest_run(workspace.library.parent), workspace=workspace).experiment(prefix)
 
 
 def list_worst(
     terminal: Terminal, workspace: "Workspace", run: Path | None, only: str | None, limit: int
 ) -> None:
-    """Print a table of the worst results in `run`, or in the newest run, that match the filter."""
     folder = run or newest_run(workspace.library.parent)
     found, count = worst_results(load_run(folder).path, only, limit)
     rows = [_line(row) for row in found]
@@ -46,7 +47,6 @@ def list_worst(
 
 
 def _line(row: "Row") -> dict[str, object]:
-    """Return one row of that table."""
     return {
         "experiment": row.experiment_id,
         "ending": row.ending,
@@ -60,9 +60,13 @@ def _line(row: "Row") -> dict[str, object]:
     }
 
 
-def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -> None:
-    """Print what was injected, and the diff."""
+def print_experiment(
+    terminal: Terminal, experiment: "Experiment", patch: str, *, tried: bool = False
+) -> None:
+    """Print what was injected, and the diff. If the experiment was only `tried`, it has no method."""
     facts = describe(experiment)
+    if tried:
+        del facts["method"]
     width = max(len(name) for name in facts)
     for name, value in facts.items():
         terminal.say(f"{name.ljust(width)}  {value}", style="bold" if name == "fault" else None)
@@ -74,74 +78,109 @@ def print_experiment(terminal: Terminal, experiment: "Experiment", patch: str) -
 
 
 def print_verdict(terminal: Terminal, result: "ExperimentResult") -> None:
-    """Print the verdict of an experiment that has run, and its events with times since the activation.
-    Differences from golden after the end of the drive do not count."""
+    """Print the verdict of an experiment that has run, its events, differences up to the end of the drive,
+    and metrics."""
     record = result.record
     assert record is not None
+    manifest = _manifest(result)
     ending = record.outcome.value if record.outcome else record.status.value
     terminal.say(f"verdict: {ending}", style=STYLES.get(ending))
     if record.detail:
         terminal.say(record.detail)
     start = record.activation.first if record.activation else None
-    events = _events(record)
+    events = _events(record, manifest)
     if events:
         rows = [
             (f"{t:.2f}", "" if start is None else f"{t - start:+.2f}", what)
             for t, what in sorted(events, key=lambda e: e[0])
         ]
         terminal.table(["time [s]", "from activation [s]", "what"], rows, right=(0, 1))
+    if manifest and (note := _no_alert(record, manifest)):
+        terminal.say(note)
     told = result.verdict
     if told["severity"]:
         terminal.say(f"severity: {told['severity']}, delta-v {told['metrics']['delta_v']:.2f} m/s")
     for name, what in _TIMES.items():
         if told[name] is not None:
             terminal.say(f"{what}: {told[name]:.2f} s")
-    deviations = ", ".join(f"{name} {value:.4g}" for name, value in told["difference_in_drive"].items())
+    units = _units(manifest) if manifest else {}
+    deviations = _values(told["difference_in_drive"].items(), units)
     if deviations:
         until = "" if record.t_end is None else " up to the end of the drive"
-        terminal.say(f"largest difference from golden{until}: {deviations}")
-    metrics = ", ".join(f"{name} {value:.4g}" for name, value in record.metrics)
-    if metrics:
-        terminal.say(f"metrics: {metrics}")
+        terminal.say(f"largest difference from the golden run{until}: {deviations}")
+    if record.metrics:
+        terminal.say(f"metrics: {_values(record.metrics, units)}")
+
+
+def _manifest(result: "ExperimentResult") -> "TargetManifest | None":
+    try:
+        return result._target()
+    except MutatorError:  # a run can be shown without its target
+        return None
+
+
+def _units(manifest: "TargetManifest") -> dict[str, str]:
+    known = (*manifest.compared, *manifest.measures)
+    return {one.name: one.unit for one in known if one.unit not in ("", "-")}
+
+
+def _values(values: Iterable[tuple[str, float]], units: Mapping[str, str]) -> str:
+    texts = (f"{name} {value:.4g} {units.get(name, '')}".rstrip() for name, value in values)
+    return ", ".join(text.replace(" ", NO_BREAK) for text in texts)
+
+
+def _no_alert(record: "Record", manifest: "TargetManifest") -> str:
+    """Return a sentence if no alert came, or none before the first hazard; empty otherwise."""
+    if not (manifest.alerts and record.outcome and record.activation):
+        return ""
+    if not record.hazards:
+        return "" if record.alerts else "no alert"
+    first = min(t for _, t in record.hazards)
+    return "" if any(t <= first for _, t in record.alerts) else "no alert before the hazard"
 
 
 def print_path(terminal: Terminal, found: "RunExperiment") -> None:
-    """Print how far the fault propagated, in two lines."""
     if (path := found.fault_path) is None:
         return
-    terminal.say(f"path: {' > '.join(map(_stage, path.stages))}")
+    terminal.say("path of the fault:")
+    for stage in path.stages:
+        terminal.say(f"  {_stage(stage)}")
     stopped = f", stopped at {' and '.join(path.stopped_at)}" if path.stopped_at else ""
     terminal.say(f"reached: {path.reached or 'nothing that is recorded'}{stopped}")
 
 
 def _stage(stage: "Stage") -> str:
-    """Return e.g. `brakes reached 3.50 s`; no time for an injected component, which feedback may change."""
-    what = f"{stage.component} {stage.state.value}"
+    """Return e.g. `brakes: reached at 3.50 s`. Injected components get no time: feedback may change them."""
+    what = f"{stage.component}: {stage.state.value}"
     if stage.state.value == "injected":
         return what
     if stage.t_by is not None:
         return f"{what} by {stage.t_by:.2f} s"
-    return what if stage.t_first is None else f"{what} {stage.t_first:.2f} s"
+    return what if stage.t_first is None else f"{what} at {stage.t_first:.2f} s"
 
 
-def _events(record: "Record") -> list[tuple[float, str]]:
+def _events(record: "Record", manifest: "TargetManifest | None") -> list[tuple[float, str]]:
+    hazards = {h.name: f": {h.about}" for h in manifest.rules if h.about} if manifest else {}
     events: list[tuple[float, str]] = []
     if record.activation:
         times = record.activation.count
         events.append((record.activation.first, f"fault first active ({times} times in all)"))
         events.append((record.activation.last, "fault last active"))
     if record.t_manifest is not None:
-        events.append((record.t_manifest, "manifested: an actuator differs from golden"))
+        events.append((record.t_manifest, "manifested: an actuator differs from the golden run"))
     events += [(t, f"alert {name}") for name, t in record.alerts]
-    events += [(t, f"hazard {name}") for name, t in record.hazards]
+    events += [(t, f"hazard {name}{hazards.get(name, '')}") for name, t in record.hazards]
     if (end := record.t_end) is None:
         return events
     late = ", after the end of the drive"
-    return [*((t, what + late * (t > end)) for t, what in events), (end, "end of the drive")]
+    return [
+        *((t, what + late * (t > end)) for t, what in events),
+        (end, "end of the drive (metrics ignore later steps)"),
+    ]
 
 
 def show_trial(terminal: Terminal, trial: "Trial") -> None:
-    """Print everything about an experiment that `try` has just run; writes its plot next to its traces."""
+    """Print an experiment that `try` has just run; write its plot next to its traces."""
     with terminal.wait("drawing"):
         drawn = trial.save_plot(trial.folder / "plot.svg")
     if terminal.as_json:
@@ -149,7 +188,7 @@ def show_trial(terminal: Terminal, trial: "Trial") -> None:
         facts |= {"golden_hazards_s": dict(trial.golden_hazards)}
         terminal.emit(facts | {"traces": str(trial.single.faulty), "plot": str(drawn) if drawn else None})
         return
-    print_experiment(terminal, trial.experiment, trial.patch)
+    print_experiment(terminal, trial.experiment, trial.patch, tried=True)
     print_verdict(terminal, trial)
     if trial.golden_hazards:
         reached = ", ".join(f"{name} at {t:.2f} s" for name, t in trial.golden_hazards)

@@ -20,7 +20,6 @@ DIFFERS = "the new run differs from the campaign's record: see `mutator rerun`"
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("show", epilog=SHOW_EXAMPLES)(show)
     app.command("rerun", epilog=RERUN_EXAMPLES)(rerun)
 
@@ -103,7 +102,6 @@ def show(
 
 
 def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, object]:
-    """Return the experiment as JSON data, without its films."""
     from mutator.api.experiment_results import describe
 
     facts = {**describe(found.experiment), **found.verdict, "patch": patch}
@@ -113,7 +111,6 @@ def _facts(found: "RunExperiment", patch: str, drawn: Path | None) -> dict[str, 
 
 
 def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
-    """Print the experiment, without plot and films."""
     from mutator.cli import experiment_view
 
     experiment_view.print_experiment(terminal, found.experiment, patch)
@@ -123,13 +120,12 @@ def _print(terminal: Terminal, found: "RunExperiment", patch: str) -> None:
         experiment_view.print_verdict(terminal, found)
         experiment_view.print_path(terminal, found)
     if found.stretch:
-        terminal.say(f"run with: {found.stretch}")
+        terminal.say(f"recorded on: {found.stretch}")
     if not found.run.verifiable:
         terminal.say("not verifiable: an older version of mutator wrote this run, without digests")
 
 
 def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
-    """Return the path of the experiment's plot; draw it if it was not kept."""
     if found.is_drawn:
         return found.plot_file
     with terminal.wait("no trace was kept: rerunning"):
@@ -140,7 +136,6 @@ def _plot(terminal: Terminal, found: "RunExperiment") -> Path | None:
 
 
 def _film(terminal: Terminal, found: "RunExperiment", video: Path | None, stills: list[str]) -> list[Path]:
-    """Write the video and the stills; returns their paths."""
     shots = [_still(text, found) for text in stills]
     shots += [mutator.Shot(out=video)] if video else []
     if not shots:

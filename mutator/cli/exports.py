@@ -14,7 +14,6 @@ from mutator.exports import Format, Table
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("export", epilog=EXAMPLES)(export)
 
 

@@ -34,7 +34,6 @@ TriggerText = Annotated[
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("try", epilog=TRY_EXAMPLES)(try_spec)
     app.command("diff", epilog=DIFF_EXAMPLES)(diff)
     app.command("generate", epilog=GENERATE_EXAMPLES)(generate)
@@ -285,8 +284,7 @@ def _operator_choice(
     seed: int | None,
     others: bool,
 ) -> "mutator.OperatorChoice | None":
-    """Collect the operator options; return None if none are given. `others`: whether specs or a campaign are
-    given as well."""
+    """Collect the operator options, if any. `others`: whether specs or a campaign are given as well."""
     if operators is None:
         if places or scenario or all_lines or sample is not None:
             raise MutatorError(

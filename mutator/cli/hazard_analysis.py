@@ -25,7 +25,6 @@ Examples:
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("stpa", epilog=EXAMPLES)(stpa)
 
 
@@ -133,7 +132,6 @@ def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:
 
 
 def _show_table(terminal: Terminal, table: "ContextTable") -> None:
-    """Print a context table: for each row, its trigger and which control actions are hazardous in it."""
     actions = list(table.rows[0].actions)
     heads = ["context", "trigger"]
     heads += [head for action in actions for head in (f"{action}", f"no {action}")] + ["about"]
@@ -169,7 +167,6 @@ def _section(
 
 
 def _data(analysis: "Analysis") -> dict[str, Any]:
-    """Return the analysis as JSON data, with constants in conditions filled in."""
     hazards = analysis.hazards
     return {
         "accidents": hazards.accidents,

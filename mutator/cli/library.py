@@ -35,7 +35,6 @@ Table = tuple[list[str], list[dict[str, Any]]]
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("list", epilog=LIST_EXAMPLES)(list_library)
     app.command("check", epilog=CHECK_EXAMPLES)(check)
     app.command("doctor")(doctor)
@@ -84,7 +83,6 @@ def _campaigns(workspace: "Workspace") -> Table:
 
 
 def _files(files: Mapping[str, Path], key: str) -> Table:
-    """Return files of the library by name, with the description at `key`, if any."""
     from mutator.config.yaml_files import load
 
     rows: list[dict[str, Any]] = []
@@ -203,7 +201,6 @@ def check(
 
 
 def _say_finding(terminal: Terminal, finding: "Finding") -> None:
-    """Print a finding, its places below it, and the remedy."""
     terminal.say(f"{finding.name}: {finding.found}", style=LEVEL_STYLES[finding.level])
     for one in finding.places:
         file = short_path(Path(one.file)) if Path(one.file).is_absolute() else one.file
@@ -213,7 +210,6 @@ def _say_finding(terminal: Terminal, finding: "Finding") -> None:
 
 
 def _line(text: str) -> str:
-    """Return a description on one line."""
     return " ".join(text.split())
 
 

@@ -20,7 +20,6 @@ Examples:
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("init", epilog=INIT_EXAMPLES)(init)
     app.command("upgrade")(upgrade)
 

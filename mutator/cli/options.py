@@ -116,11 +116,9 @@ class Place:
     target: Path | None = None
 
     def workspace(self) -> "Workspace":
-        """Find the workspace; MutatorError if there is none."""
         return mutator.Workspace.find(self.root, self.library, self.templates, self.target)
 
     def over(self, other: "Place") -> "Place":
-        """Return this place with its gaps filled from `other`."""
         mine = {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}
         return dataclasses.replace(other, **{k: v for k, v in mine.items() if v is not None})
 
@@ -145,7 +143,7 @@ PLACE_OPTIONS = {"root": Root, "library": Library, "templates": Templates, "targ
 
 
 def with_place(verb: Callable[..., None]) -> Callable[..., None]:
-    """Add the four options of a place to a verb; users can write them before or after the verb's name."""
+    """Add the four options of a place to a verb, so that users can also write them after its name."""
     signature = inspect.signature(verb, eval_str=True)
     own = [p for p in signature.parameters.values() if p.name != "place"]
     context = inspect.Parameter("ctx", inspect.Parameter.KEYWORD_ONLY, annotation=typer.Context)

@@ -23,7 +23,6 @@ Examples:
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("places", epilog=PLACES_EXAMPLES)(list_places)
 
 
@@ -51,7 +50,6 @@ def list_places(
 
 
 def _print(terminal: Terminal, found: Sequence["ListedPlace"]) -> None:
-    """Print a table of the places, with a letter for each set of models, and then the key."""
     letters: dict[tuple[str, ...], str] = {}
     rows = []
     for one in found:
@@ -71,7 +69,6 @@ def _letter(number: int) -> str:
 
 
 def _yaml(at: Mapping[str, Any]) -> str:
-    """Return the anchor as one line of YAML, without the file."""
     told = {key: value for key, value in at.items() if key != "file"}
     import yaml
 

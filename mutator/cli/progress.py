@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def campaign_progress(terminal: Terminal) -> Iterator[Callable[["Progress"], None]]:
-    """Show progress; yields the function that the campaign calls, from any thread."""
+    """Show progress; yield the function that the campaign calls, from any thread."""
     if terminal.err.is_terminal:
         with _live(terminal) as notify:
             yield notify

@@ -26,8 +26,6 @@ Remark = Annotated[str, typer.Option(metavar="TEXT", help="Add this remark to ea
 
 
 def _deciding(kind: str, about: str) -> Callable[..., None]:
-    """Build `approve` or `reject`."""
-
     @with_place
     def verb(
         groups: SomeGroups = None,
@@ -99,8 +97,6 @@ def remark(
 
 
 def _flagging(flag: bool, about: str) -> Callable[..., None]:
-    """Build `flag` or `unflag`."""
-
     @with_place
     def verb(
         groups: Groups,
@@ -130,7 +126,7 @@ unflag = _flagging(False, "Remove flags.")
 def _chosen(
     found: "mutator.ReviewedGroups", verb: str, starts: Sequence[str] | None, only: str | None, *, yes: bool
 ) -> "Sequence[Group]":
-    """Return the chosen groups; none if the user does not confirm."""
+    """Return the chosen groups, or none without the user's confirmation."""
     if bool(starts) == (only is not None):
         raise MutatorError(
             "groups together with --only" if starts else "neither groups nor --only",
@@ -154,7 +150,6 @@ def _chosen(
 
 
 def _tell(terminal: Terminal, found: "mutator.ReviewedGroups", groups: "Sequence[Group]") -> None:
-    """Print the new state of these groups."""
     decided = found.review
     if terminal.as_json:
         terminal.emit([review_view.data(decided, group) for group in groups])

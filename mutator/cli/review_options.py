@@ -41,7 +41,6 @@ def load(
     seed: int | None,
     manifest: str | None,
 ) -> "mutator.ReviewedGroups":
-    """Load the groups that the options choose, with their decisions."""
     if campaign and specs:
         raise MutatorError("--campaign together with --spec", expected="one or the other")
     workspace = place.workspace()
@@ -57,7 +56,6 @@ def load(
 
 
 def reviewer(place: Place, by: str | None) -> str:
-    """Return the reviewer: `by`, or git's user.name; MutatorError without either."""
     from mutator.api.reviews import reviewer_name
 
     name = reviewer_name(place.workspace()) if by is None else by

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 def print_status(terminal: Terminal, found: "mutator.ReviewedGroups", campaign: str | None) -> None:
-    """Print counts by state, changed and flagged groups, and what the campaign lacks."""
     review = found.review
     if terminal.as_json:
         terminal.emit(_data(found))

@@ -1,4 +1,4 @@
-"""Prints groups of mutants: as a table, one by one with diff and values, or as data."""
+"""Print groups of mutants: as a table, one by one with diff and values, or as data."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -39,13 +39,11 @@ def data(review: "Review", group: "Group", *, whole: bool = False) -> dict[str, 
 
 
 def counts(review: "Review", groups: Sequence["Group"]) -> str:
-    """Return the number of groups in each state, as text."""
     found = Counter(review.state(group).value for group in groups)
     return ", ".join(f"{found[name]} {name}" for name in STYLES if found[name]) or "no groups"
 
 
 def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) -> None:
-    """Print the groups as a table, or as JSON."""
     if terminal.as_json:
         terminal.emit([data(review, group) for group in groups])
         return
@@ -65,7 +63,7 @@ def print_list(terminal: Terminal, review: "Review", groups: Sequence["Group"]) 
 
 
 def _short(injection: str) -> str:
-    """Shorten the file's path to its name: `sonar.py Sonar.measure after_assign gap: offset(by)`."""
+    """Shorten the file's path to its name."""
     path, space, rest = injection.partition(" ")
     return path.rpartition("/")[2] + space + rest
 
@@ -75,7 +73,6 @@ def _when(group: "Group") -> str:
 
 
 def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """Print a group's state, decision, flag and remarks."""
     state, flag = review.state(group).value, review.flag(group.id)
     terminal.say(f"group {group.id}: {state}", style=STYLES[state])
     if decision := review.describe(group):
@@ -87,7 +84,6 @@ def _print_head(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """Print what has changed in a group since its decision."""
     _print_head(terminal, review, group)
     terminal.say(f"  {group.what}", style="bold")
     terminal.say()
@@ -101,7 +97,6 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
 
 
 def print_group(terminal: Terminal, review: "Review", group: "Group") -> None:
-    """Print one group: decision, injections, values, triggers, diff with holes."""
     from mutator.review.readable_groups import condition_lines, ranges, value_table
 
     _print_head(terminal, review, group)

@@ -19,10 +19,8 @@ KEYS = {"a": "approve", "r": "reject", "s": "skip", "q": "quit"}
 def walk_through(
     terminal: Terminal, load: Callable[[], "mutator.ReviewedGroups"], reviewer: Callable[[], str]
 ) -> None:
-    """Show each new or changed group, ask for a decision, and save it at once. If somebody else has decided
-    in the meantime, ask again.
-
-    MutatorError if there is no terminal.
+    """Show each new or changed group, ask for a decision, and save it at once. Ask again if somebody else has
+    decided in the meantime. MutatorError without a terminal.
     """
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
         raise MutatorError(
@@ -56,7 +54,6 @@ def walk_through(
 
 
 def _asked(terminal: Terminal, where: str) -> str:
-    """Ask until one of the keys is pressed, and return it."""
     choices = "  ".join(f"[{key}] {word}" for key, word in KEYS.items())
     while True:
         terminal.say(f"{where}:  {choices}", style="bold")

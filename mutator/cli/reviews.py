@@ -51,14 +51,13 @@ class Verbs(TyperGroup):
     """The verbs of `review`; the default is `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Insert `list` if the first argument is neither a verb nor a request for help."""
+        """Insert `list` unless the first argument is a verb or asks for help."""
         if not args or (args[0].startswith("-") and args[0] not in ("-h", "--help")):
             args = ["list", *args]
         return super().parse_args(ctx, args)
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     reviews = typer.Typer(
         cls=Verbs, rich_markup_mode=None, epilog=EXAMPLES, context_settings={"max_content_width": 110}
     )
@@ -139,7 +138,6 @@ def show(
 def _write_pictures(
     terminal: Terminal, place: Place, target: str, groups: "Sequence[Group]", folder: Path
 ) -> dict[str, dict[str, str]]:
-    """Write the frames of groups, and print the value that each frame shows; returns the files by group."""
     from mutator.api.review_pictures import write_pictures
 
     with terminal.wait("drawing"):

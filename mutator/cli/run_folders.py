@@ -21,14 +21,12 @@ if TYPE_CHECKING:
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verbs."""
     app.command("merge", epilog=MERGE_EXAMPLES)(merge)
     app.command("report", epilog=REPORT_EXAMPLES)(report)
     app.command("clean", epilog=CLEAN_EXAMPLES)(clean)
 
 
 def show_counts(terminal: Terminal, run: "Run") -> None:
-    """Print the results by fault type, and how the experiments ended."""
     counts = run.counts()
     terminal.table(counts.heads, counts.rows, right=tuple(counts.right), total=True)
     score = run.mutation_totals()
@@ -126,7 +124,7 @@ def _history(terminal: Terminal, folder: Path) -> None:
 
 
 def library_if_any(place: Place) -> "Workspace | None":
-    """Find the workspace; None if no option names one and none is found, since a report needs none."""
+    """Find the workspace; None if no option names one and none is found."""
     try:
         return place.workspace()
     except MutatorError:

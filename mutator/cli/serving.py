@@ -24,7 +24,6 @@ server and its jobs.
 
 
 def register(app: typer.Typer) -> None:
-    """Register the verb."""
     app.command("serve", epilog=EXAMPLES)(serve)
 
 

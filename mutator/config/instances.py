@@ -27,6 +27,5 @@ def instance_condition(text: str) -> str:
 
 
 def names_of(text: str) -> frozenset[str]:
-    """Return the names that a condition uses."""
     tree = ast.parse(text.strip(), mode="eval")
     return frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))

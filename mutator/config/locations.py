@@ -119,7 +119,6 @@ class AtModel(StrictModel, title="A place"):
         return FaultLocation(path=self.file, function=function, anchor=anchor)
 
     def _function_of(self, kind: AnchorKind, source: Source, keys: Keys) -> str:
-        """Return the function's name, or an empty string for a constant."""
         name = self.function
         if kind is AnchorKind.CONSTANT:
             if name is not None:
@@ -142,7 +141,6 @@ class AtModel(StrictModel, title="A place"):
 
 
 def as_written_at(location: FaultLocation) -> dict[str, Any]:
-    """Return the location as the value of `at` in a spec."""
     anchor = location.anchor
     found: dict[str, Any] = {"file": location.path}
     found |= {"function": location.function} if location.function else {}
@@ -153,7 +151,6 @@ def as_written_at(location: FaultLocation) -> dict[str, Any]:
 
 
 def _fits(kind: AnchorKind, name: str) -> bool:
-    """Whether the name is valid for an anchor of this kind."""
     if kind is AnchorKind.DEFAULT and "." in name:
         return False
     if kind in VALUE_ANCHORS:
@@ -182,7 +179,6 @@ def assignable(text: str) -> bool:
 
 
 def base_name(text: str) -> str:
-    """Return the first name of a chain."""
     return re.split(r"[.\[\s]", text, maxsplit=1)[0]
 
 
@@ -204,6 +200,6 @@ def _is_constant(node: ast.expr) -> bool:
 
 
 def dotted_name(text: str) -> bool:
-    """Whether `text` is a chain of identifiers without keywords, and does not start with the probe's name."""
+    """Whether `text` is a chain of identifiers that does not start with the probe's name."""
     parts = text.split(".")
     return all(p.isidentifier() and not keyword.iskeyword(p) for p in parts) and parts[0] != PROBE_NAME

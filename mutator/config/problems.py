@@ -51,7 +51,7 @@ def explain(problem: ErrorDetails, model: type[BaseModel]) -> tuple[str, str, st
 def most_telling(found: Sequence[ErrorDetails]) -> ErrorDetails:
     """Choose the error to report. An unknown key comes before a missing key, which it may misspell.
 
-    If a value may have several shapes, prefer an error about the shape that it has.
+    If a value may have several shapes, prefer an error about its actual shape.
     """
     shapes = {p["loc"] for p in found if p["type"] in ("list_type", "dict_type", "model_type")}
     inside = {p["loc"][: len(loc) - 1] for loc in shapes for p in found if len(p["loc"]) > len(loc)}
@@ -91,7 +91,6 @@ def _named(shape: Any, tag: str) -> bool:
 
 
 def _shapes(annotation: Any) -> list[Any]:
-    """Return the types that `X`, `X | None`, `Annotated[X, ...]` or `X | Y` allow, without None."""
     if get_origin(annotation) is Annotated:
         return _shapes(get_args(annotation)[0])
     if get_origin(annotation) in (Union, types.UnionType):

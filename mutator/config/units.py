@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Unit:
-    """A unit: `suffix` as in keys, `symbol` as in tables, `factor` converts to SI (radians for angles)."""
+    """A unit: `suffix` in keys, `symbol` in tables, `factor` to SI (radians for angles)."""
 
     suffix: str
     symbol: str
@@ -61,8 +61,9 @@ _WORDS = 1 + max(suffix.count("_") for suffix in UNITS)  # number of parts of th
 
 
 def split(key: str) -> tuple[str, Unit | None]:
-    """Split `offset_m` into (`offset`, metre), and `offset_per_m` into (`offset`, 1/m): the longest suffix
-    wins. A key without a unit is returned whole, with None."""
+    """Split `offset_m` into (`offset`, metre), at the longest suffix. A key without a unit is returned with
+    None.
+    """
     for words in range(_WORDS, 0, -1):
         stem, *parts = key.rsplit("_", words)
         suffix = "_".join(parts)

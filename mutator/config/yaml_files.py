@@ -1,7 +1,7 @@
 """Read YAML strictly, and keep the line of every value for error messages.
 
-The dialect is the core of YAML 1.2: `true`/`false`, `null`, decimal numbers and strings. It excludes tags,
-anchors and aliases (a small file could expand to gigabytes), several documents, and duplicate keys.
+The dialect is the core of YAML 1.2, without tags, anchors and aliases (a small file could expand to
+gigabytes), several documents, and duplicate keys.
 """
 
 import re
@@ -63,12 +63,12 @@ class Source:
     def error(
         self, keys: Keys, got: str, *, expected: str | None = None, remedy: str | None = None
     ) -> MutatorError:
-        """Return (not raise) an error that points at the value at `keys`."""
+        """Return an error that points at the value at `keys`."""
         return MutatorError(got, where=self.path, line=self.line(keys), expected=expected, remedy=remedy)
 
     @contextmanager
     def placing(self, keys: Keys) -> Iterator[None]:
-        """Make every MutatorError raised in the `with` block point at the value at `keys`."""
+        """Make every MutatorError raised in the block point at the value at `keys`."""
         try:
             yield
         except MutatorError as error:
@@ -89,12 +89,11 @@ for _kind, (_first, _pattern) in _CORE.items():
 
 
 def load(path: Path) -> Source:
-    """Parse one YAML file strictly; MutatorError with file and line if it is invalid."""
     return parse(_read_text(path), path)
 
 
 def parse(text: str, path: Path) -> Source:
-    """Parse the text of a file as `load` does; `path` is the file that errors name."""
+    """Parse text as `load` does; errors name `path`."""
     try:
         _check_events(text, path)
         node = yaml.compose(text, Loader=_Loader)
@@ -133,7 +132,7 @@ def _read_text(path: Path) -> str:
 
 
 def _check_events(text: str, path: Path) -> None:
-    """Reject excluded syntax and files that take too long to read, before building any value."""
+    """Reject excluded syntax and large files before building any value."""
     if directive := _DIRECTIVE.search(text):
         raise MutatorError(
             "'%' at the start of a line (a directive)",
@@ -226,8 +225,8 @@ def read(
 ) -> tuple[M, Source]:
     """Parse `path`, check its `schema: name/version` key against `schema`, validate the rest as `model`.
 
-    `older` maps older schemas to functions that convert a file to `schema`. MutatorError, with file, line and
-    remedy, for a newer version, an unknown or duplicate key, a wrong type or a value out of range.
+    `older` maps older schemas to functions that convert a file to `schema`. MutatorError for an invalid file
+    or a newer version.
     """
     source = load(path)
     if not isinstance(source.data, dict):

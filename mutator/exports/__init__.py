@@ -1,4 +1,4 @@
-"""Writes runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
+"""Write runs for other tools: mutation testing viewers, CI servers, spreadsheets, data frames."""
 
 from enum import StrEnum
 

@@ -1,8 +1,7 @@
-"""Writes a run as a mutation testing report (the mutation-testing-elements schema, version 2).
+"""Write a run as a mutation testing report (the mutation-testing-elements schema, version 2).
 
-A mutant is a fault at its first location, with its value; a mutant that changes an expression's value
-replaces only the expression. Its tests are runs: a scenario and a trigger. *Killed* means that a run ended in
-a hazard, because fault-free runs pass the hazard checks. So a high score is bad for the controller, and
+A mutant is a fault at its first location; its tests are runs. *Killed* means that a run ended in a hazard,
+because fault-free runs pass the hazard checks. A high score is therefore bad for the controller, and
 thresholds are set so that no score is green.
 """
 
@@ -29,7 +28,6 @@ SCHEMA_VERSION = "2.0"
 
 
 def content(folder: RunFolder, workspace: Workspace) -> bytes:
-    """The report as JSON; deterministic."""
     manifest = single_run.manifest_of(workspace, folder)
     return (
         json.dumps(report(folder, manifest, workspace.fault_models()), ensure_ascii=False) + "\n"
@@ -37,7 +35,6 @@ def content(folder: RunFolder, workspace: Workspace) -> bytes:
 
 
 def report(folder: RunFolder, manifest: TargetManifest, models: FaultModels) -> dict[str, Any]:
-    """The report as plain data."""
     records = folder.records()
     drives: dict[str, list[Experiment]] = {}
     for experiment in plan_file.read_all(folder.path):
@@ -87,7 +84,6 @@ def _line(manifest: TargetManifest, injection: Injection) -> int:
 
 
 def _change(manifest: TargetManifest, models: FaultModels, fault: Fault) -> dict[str, Any]:
-    """The text that the fault's first injection replaces, and the replacement."""
     first = fault.injections[0]
     file, model = parsed(manifest.tree, first.location.path), models.get(first.model)
     name, span = injection_id(0, first), file.span(first.location)
@@ -106,7 +102,8 @@ def _located(
     file: ParsedFile, start: tuple[int, int], end: tuple[int, int], replacement: str
 ) -> dict[str, Any]:
     """A replacement of the text from `start` to `end` (line and byte, from 0), in the schema's positions:
-    lines and characters, from 1, end excluded."""
+    lines and characters, from 1.
+    """
     first, last = (
         {"line": line + 1, "column": len(file.lines[line][:column].decode(file.encoding)) + 1}
         for line, column in (start, end)
@@ -115,7 +112,7 @@ def _located(
 
 
 def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> dict[str, Any]:
-    """All anchored lines (at a function's entry, the line there), and their replacement."""
+    """Replace all anchored lines (at a function's entry, the line there)."""
     first = min(span[0], *(edit.index for edit in edits), len(file.lines) - 1)
     last = max(span[1], first + 1)
     lines, new, done = file.lines[first:last], list[bytes](), 0
@@ -130,8 +127,7 @@ def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> d
 
 
 def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
-    """Status of a fault over its runs, the reason, the runs that activated it, and those that ended in a
-    hazard."""
+    """Return a fault's status over its runs, its reason, and the runs that activated it or ended in a hazard."""
     known = {e: records[e.id] for e in experiments if e.id in records}
     of = {status: [r for r in known.values() if r.status is status] for status in Status}
     hazardous = [e for e, r in known.items() if r.hazards]
@@ -165,7 +161,6 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
 
 
 def _tests(experiments: Sequence[Experiment]) -> dict[str, Any]:
-    """A file of tests for each scenario: its runs, by method and trigger."""
     files: dict[str, Any] = {}
     for scenario, name in sorted({(e.scenario, e.drive_label) for e in experiments}):
         files.setdefault(scenario, {"tests": []})["tests"].append({"id": name, "name": name})

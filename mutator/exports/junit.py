@@ -1,8 +1,7 @@
-"""Writes a run as JUnit XML: a suite for each fault type, a case for each experiment.
+"""Write a run as JUnit XML: a suite for each fault type, a case for each experiment.
 
-Hazards are data, not failures: every experiment with a result passes, unless its outcome is listed as a
-failure. Harness errors and invalid mutants are errors; experiments that have not run or were never active are
-skipped.
+Experiments with a result pass, unless their outcome is listed as a failure. Harness errors and invalid
+mutants are errors; experiments that have not run or were never active are skipped.
 """
 
 import re
@@ -22,7 +21,7 @@ _NO_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def content(folder: RunFolder, failures: Sequence[str] = ()) -> bytes:
-    """The XML; deterministic. MutatorError for an outcome that cannot be a failure."""
+    """Return the XML. MutatorError for an outcome that cannot be a failure."""
     known = [ending.value for ending in ENDINGS]
     if strangers := [name for name in failures if name not in known]:
         raise MutatorError(f"'{strangers[0]}'", argument="failures", expected=f"one of {', '.join(known)}")
@@ -65,12 +64,10 @@ def _case(experiment: Experiment, row: Row | None, failures: Collection[str]) ->
 
 
 def _count(element: ET.Element) -> None:
-    """Set the totals of a suite, or of all suites."""
     element.set("tests", str(len(list(element.iter("testcase")))))
     for attribute, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
         element.set(attribute, str(len(list(element.iter(tag)))))
 
 
 def _clean(text: str) -> str:
-    """The text without characters that XML forbids."""
     return _NO_XML.sub("?", text)

@@ -1,9 +1,8 @@
-"""Writes experiments as MCAP files: golden and faulty run as two sets of topics, and events as messages.
+"""Write experiments as MCAP files: golden and faulty run as two sets of topics, and events as messages.
 
 Each experiment has a file: `/golden/CHANNEL` and `/faulty/CHANNEL` with a message for each stored value, and
 `/events`. Messages are JSON with schemas; log times are simulated time in ns. Log times cannot be negative:
-if the run begins before 0, they count from its first message, whose simulated time is in the metadata
-`times`. Only existing data is written; nothing is rerun.
+if the run begins before 0, they start at its first message, whose simulated time is in the metadata `times`.
 """
 
 import io
@@ -42,8 +41,6 @@ Values = list[tuple[float, float]]  # time (s) and value
 
 @dataclass(frozen=True, kw_only=True)
 class Topic:
-    """A channel of one run, with its values."""
-
     name: str
     about: Mapping[str, str]  # unit, role, component, about
     values: Values
@@ -53,7 +50,7 @@ def write_experiments(
     folder: RunFolder, out: Path, workspace: Workspace | None, only: str | None = None
 ) -> Path:
     """Write `<id>.mcap` into `out` for each experiment with a series or a kept trace that matches the filter
-    `only` over results columns.
+    `only`.
 
     MutatorError if the package mcap is missing or no experiment has data; MutatorWarning for those without.
     """
@@ -84,7 +81,7 @@ def write_experiments(
 
 
 class Content:
-    """Builds the files of a run folder's experiments; deterministic."""
+    """Build the files of a run folder's experiments."""
 
     def __init__(self, folder: RunFolder, workspace: Workspace | None) -> None:
         self._folder = folder
@@ -97,11 +94,10 @@ class Content:
         return {experiment.id: experiment for experiment in plan_file.read_all(self._folder.path)}
 
     def has(self, experiment_id: str) -> bool:
-        """Whether an experiment has data to write."""
         return self._series.has(experiment_id) or self._exact(experiment_id) is not None
 
     def of(self, experiment_id: str) -> bytes:
-        """The file of an experiment: its exact traces if they are kept, else its series."""
+        """Return an experiment's file, from its exact traces if kept, else from its series."""
         experiment, record = self._experiments[experiment_id], self._records[experiment_id]
         if (traces := self._exact(experiment_id)) is not None:
             assert self._traces is not None
@@ -118,8 +114,9 @@ class Content:
         return written.finish()
 
     def _exact(self, experiment_id: str) -> tuple[Trace, Trace] | None:
-        """The kept traces, if both runs have one; never reruns. MutatorError if a trace does not match its
-        record: using the coarser series instead would hide this."""
+        """The kept traces, if both runs have one. MutatorError if a trace does not match its record: using
+        the coarser series instead would hide this.
+        """
         kept = self._folder.path / "traces" / experiment_id
         if self._traces is None or not kept.is_dir() or experiment_id not in self._records:
             return None
@@ -168,7 +165,7 @@ class Content:
 
 
 class _Written:
-    """A file in progress: collects messages and writes them in time order."""
+    """Collect messages, and write them in time order."""
 
     def __init__(self) -> None:
         try:
@@ -228,7 +225,6 @@ class _Written:
 
 
 def _chosen(folder: RunFolder, only: str | None) -> list[str]:
-    """The experiments with a result that match `only`, in table order."""
     frame = Results.up_to_date(folder.path).frame().reset_index()
     if only is None:
         return list(frame["experiment_id"])
@@ -238,7 +234,6 @@ def _chosen(folder: RunFolder, only: str | None) -> list[str]:
 
 
 def _of_trace(trace: Trace, manifest: TargetManifest) -> Iterator[Topic]:
-    """The channels of an exact trace."""
     for channel in (*manifest.compared, *manifest.plotted):
         if channel.name in trace:
             clock = own_times(channel.name)
@@ -257,7 +252,6 @@ def _pairs(time: np.ndarray, values: np.ndarray) -> Values:
 
 
 def _events(record: Record) -> Iterator[tuple[float, str, str]]:
-    """Time, kind and name of each event."""
     if record.activation:
         yield record.activation.first, "activation", ""
         yield record.activation.last, "last_active", ""

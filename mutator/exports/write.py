@@ -1,5 +1,3 @@
-"""Writes a run in the requested format."""
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +16,9 @@ FILES = {Format.MUTATION_ELEMENTS: "mutation-elements.json", Format.JUNIT: "juni
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parts:
-    """The part of a run to write: `failures` are the outcomes that JUnit reports as failures, `only` is a
-    filter over results columns for MCAP, `table` is the table for CSV and Parquet."""
+    """The part of a run to write: the outcomes that JUnit reports as failures, a filter over results columns
+    for MCAP, the table for CSV and Parquet.
+    """
 
     failures: Sequence[str] = ()
     only: str | None = None
@@ -34,11 +33,10 @@ def export(
     workspace: Workspace | None = None,
     parts: Parts = Parts(),
 ) -> Path:
-    """Write the run folder `run` as `format` to `out` (default: RUN/exports/); returns the file, or the
-    folder of several.
+    """Write the run folder `run` as `format` to `out` (default: RUN/exports/); return the file or folder.
 
-    A mutation report shows sources, so it needs the `workspace` with the target; MCAP uses it to read kept
-    exact traces. MutatorError for a target that has changed since.
+    A mutation report needs the `workspace` with the target; MCAP uses it to read exact traces. MutatorError
+    for a target that has changed since.
     """
     folder = RunFolder.open(run)
     if parts.only is not None and format is not Format.MCAP:

@@ -1,2 +1,1 @@
-"""Figures of results and runs, drawn from frames or traces. This package does not compute statistics or read
-run folders."""
+"""Draw figures of results and runs from frames or traces. No statistics, no run folders."""

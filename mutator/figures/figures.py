@@ -1,4 +1,4 @@
-"""Selects the figures of a run by what can be compared, and writes them as SVG and PNG."""
+"""Select the figures of a run by what can be compared, and write them as SVG and PNG."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,9 +19,8 @@ FOLDER = "figures"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Drawing:
-    """One figure. `name` is the file name. `note` says what the figure shows, or why there is none.
-
-    `codes` are lines of code to copy, each with a description.
+    """One figure. `note` says what it shows, or why there is none. `codes` are lines of code to copy, each
+    with a description.
     """
 
     name: str
@@ -31,12 +30,10 @@ class Drawing:
     codes: tuple[tuple[str, str], ...] = ()
 
     def link(self, suffix: str) -> str:
-        """The path of the file, relative to the report. `suffix` is svg or png."""
         return f"{FOLDER}/{self.name}.{suffix}"
 
 
 def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
-    """The figures of a frame of results, without those that have nothing to compare."""
     frame = slim(frame)
     kinds, scenarios = frame["kind"].nunique(), frame["scenario"].nunique()
     made = []
@@ -50,7 +47,6 @@ def drawings(frame: pd.DataFrame) -> tuple[Drawing, ...]:
 
 
 def write_drawings(made: Sequence[Drawing], out: Path) -> None:
-    """Write each figure into `out`/figures as <name>.svg and <name>.png."""
     for drawing in made:
         paths = [out / drawing.link(suffix) for suffix in ("svg", "png")]
         if drawing.figure is not None:

@@ -19,7 +19,7 @@ SEVERAL = "several"
 
 
 def hazard_sets(frame: pd.DataFrame) -> pd.Series:
-    """For each run, the name of its hazard, `several` if it has more than one, or '' if it has none."""
+    """Return each run's hazard, `several` if it has more than one, or '' if it has none."""
     names = hazard_names(frame)
     had = frame[[f"t_{name.lower()}" for name in names]].notna().to_numpy()
     count = had.sum(axis=1)
@@ -30,8 +30,6 @@ def hazard_sets(frame: pd.DataFrame) -> pd.Series:
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """Draw a panel of counts for each method, and a panel of hazards per activated fault with 95 %
-    intervals."""
     tallies = by_kind(frame)
     methods = sorted({method for method, _ in tallies})
     hazards = frame.groupby("kind")["is_hazard"].sum()
@@ -53,8 +51,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _counts(axis: "Axes", frame: pd.DataFrame, kinds: list[str]) -> None:
-    """Draw bars of hazards, divided by hazard. At the end of each bar are the count and the number of
-    injected faults."""
+    """Draw bars of hazards, each with its count and the number of injected faults."""
     names = hazard_names(frame)
     counts = pd.crosstab(frame["kind"], hazard_sets(frame)).reindex(kinds, fill_value=0)
     injected = frame["kind"].value_counts().reindex(kinds, fill_value=0)

@@ -17,7 +17,6 @@ DARK_BELOW = 50.0  # %; text is white on cells below this rate, else black
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """Draw a panel for each method. Colour shows hazards per activated fault, and text shows both counts."""
     kinds, scenarios = sorted(frame["kind"].unique()), sorted(frame["scenario"].unique())
     methods = sorted(frame["method"].unique())
     figure, axes = style.blank(1.3 + 0.36 * len(kinds), 1, len(methods), sharey=True)
@@ -32,7 +31,6 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[str]) -> "AxesImage":
-    """Draw one method's cells. Cells without activated faults have text but no colour."""
     import numpy as np
 
     groups = {(str(k), str(s)): tally(group) for (k, s), group in frame.groupby(["kind", "scenario"])}
@@ -56,8 +54,7 @@ def _panel(axis: "Axes", frame: pd.DataFrame, kinds: list[str], scenarios: list[
 
 
 def _text_colour(rate: float) -> str:
-    """The text colour for a cell with this rate. If the rate is NaN, the cell has no colour and normal
-    text."""
+    """Return the text colour for a cell with this rate, or without colour (NaN)."""
     if rate != rate:
         return "black"
     return "white" if rate < DARK_BELOW else "#010101"  # not pure black, which follows the theme

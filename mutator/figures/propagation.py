@@ -1,4 +1,4 @@
-"""The figure of propagation times by scenario, that is the times between the events of a fault."""
+"""The figure of the times between the events of a fault, by scenario."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -14,7 +14,6 @@ if TYPE_CHECKING:
 
 
 def draw(frame: pd.DataFrame) -> "Figure":
-    """Draw a panel for each step of propagation, with quartiles, median, mean and number of runs."""
     methods, scenarios = sorted(frame["method"].unique()), sorted(frame["scenario"].unique())
     spreads = {(m, s): propagation(group) for (m, s), group in frame.groupby(["method", "scenario"])}
     steps = list(next(iter(spreads.values())))
@@ -38,8 +37,7 @@ def draw(frame: pd.DataFrame) -> "Figure":
 
 
 def _method(axis: "Axes", spreads: Sequence[tuple[float, Spread]], method: str) -> None:
-    """Draw a bar between the quartiles, a line at the median, a marker at the mean, and the number of runs
-    above."""
+    """Draw quartiles as a bar, the median, the mean, and the number of runs."""
     colour, marker = style.method_look(method)
     known = [(x, spread) for x, spread in spreads if spread.n]
     xs = [x for x, _ in known]

@@ -1,7 +1,6 @@
-"""Draws the golden and the faulty run on one time axis, with marks for trigger, manifestation, alerts and
-hazards.
+"""Draw the golden and the faulty run on one time axis, with marks for events.
 
-It uses matplotlib without pyplot, so it needs no display, has no global state and is deterministic.
+It uses matplotlib without pyplot, so it needs no display and is deterministic.
 """
 
 import io
@@ -53,15 +52,12 @@ MARK_LINES = {MarkKind.TRIGGER: "-", MarkKind.MANIFEST: ":", MarkKind.ALERT: "--
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mark:
-    """A vertical line at `t` (in simulated seconds), and its label."""
-
     kind: MarkKind
     t: float
     label: str
 
 
 def marks_of(record: Record) -> tuple[Mark, ...]:
-    """The recorded events, earliest first."""
     marks = []
     if record.activation is not None:
         marks.append(Mark(kind=MarkKind.TRIGGER, t=record.activation.first, label="activated"))
@@ -81,10 +77,10 @@ def draw_run(
     marks: Iterable[Mark] = (),
     end: float | None = None,
 ) -> "Figure":
-    """Draw the manifest's channels of two runs, one panel each. `save` writes the figure.
+    """Draw the manifest's channels of two runs, one panel each, compared channels (actuators) first.
 
-    Data after the `end` of the drive (s) is grey and does not affect the axes. Compared channels (actuators)
-    come first. Channels that either run lacks are left out. Raise MutatorError if no channel is left.
+    Data after the `end` of the drive (s) is grey and does not affect the axes. MutatorError if no channel is
+    in both runs.
     """
     channels = [c for c in (*manifest.compared, *manifest.plotted) if c.name in golden and c.name in faulty]
     if not channels:
@@ -109,8 +105,6 @@ def _figure_type() -> type["Figure"]:
     from matplotlib.figure import Figure
 
     class RunFigure(Figure):
-        """A figure that notebooks show with any backend of pyplot."""
-
         def _repr_png_(self) -> bytes:
             self.savefig(png := io.BytesIO(), format="png", dpi=PNG_DPI)
             return png.getvalue()
@@ -121,8 +115,7 @@ def _figure_type() -> type["Figure"]:
 def _panel(
     axis: "Axes", channel: Channel, golden: tuple[Any, Any], faulty: tuple[Any, Any], end: float
 ) -> None:
-    """Draw one channel. The golden line is broad and below the narrow faulty line, so that equal lines show
-    both colours."""
+    """Draw one channel, golden broad below faulty narrow, so that equal lines show both colours."""
     looks = ((golden, GOLDEN_COLOUR, 2.4, 0.55, "golden"), (faulty, FAULTY_COLOUR, 1.1, 1.0, "faulty"))
     axis.margins(x=0.01, y=0.12)
     for (time, values), colour, width, alpha, label in looks:
@@ -168,7 +161,7 @@ def _decorate(
 
 
 def save(figure: "Figure", paths: Sequence[Path]) -> None:
-    """Write a figure to each of `paths` as .svg or .png, by suffix. Equal figures give equal bytes."""
+    """Write a figure to each of `paths` as .svg or .png, by suffix, deterministically."""
     import matplotlib
 
     if figure.get_layout_engine() is not None:  # once for all files, because layout takes as long as drawing
@@ -184,6 +177,6 @@ def save(figure: "Figure", paths: Sequence[Path]) -> None:
 
 
 def finite(values: Any) -> Any:
-    """Replace infinities, for example of time headway at standstill, with gaps."""
+    """Replace infinities, e.g. of time headway at standstill, with gaps."""
     array = np.asarray(values, dtype=float)
     return np.where(np.isfinite(array), array, np.nan)

@@ -1,7 +1,6 @@
-"""The common style of a report's figures: colours, sizes and the blank figure.
+"""The common style of a report's figures.
 
-`themed` adapts a figure to the light or dark theme of a page. The colours are those of Okabe and Ito, which
-colour-blind people can distinguish. Methods also differ in their markers.
+The colours are those of Okabe and Ito, which colour-blind people can distinguish.
 """
 
 from typing import TYPE_CHECKING
@@ -21,12 +20,11 @@ _METHOD_LOOKS = (("#0072b2", "o"), ("#d55e00", "s"), ("#009e73", "^"), ("#cc79a7
 
 
 def method_look(method: str) -> tuple[str, str]:
-    """The colour and marker of a method, which are the same in every report."""
     return _METHOD_LOOKS[list(Method).index(Method(method)) % len(_METHOD_LOOKS)]
 
 
 def blank(height: float, rows: int, columns: int, *, sharey: bool = False) -> tuple["Figure", list["Axes"]]:
-    """An empty figure of `height` inches, with its axes row by row."""
+    """Return an empty figure of `height` inches, with its axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -56,7 +54,7 @@ _THEMED = {  # black parts follow the theme; the background is transparent
 
 
 def themed(svg: str) -> str:
-    """A figure's SVG for a page, with a transparent background, and with light ink on a dark page."""
+    """Return a figure's SVG with a transparent background, and with light ink on a dark page."""
     for colour, shown in _THEMED.items():
         svg = svg.replace(colour, shown)
     return svg.replace("<defs>", f"{_DARK}<defs>", 1)

@@ -10,7 +10,7 @@ def readable(patch: str) -> tuple[str, str]:
     """The patch without its new files, and a sentence that names them (empty if there are none)."""
     sections = list(file_patches(patch))
     left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_NAME.search(s))]
-    note = f"not shown: {', '.join(left_out)}, the probe, which every mutant gets" if left_out else ""
+    note = f"not shown: {', '.join(left_out)}, the probe, which evaluates the trigger" if left_out else ""
     return "".join(s for s in sections if not adds_file(s)), note
 
 

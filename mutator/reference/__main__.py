@@ -1,4 +1,4 @@
-"""`python -m mutator.reference`: write all generated pages and schemas of the current clone."""
+"""Write all generated pages and schemas of the current clone."""
 
 from mutator.reference.pages import write
 from mutator.workspace import Workspace

@@ -1,6 +1,6 @@
-"""Generates the page of the Python API from the signatures and docstrings of `mutator.__all__`.
+"""Generate the page of the Python API from the signatures and docstrings of `mutator.__all__`.
 
-Signatures are printed as in the source. A `#:` comment on an attribute's line, or above it, documents it.
+A `#:` comment on an attribute's line, or above it, documents the attribute.
 """
 
 import ast
@@ -56,7 +56,7 @@ Function = ast.FunctionDef
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """A public attribute, property or method of a class: its form, type and meaning."""
+    """A public attribute, property or method of a class."""
 
     name: str
     written: str
@@ -65,7 +65,6 @@ class Member:
 
 
 def python_api(workspace: Workspace) -> str:
-    """Return the text of docs/reference/api.md."""
     shared = Table(heads=("argument", "what you can pass"), rows=_ARGUMENTS).as_markdown(escape=False)
     parts = [generated("Python API"), _INTRO, shared, "\n## Functions\n"]
     for name in _functions():
@@ -140,25 +139,21 @@ def _cell(text: str) -> str:
 
 
 def _type(text: str) -> str:
-    """Return a type as code, linked to the first public class in it."""
     code = f"`{text}`" if text else ""
     known = _public_in(text)
     return f"[{code}](#{known[0].lower()})" if known else code
 
 
 def _public_in(text: str) -> list[str]:
-    """Return the public classes that a type or signature names, each once."""
     return list(dict.fromkeys(name for name in re.findall(r"\w+", text) if name in _classes()))
 
 
 def _parsed(thing: Any) -> tuple[Any, str]:
-    """Return the syntax tree of a function or class, and its docstring."""
     node: Any = ast.parse(dedent(inspect.getsource(thing))).body[0]
     return node, ast.get_docstring(node) or ""
 
 
 def _own_members(cls: type) -> Iterator[Member]:
-    """Yield the members that the class's own source defines, in order."""
     lines = dedent(inspect.getsource(cls)).splitlines()
     for node in _parsed(cls)[0].body:
         if isinstance(node, Function):
@@ -183,7 +178,6 @@ def _assigned_to_self(init: Function, lines: list[str]) -> Iterator[Member]:
 
 
 def _comment(node: ast.stmt, lines: list[str]) -> str:
-    """Return the `#:` comment on a statement's lines, or else just above them, as a sentence."""
     own = [
         found[1] for line in lines[node.lineno - 1 : node.end_lineno] if (found := _DOC_COMMENT.search(line))
     ]
@@ -216,12 +210,10 @@ def _annotation(node: ast.arg | ast.AnnAssign) -> str:
 
 
 def _plain(annotation: ast.expr) -> str:
-    """Return an annotation without the quotes around names imported only for types."""
     return ast.unparse(annotation).strip("'")
 
 
 def _type_of(value: Any) -> str:
-    """Return the value of an enumeration's member, or the type of anything else."""
     return f'"{value.value}"' if isinstance(value, Enum) else type(value).__name__
 
 

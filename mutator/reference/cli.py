@@ -1,4 +1,4 @@
-"""Generates docs/reference/cli.md from the same source as `--help`."""
+"""Generate docs/reference/cli.md from the source of `--help`."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -20,7 +20,6 @@ _PLACES = (
 
 
 def command_line(workspace: Workspace) -> str:
-    """Return the text of docs/reference/cli.md."""
     command: Any = get_command(app)
     parts = [
         generated("Command line"),
@@ -66,7 +65,6 @@ def _verb(group: Any, name: str) -> Iterator[str]:
 
 
 def _example(line: str) -> str:
-    """Return one example line, with the text after the wide gap as a comment."""
     command, gap, comment = re.match(r"  (.*?)(?:( {2,})(\S.*))?$", line).groups()  # type: ignore[union-attr]
     return f"{command}{gap}# {comment}" if gap else command
 
@@ -87,7 +85,6 @@ def _paragraphs(text: str) -> str:
 
 
 def _plugin() -> Iterator[str]:
-    """Describe the options that the plugin adds to pytest."""
     parser = pytest.Parser(_ispytest=True)
     pytest_plugin.pytest_addoption(parser)
     yield "## pytest\n"

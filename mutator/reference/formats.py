@@ -1,4 +1,4 @@
-"""Generates the pages of the file formats: fault specs, campaigns, manifests, hazard analysis, clusters."""
+"""Generate the pages of the file formats."""
 
 from collections.abc import Iterator
 
@@ -27,7 +27,6 @@ _SAME = (
 
 
 def fault_spec(workspace: Workspace) -> str:
-    """Return the text of docs/reference/fault-spec.md."""
     example = min((workspace.library / "faults").rglob("*.yaml")).read_text(encoding="utf-8")
     return _page(
         generated("Fault specs"),
@@ -50,7 +49,6 @@ def fault_spec(workspace: Workspace) -> str:
 
 
 def campaigns(workspace: Workspace) -> str:
-    """Return the text of docs/reference/campaign.md."""
     example = (workspace.library / "campaigns" / "quickstart.yaml").read_text(encoding="utf-8")
     return _page(
         generated("Campaigns"),
@@ -66,7 +64,6 @@ def campaigns(workspace: Workspace) -> str:
 
 
 def manifests(workspace: Workspace) -> str:
-    """Return the text of docs/reference/target-manifest.md."""
     return _page(
         generated("Target manifests"),
         "A manifest at `fault_library/targets/<name>.yaml` holds everything that the harness knows "
@@ -84,7 +81,6 @@ def manifests(workspace: Workspace) -> str:
 
 
 def hazard_analysis(workspace: Workspace) -> str:
-    """Return the text of docs/reference/hazard-analysis.md."""
     return _page(
         generated("Files of the hazard analysis"),
         "These are the files in `fault_library/stpa/`. [The hazard "
@@ -106,7 +102,6 @@ def hazard_analysis(workspace: Workspace) -> str:
 
 
 def clusters(workspace: Workspace) -> str:
-    """Return the text of docs/reference/cluster-file.md."""
     return _page(
         generated("Cluster files"),
         "A cluster file describes the cluster that `mutator run --cluster FILE.yaml` starts, and stops after "

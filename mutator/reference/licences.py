@@ -1,7 +1,7 @@
-"""Generates the page of licences, as each installed package of constraints.txt states its own.
+"""Generate the page of licences that the installed packages of constraints.txt state.
 
-`python -m mutator.reference.licences` writes it into the current clone. `python -m mutator.reference` leaves
-it out, since it depends on the installed packages.
+`python -m mutator.reference.licences` writes it. `python -m mutator.reference` does not, since it depends on
+the installed packages.
 """
 
 import re
@@ -42,12 +42,10 @@ def write_licences(clone: Path) -> None:
 
 
 def table_of(page: str) -> dict[str, str]:
-    """Return the licence of each package on the page."""
     return {name: licence for name, licence in _ROW.findall(page) if name != "package"}
 
 
 def constrained(clone: Path) -> tuple[str, ...]:
-    """Return the names of the packages in constraints.txt, sorted, without duplicates."""
     text = (clone / "constraints.txt").read_text(encoding="utf-8")
     return tuple(sorted(set(re.findall(r"^([\w.-]+)==", text, re.MULTILINE))))
 
@@ -55,8 +53,7 @@ def constrained(clone: Path) -> tuple[str, ...]:
 def stated_licence(name: str) -> str | None:
     """Return the licence that an installed package states; None if it is not installed.
 
-    This is its licence expression (PEP 639), else its classifier, else the first line of the free text, which
-    may be a whole licence.
+    This is its licence expression (PEP 639), else its classifier, else the first line of the free text.
     """
     try:
         stated = metadata.metadata(name)
@@ -79,7 +76,6 @@ def _licence(name: str, known: Mapping[str, str]) -> str:
 
 
 def _needed_by(clone: Path) -> dict[str, str]:
-    """Return who requires each direct dependency: mutator, or else the first of its extras."""
     project = tomllib.loads((clone / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = {"mutator": project["dependencies"]}
     groups |= {f"`{extra}`": lines for extra, lines in project["optional-dependencies"].items()}

@@ -1,4 +1,4 @@
-"""Generates the page of the fault models from their templates."""
+"""Generate the page of the fault models from their templates."""
 
 import difflib
 from collections.abc import Iterator
@@ -44,7 +44,6 @@ _DOES = {
 
 
 def fault_models_page(workspace: Workspace) -> str:
-    """Return the text of docs/reference/fault-models.md."""
     models = list(workspace.fault_models())
     parts = [generated("Fault models"), INTRODUCTION]
     rows = [(f"[{model.name}](#{model.name})", _sentence(model.about)) for model in models]
@@ -84,7 +83,6 @@ def _param(param: ParamSchema) -> tuple[str, str, str, str]:
 
 
 def _change(example: Example) -> str:
-    """Return the example's change as a diff."""
     lines = difflib.ndiff(example.before.splitlines(), example.after.splitlines())
     return "\n".join((line[0] + line[2:]).rstrip() for line in lines if not line.startswith("?"))
 

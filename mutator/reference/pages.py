@@ -1,4 +1,4 @@
-"""Lists the generated files of the documentation, and generates them."""
+"""The generated files of the documentation."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -26,7 +26,6 @@ PAGES: dict[str, Callable[[Workspace], str]] = {
 
 
 def generated_files(workspace: Workspace) -> dict[Path, str]:
-    """Return the text of each generated file by its path, relative to the clone."""
     files = {FOLDER / name: make(workspace) for name, make in PAGES.items()}
     known = workspace.fault_models()
     for kind in file_formats(workspace.readings()):
@@ -36,7 +35,7 @@ def generated_files(workspace: Workspace) -> dict[Path, str]:
 
 
 def write(workspace: Workspace) -> Iterator[Path]:
-    """Write the files into the library's clone; yields the paths. MutatorError if there is no clone."""
+    """Write the files into the library's clone; yield the paths. MutatorError if there is no clone."""
     clone = workspace.library.parent
     refuse_shipped(clone)
     for path, text in generated_files(workspace).items():

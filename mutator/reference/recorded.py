@@ -1,4 +1,4 @@
-"""Generates the pages on recorded data: result columns, and the channels of each target."""
+"""Generate the pages on result columns and channels."""
 
 from collections.abc import Iterable, Iterator
 
@@ -24,7 +24,6 @@ _ARROW = {"text": "string", "flag": "int8", "count": "int64", "number": "double"
 
 
 def results(workspace: Workspace) -> str:
-    """Return the text of docs/reference/results.md."""
     left_out = ", ".join(f"`{name}`" for name in PLAN_COLUMNS)
     manifests = [workspace.manifest(name) for name in workspace.targets]
     return "\n".join(
@@ -72,7 +71,6 @@ def _columns(columns: Iterable[Column]) -> Iterator[str]:
 
 
 def channels(workspace: Workspace) -> str:
-    """Return the text of docs/reference/channels.md."""
     manifests = [workspace.manifest(name) for name in workspace.targets]
     parts = [
         generated("Channels and units"),

@@ -1,7 +1,4 @@
-"""JSON Schemas of the YAML files, for editors, made from the models that check these files.
-
-A schema covers the form of a file; `mutator check` checks the names in it (places, hazards, contexts).
-"""
+"""JSON Schemas of the YAML files, for editors. Names in the files are checked only by `mutator check`."""
 
 import re
 from collections.abc import Iterator
@@ -37,8 +34,7 @@ _DRAWN = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """A kind of YAML file: its model, the value of its `schema` key, and the glob of such files in a
-    clone."""
+    """A kind of YAML file: its model, the value of its `schema` key, and the glob of its files in a clone."""
 
     model: type[StrictModel]
     schema: str
@@ -46,7 +42,6 @@ class Format:
 
     @property
     def name(self) -> str:
-        """Name of its JSON Schema: `fault_spec` for `fault_spec/1`."""
         return self.schema.partition("/")[0]
 
 
@@ -64,7 +59,6 @@ _FILES: tuple[tuple[type[StrictModel], str, str], ...] = (
 
 
 def file_formats(declared: Readings) -> tuple[Format, ...]:
-    """Return the kinds of YAML files of a library with these readings, of templates, and of clusters."""
     specs = (spec.spec_model(declared), spec.SCHEMA, "faults/*/*.yaml")
     return (
         *(Format(model=m, schema=s, files=f"fault_library/{files}") for m, s, files in (specs, *_FILES)),
@@ -76,11 +70,10 @@ def file_formats(declared: Readings) -> tuple[Format, ...]:
 
 
 def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
-    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`). The schema of
-    the file comes first.
+    """Return the JSON Schema of every model in a file of `model`, by short name (`Variant`), the file's
+    first.
 
-    The schema of a model has the class's title, its docstring in one line, and descriptions of its
-    properties.
+    It has the class's title, its docstring in one line, and descriptions of its properties.
     """
     whole = model.model_json_schema(by_alias=True)
     parts = {model.__name__: whole} | whole.pop("$defs", {})
@@ -88,13 +81,12 @@ def definitions(model: type[StrictModel]) -> dict[str, dict[str, Any]]:
 
 
 def short_name(name: str) -> str:
-    """Return `Variant` for `_VariantModel`; names of enumerations stay unchanged."""
+    """Return `Variant` for `_VariantModel`; other names stay unchanged."""
     match = _MODEL.match(name)
     return match[1] if match else name
 
 
 def _described(part: dict[str, Any]) -> dict[str, Any]:
-    """Clean the part; models and their properties keep titles and descriptions."""
     kept: dict[str, Any] = _clean(part)
     if "properties" in part:
         kept["title"] = part["title"]
@@ -105,7 +97,7 @@ def _described(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def _clean(value: Any) -> Any:
-    """Drop titles and descriptions, because pydantic generates many of them, and shorten references."""
+    """Drop the titles and descriptions that pydantic generates, and shorten references."""
     if isinstance(value, list):
         return [_clean(item) for item in value]
     if not isinstance(value, dict):
@@ -123,7 +115,6 @@ def _clean(value: Any) -> Any:
 
 
 def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
-    """Return the JSON Schema of one kind of file; injections have the parameters of `models`."""
     parts = definitions(kind.model)
     if "Injection" in parts:
         _with_models(parts["Injection"], models)
@@ -143,7 +134,6 @@ def editor_schema(kind: Format, models: FaultModels) -> dict[str, Any]:
 
 
 def _with_models(injection: dict[str, Any], models: FaultModels) -> None:
-    """Add the fault models and their parameters; `mutator check` finds unknown models."""
     properties = injection["properties"]
     properties["model"]["anyOf"] = [{"enum": [model.name for model in models]}, {"type": "string"}]
     properties["unit"]["anyOf"] = [{"enum": [*units.UNITS, DIMENSIONLESS]}, {"type": "null"}]
@@ -162,7 +152,7 @@ def _parameters(model: FaultModel) -> dict[str, Any]:
 
 
 def keys(param: ParamSchema) -> Iterator[str]:
-    """Yield the keys of a parameter in a spec: its name with the suffix of each possible unit."""
+    """Yield the keys of a parameter in a spec, one for each possible unit."""
     if param.unit in (None, TARGET_UNIT):
         yield param.name
     if param.unit is not None:

@@ -26,15 +26,14 @@ _WORDS = {
 
 
 def generated(title: str) -> str:
-    """Return the head of a page."""
     return f"# {title}\n\n<!-- Written by `python -m mutator.reference`; do not edit by hand. -->\n"
 
 
 def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[str]:
     """Yield a section for each model in files of `models`, each once, in the order of their keys.
 
-    Headings are one level below `below`; with several files, their parts are one level deeper. A model with
-    its section on another page is linked there.
+    Headings are one level below `below`, those of parts of several files two. Models of other pages are only
+    linked.
     """
     parts: dict[str, dict[str, Any]] = {}
     for model in models:
@@ -53,8 +52,7 @@ def sections(page: str, *models: type[StrictModel], below: int = 1) -> Iterator[
 
 
 def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
-    """Return the names of models in reading order: the first, then those that its keys refer to, each
-    once."""
+    """Return the names of models in reading order: the first, then those that its keys refer to."""
     met: dict[str, None] = {}
     waiting = [next(iter(parts))]
     while waiting:
@@ -66,7 +64,6 @@ def reading_order(parts: dict[str, dict[str, Any]]) -> list[str]:
 
 
 def _references(value: Any) -> Iterator[str]:
-    """Yield the names of the models that a JSON Schema refers to."""
     if isinstance(value, list):
         for item in value:
             yield from _references(item)
@@ -79,14 +76,11 @@ def _references(value: Any) -> Iterator[str]:
 
 
 class _Tables:
-    """Tables of the keys of models on `page`; `parts` holds models and enumerations by name."""
-
     def __init__(self, page: str, parts: dict[str, dict[str, Any]]) -> None:
         self._page = page
         self._parts = parts
 
     def keys(self, part: dict[str, Any]) -> Iterator[str]:
-        """Yield the table of a model's keys."""
         required = part.get("required", [])
         rows = [
             (
@@ -101,7 +95,7 @@ class _Tables:
         yield ""
 
     def _type(self, value: dict[str, Any]) -> str:
-        """Return a JSON Schema type as text, without the null of optional keys."""
+        """Return a JSON Schema type as text; optional keys without null."""
         if "anyOf" in value:
             types = [v.get("type") for v in value["anyOf"]]
             # "number" includes whole numbers

@@ -47,12 +47,11 @@ class OpenFile(FileResponse):
 
 
 def kind_of(name: str) -> str:
-    """Return the media type of a file."""
     return _KINDS[Path(name).suffix]
 
 
 def without_places(text: str) -> str:
-    """Shorten absolute paths in a text to their last part, or to the part below the current folder."""
+    """Shorten absolute paths in a text."""
     for folder, instead in ((Path.cwd(), ""), (Path.home(), "/_/"), (Path(tempfile.gettempdir()), "/_/")):
         if folder != Path("/"):
             text = text.replace(f"{folder}/", instead)  # names may contain spaces
@@ -60,7 +59,6 @@ def without_places(text: str) -> str:
 
 
 def error_facts(error: MutatorError) -> dict[str, Any]:
-    """Return an error as JSON data."""
     place = error.where or error.argument
     parts = {"got": error.got, "where": place, "expected": error.expected, "remedy": error.remedy}
     facts: dict[str, Any] = {name: without_places(text) if text else None for name, text in parts.items()}

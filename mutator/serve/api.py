@@ -16,13 +16,10 @@ _MOST_WORDS = 100  # most parameters in an address
 
 
 class ReviewApi:
-    """Reviews for scripts."""
-
     def __init__(self, reviews: Reviews, runs: Runs) -> None:
         self._reviews, self._runs = reviews, runs
 
     def told(self, request: Request) -> Response:
-        """Return the decisions on each group."""
         return JSONResponse(self._reviews.told(asked(self._reviews, request)))
 
     def decide(self, request: Request, body: bytes) -> Response:
@@ -34,7 +31,6 @@ class ReviewApi:
             return JSONResponse({"conflict": moved.got, "groups": moved.groups}, 409)
 
     def changes(self, request: Request) -> Response:
-        """Return what has changed in a group since its approval."""
         found = self._reviews.changes(asked(self._reviews, request), request.path_params["group"])
         return JSONResponse({"changes": found})
 
@@ -45,16 +41,13 @@ class ReviewApi:
         return JSONResponse(self._reviews.typical(chosen, request.path_params["group"], run))
 
     def levels(self, request: Request) -> Response:
-        """Return the levels that have frames."""
         chosen = asked(self._reviews, request)
         return JSONResponse({"levels": self._reviews.levels(chosen, request.path_params["group"])})
 
     def before(self, request: Request) -> Response:
-        """Return a frame before a group's effect."""
         return self._picture(request, after=False)
 
     def after(self, request: Request) -> Response:
-        """Return the frame after the effect."""
         return self._picture(request, after=True)
 
     def _picture(self, request: Request, *, after: bool) -> Response:
@@ -64,25 +57,19 @@ class ReviewApi:
 
 
 class JobApi:
-    """Jobs for scripts."""
-
     def __init__(self, desk: Desk, jobs: Jobs) -> None:
         self._desk, self._jobs = desk, jobs
 
     def told(self, _: Request) -> Response:
-        """Return all jobs."""
         return JSONResponse({"jobs": [job.told() for job in self._jobs.all()]})
 
     def submit(self, _: Request, body: bytes) -> Response:
-        """Start a job."""
         return JSONResponse({"id": self._jobs.submit(self._desk.work(body)).id}, 201)
 
     def log(self, request: Request) -> Response:
-        """Return the output of a job."""
         return JSONResponse({"log": self._jobs.get(request.path_params["job"]).text})
 
     def cancel(self, request: Request, _: bytes) -> Response:
-        """Cancel a job."""
         try:
             self._jobs.cancel(request.path_params["job"])
         except Ended as err:
@@ -91,7 +78,7 @@ class JobApi:
 
 
 def asked(reviews: Reviews, request: Request) -> Selection:
-    """Return the selection of groups in an address; MutatorError for unknown parameters."""
+    """Return the selection of groups in an address."""
     given = parse_qsl(request.url.query, keep_blank_values=True)
     if len(given) > _MOST_WORDS:
         raise MutatorError(f"{len(given)} parameters in the address", expected=f"at most {_MOST_WORDS}")

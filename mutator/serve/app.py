@@ -48,7 +48,6 @@ class Site:
         self.jobs = Jobs(self.at_once, self._report_at)
 
     def told_runs(self) -> list[dict[str, Any]]:
-        """Return a summary of each run, in the order of the folders."""
         return [told(key, path) for key, path in self.runs.folders().items()]
 
     def _report_at(self, work: Work) -> str | None:
@@ -87,7 +86,7 @@ def application(site: Site) -> Starlette:
 
 
 def _quick(answer: Callable[[Request], Response]) -> Answer:
-    """Compute the response in a separate thread, so that other requests need not wait."""
+    """Compute the response in a thread, so that other requests need not wait."""
 
     async def answered(request: Request) -> Response:
         return await run_in_threadpool(answer, request)
@@ -96,8 +95,6 @@ def _quick(answer: Callable[[Request], Response]) -> Answer:
 
 
 def _sent(answer: Callable[[Request, bytes], Response]) -> Answer:
-    """Compute the response to a request with a JSON body in a separate thread."""
-
     async def answered(request: Request) -> Response:
         kind = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         if kind != "application/json":
@@ -146,7 +143,6 @@ def _pages(site: Site) -> list[Route]:
 
 
 def _own(request: Request) -> Response:
-    """Return CSS and JavaScript that ship with mutator."""
     name = request.path_params["name"]
     if name not in (*assets(".js"), *assets(".css")):
         raise Absent("no such file")

@@ -14,18 +14,15 @@ _MOST_PAIRS = 20  # of runs offered for comparison
 
 
 def home_page(workspace: Workspace, runs: Sequence[Mapping[str, Any]]) -> str:
-    """Return the first page: runs, comparisons, reviews."""
     return _rendered("home.html", runs=runs, pairs=_pairs(runs), targets=tuple(workspace.targets))
 
 
 def error_page(facts: Mapping[str, Any]) -> str:
-    """Return the page of an error."""
     return _rendered("error.html", **facts)
 
 
 def offered(workspace: Workspace) -> dict[str, Any]:
-    """Return the choices: faults, scenarios, triggers, campaigns. An entry that cannot be read is reported as
-    `problem`."""
+    """Return the choices in the forms. The first entry that cannot be read is reported as `problem`."""
     names = ("targets", "scenarios", "campaigns")
     found: dict[str, Any] = {name: [*getattr(workspace, name)] for name in names}
     found |= {"specs": [], "contexts": [], "readings": [], "problem": None}
@@ -45,7 +42,7 @@ def offered(workspace: Workspace) -> dict[str, Any]:
 
 
 def _pairs(runs: Sequence[Mapping[str, Any]]) -> list[tuple[str, str]]:
-    """Return pairs of consecutive runs of one campaign and target, for comparison."""
+    """Return pairs of consecutive runs of one campaign and target."""
     latest: dict[tuple[str, str], str] = {}
     pairs = []
     for run in runs:

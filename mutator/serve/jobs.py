@@ -32,8 +32,6 @@ _END_S = 30.0  # time for jobs to end when the server ends
 
 
 class State(StrEnum):
-    """The state of a job."""
-
     QUEUED = "queued"
     RUNNING = "running"
     DONE = "done"
@@ -62,7 +60,6 @@ class Job:
     hold: int | None = None  # the writing end of the pipe to its keeper
 
     def told(self) -> dict[str, Any]:
-        """Return the job as JSON data."""
         order = self.work.order
         if self.tail is not None and self.state is State.RUNNING:
             now = self.tail.poll()
@@ -80,7 +77,6 @@ class Job:
         return _plain(self.log)
 
     def hear(self, line: bytes) -> None:
-        """Process one line of output."""
         self.log += line
         del self.log[:-_LOG_BYTES]
         text = _plain(line).strip()
@@ -94,7 +90,7 @@ class Job:
 
 
 class Jobs:
-    """The jobs of a server. `at_once` run in parallel; `report_at` returns the address of their result."""
+    """The jobs of a server. `report_at` returns the address of a result."""
 
     def __init__(self, at_once: int, report_at: Callable[[Work], str | None]) -> None:
         self._jobs: dict[str, Job] = {}
@@ -123,12 +119,10 @@ class Jobs:
         return job
 
     def all(self) -> list[Job]:
-        """Return the jobs, newest first."""
         with self._lock:
             return [*reversed(self._jobs.values())]
 
     def get(self, name: str) -> Job:
-        """Return the job with this id; Absent if there is none."""
         with self._lock:
             if name in self._jobs:
                 return self._jobs[name]
@@ -143,7 +137,7 @@ class Jobs:
             self._cancel(job)
 
     def close(self) -> None:
-        """End all jobs, and wait until all their processes are gone."""
+        """End all jobs, and wait for all their processes."""
         with self._lock:
             self._closed = True
             for job in self._jobs.values():
@@ -163,14 +157,12 @@ class Jobs:
             job.hold = None
 
     def _work(self) -> None:
-        """Run jobs one after another."""
         while (job := self._waiting.get()) is not None:
             process = self._started(job)
             if process is not None:
                 self._follow(job, process)
 
     def _started(self, job: Job) -> subprocess.Popen[bytes] | None:
-        """Start the job's process; None if the job was cancelled or cannot start."""
         with self._lock:
             if job.state is not State.QUEUED or self._closed:
                 return None
@@ -196,7 +188,6 @@ class Jobs:
             return process
 
     def _follow(self, job: Job, process: subprocess.Popen[bytes]) -> None:
-        """Read the job's output until it ends."""
         assert process.stdout is not None
         with process.stdout as said:
             for line in iter(lambda: said.readline(_LOG_BYTES), b""):
@@ -216,7 +207,6 @@ class Jobs:
                 job.hold = None
 
     def _result(self, job: Job) -> str | None:
-        """Return the page that shows the result of a job."""
         if job.work.order.kind == "try":
             tried = _TRIED.search(job.text)
             return f"/{TRIES}/{tried[1]}/plot.svg" if tried and "\nplot: " in job.text else None
@@ -224,20 +214,17 @@ class Jobs:
 
 
 def _plain(data: bytes | bytearray) -> str:
-    """Return printable text without paths on the disk."""
     text = without_places(_STYLES.sub("", data.decode("utf-8", "replace")))
     return "".join(c for c in text if c.isprintable() or c in "\n\t")
 
 
 def _news(job: Job) -> str:
-    """Return the line with the result, or else the last line."""
     lines = job.text.splitlines()
     told = [line for line in lines if line.startswith(_NEWS)]
     return (told or [job.message])[-1]
 
 
 def _complaint(job: Job) -> str:
-    """Return the error in the output, if any, or else its last line."""
     lines = job.text.splitlines()
     errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
     differs = [line for line in lines if line.startswith("DIFFERS")]

@@ -1,4 +1,4 @@
-"""Checks requests for jobs like the command line does, and builds their command lines.
+"""Check requests for jobs, and build their command lines.
 
 A name must be in the library, and an id in a run's plan. No value is a path or looks like an option.
 """
@@ -45,8 +45,6 @@ class Rerun(StrictModel):
 
 
 class Film(StrictModel):
-    """Film an experiment."""
-
     kind: Literal["film"]
     run: Text
     experiment: ExperimentId
@@ -62,8 +60,6 @@ class Still(StrictModel):
 
 
 class Report(StrictModel):
-    """Rewrite the report of a run."""
-
     kind: Literal["report"]
     run: Text
 
@@ -100,7 +96,7 @@ _ORDERS: TypeAdapter[Order] = TypeAdapter(Annotated[Order, Field(discriminator="
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Work:
-    """A checked request: the arguments of its command line (`words`), and the folder of its run."""
+    """A checked request, with the arguments of its command line (`words`)."""
 
     order: Order
     title: str
@@ -111,8 +107,6 @@ class Work:
 
 @dataclass(frozen=True, slots=True)
 class Desk:
-    """Checks requests for a library and the served runs."""
-
     workspace: Workspace
     runs: Runs
 
@@ -214,8 +208,6 @@ class Desk:
         )
 
     def _check_trigger(self, text: str, target: str | None) -> None:
-        """Check a trigger as `try` does: a context, a time in s, `always`, or a condition on observed
-        values."""
         tables = map(self.workspace.context_table, self.workspace.context_tables)
         names = {
             name for table in tables for row in table.rows for name in (row.id, f"{table.name}/{row.id}")
@@ -232,13 +224,12 @@ class Desk:
             raise MutatorError(f"'{text}'", where="trigger", expected="a time in s")
 
     def _folder(self, key: str) -> Path:
-        """Return the run folder with this key; a command may write to it."""
+        """Return the run folder with this key, checked for writing."""
         folder = self.runs.folder(key)
         check_no_links(folder)
         return folder
 
     def _new(self, name: str) -> Path:
-        """Return a folder next to the runs."""
         folder = self.runs.new / name
         if folder.is_symlink():
             raise MutatorError(f"a link, {name}", expected="a new folder", remedy="choose another name")
@@ -247,7 +238,6 @@ class Desk:
         return folder.resolve()
 
     def _place(self) -> list[str]:
-        """Return the options that name this library."""
         place = self.workspace
         options = {"--library": place.library, "--templates": place.templates, "--target": place.target}
         return _options(options)

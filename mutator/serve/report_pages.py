@@ -36,7 +36,7 @@ class Shown:
         self._compared: dict[tuple[str, str], dict[str, bytes]] = {}
 
     def file(self, key: str, name: str) -> Response:
-        """Open a file of a run; Absent for one that is not served."""
+        """Open a file of a run; Absent if it is not served."""
         run = self._runs.folder(key)
         if name in (REPORT, _STUDY):
             return self._page(run, name)
@@ -76,7 +76,6 @@ class Shown:
         }
 
     def _alerts(self, run: Path) -> str:
-        """Return which alerts the golden runs also raise; empty if not known here."""
         folder = RunFolder.open(run)
         try:
             return own_alerts(fault_free_runs(folder, self._workspace.manifest(folder.head["target"])))
@@ -85,8 +84,7 @@ class Shown:
 
 
 def _series(run: Path, name: str) -> bytes:
-    """Open a file of series. It is a script, so it must equal the output of `write_script` for its data: a
-    call with one string."""
+    """Open a file of series. Since it is a script, it must equal the output of `write_script` for its data."""
     data = _read(open_in_run(run, name))
     path = run / name
     try:

@@ -37,7 +37,6 @@ class Selection:
 
     @property
     def options(self) -> list[str]:
-        """The options of `mutator review` for the same selection."""
         if self.campaign:
             return ["--campaign", self.campaign]
         return ["--manifest", self.target, *(word for spec in self.specs for word in ("--spec", spec))]
@@ -50,8 +49,9 @@ class _ChangeModel(StrictModel):
 
 
 class Decisions(StrictModel):
-    """Changes that a page sends. `seen` has the revision of each group on the page, and `digests` identify
-    the diffs that it shows; without them, nothing is approved or rejected."""
+    """Changes that a page sends, with the revisions and digests of the diffs that it shows. Without digests,
+    nothing is approved or rejected.
+    """
 
     changes: Annotated[list[_ChangeModel], Field(min_length=1, max_length=5000)]
     by: Short
@@ -60,7 +60,7 @@ class Decisions(StrictModel):
 
 
 class Moved(MutatorError):
-    """The groups have changed since the page was loaded; `groups` has their current state."""
+    """The groups have changed since the page was loaded."""
 
     def __init__(self, got: str, groups: dict[str, Any]) -> None:
         super().__init__(got)
@@ -68,8 +68,7 @@ class Moved(MutatorError):
 
 
 class Reviews:
-    """The reviews of a library. Groups are built on first use, and again when a file that they depend on has
-    changed."""
+    """The reviews of a library. Groups are built on first use, and again when a file changes."""
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
@@ -78,11 +77,9 @@ class Reviews:
 
     @property
     def reviewer(self) -> str:
-        """Git's user.name; empty if it is not set."""
         return user_name(self.workspace) or ""
 
     def selection(self, target: str, campaign: str | None, specs: Sequence[str]) -> Selection:
-        """Return the selection of an address; Absent for an unknown target or campaign."""
         if target not in self.workspace.targets:
             raise Absent(f"no target '{target}'", expected=f"one of {', '.join(self.workspace.targets)}")
         if campaign is not None and campaign not in self.workspace.campaigns:
@@ -97,7 +94,6 @@ class Reviews:
         return Selection(target=target, campaign=campaign, specs=tuple(specs))
 
     def groups(self, chosen: Selection) -> tuple[Group, ...]:
-        """Return the current groups of a selection."""
         with self._making:
             stamp = self._stamp(chosen.target)
             if (made := self._made.pop(chosen, None)) is None or made[0] != stamp:
@@ -108,14 +104,12 @@ class Reviews:
             return made[1]
 
     def group(self, chosen: Selection, name: str) -> Group:
-        """Return one group by its full id; Absent if there is none."""
         found = next((group for group in self.groups(chosen) if group.id == name), None)
         if found is None:
             raise Absent(f"no group '{name}'", expected="the id of a group on the page")
         return found
 
     def page(self, chosen: Selection, query: str, runs: Sequence[Mapping[str, Any]]) -> str:
-        """Return the page of a selection; `runs` are those of its target."""
         review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
         served = {
             "target": chosen.target,
@@ -127,7 +121,6 @@ class Reviews:
         return page_html(review, review.in_turn(groups), chosen.options, served)
 
     def told(self, chosen: Selection) -> dict[str, Any]:
-        """Return the decisions on each group."""
         review, groups = load_review(self.workspace, chosen.target), self.groups(chosen)
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, groups)}
 
@@ -155,7 +148,6 @@ class Reviews:
         return {"target": chosen.target, "by": self.reviewer, "groups": _states(review, touched)}
 
     def changes(self, chosen: Selection, name: str) -> str:
-        """Return what has changed in a group since its approval, as a diff."""
         return load_review(self.workspace, chosen.target).changes(self.group(chosen, name))
 
     def picture(self, chosen: Selection, name: str, level: str, *, after: bool) -> bytes:
@@ -169,7 +161,7 @@ class Reviews:
         return found[after]
 
     def levels(self, chosen: Selection, name: str) -> list[dict[str, str]]:
-        """Return the levels that have frames, with their values as text; empty for other groups."""
+        """Return the levels that have frames, with their values as text."""
         manifest, group = self.workspace.manifest(chosen.target), self.group(chosen, name)
         found = pictures.of_groups(self.workspace, manifest, [group]).get(name)
         return [{"name": level.name, "label": level.label} for level in found.levels] if found else []
@@ -201,7 +193,6 @@ class Reviews:
         return catalogue.of_plan(workspace, plan)
 
     def _stamp(self, target: str) -> object:
-        """Return a value that changes with every file that groups depend on."""
         manifest = self.workspace.manifest(target)
         places = (self.workspace.library, self.workspace.templates, manifest.root)
         return [_files_in(place) for place in places]
@@ -212,7 +203,6 @@ def _states(review: Review, groups: Iterable[Group]) -> dict[str, Any]:
 
 
 def _files_in(place: Path) -> list[tuple[str, int, int]]:
-    """Return path, time and size of each file below a folder."""
     found = []
     for folder, inner, names in os.walk(place):
         inner[:] = sorted({*inner} - _SKIPPED)

@@ -36,8 +36,7 @@ class Absent(MutatorError):
 
 @dataclass(frozen=True, slots=True)
 class Runs:
-    """Run folders below `roots`, each a run folder or a folder of run folders. A run's key is its folder's
-    name, followed by `-2`, `-3` and so on for repeated names."""
+    """Run folders below `roots`, by key: the folder's name, with `-2`, `-3` and so on for repeated names."""
 
     roots: tuple[Path, ...]
 
@@ -51,18 +50,15 @@ class Runs:
         return found
 
     def folder(self, key: str) -> Path:
-        """Return the run folder with this key; Absent if there is none."""
         with suppress(KeyError):
             return self.folders()[key]
         raise Absent(f"no run '{key}'", expected="one of the served runs", remedy="see the first page")
 
     def key_of(self, folder: Path) -> str | None:
-        """Return the key of a run folder; None if it is not served."""
         return next((key for key, path in self.folders().items() if path == folder.resolve()), None)
 
     @property
     def new(self) -> Path:
-        """Return the parent for new run folders: the first folder of runs."""
         return next((root for root in self.roots if not RunFolder.exists(root)), self.roots[0].parent)
 
 
@@ -78,7 +74,6 @@ def _runs_in(root: Path) -> list[Path]:
 
 
 def report_of(key: str) -> str:
-    """Return the address of a run's report."""
     return f"/runs/{quote(key, safe='')}/{REPORT}"
 
 
@@ -91,7 +86,6 @@ def _free(name: str, taken: Iterable[str]) -> str:
 
 
 def told(key: str, path: Path) -> dict[str, Any]:
-    """Summarise a run: campaign, target, progress, endings."""
     facts: dict[str, Any] = {"key": key, "campaign": "", "target": "", "planned": 0, "done": 0}
     facts |= {"report": report_of(key)}
     facts |= {"state": "damaged", "outcomes": {}, "problem": ""}
@@ -112,7 +106,7 @@ def told(key: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=1000)
 def _outcomes(run: Path, mtime_ns: int, size: int) -> dict[str, int]:
-    """Count how the experiments ended; the table is read again if it has changed."""
+    """Count how the experiments ended; `mtime_ns` and `size` tell whether the table has changed."""
     return outcome_counts(Results.of_run(run).texts())
 
 
@@ -134,7 +128,7 @@ def check_no_links(run: Path) -> None:
 
 
 def open_in_run(run: Path, name: str) -> int:
-    """Open a served file and return its descriptor; Absent for anything else."""
+    """Open a served file and return its descriptor; Absent otherwise."""
     folder, _, last = name.rpartition("/")
     if Path(last).suffix not in SERVED.get(folder, ()):
         raise _absent()

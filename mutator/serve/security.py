@@ -1,9 +1,8 @@
-"""Checks every request, and limits what a browser may do with a response.
+"""Check every request, and limit what a browser may do with a response.
 
-Other pages in the user's browser and other users of the machine can reach a port on the loopback interface.
-So each request needs the token, in a cookie that other sites cannot send. It must name this server, because a
-page whose host name resolves to this machine could otherwise read responses. It must not come from a page of
-another origin.
+Other pages in the user's browser and other users of the machine can reach a local port. So each request needs
+the token, in a cookie that other sites cannot send. It must name this server, because a page whose host name
+resolves to this machine could otherwise read responses. It must not come from a page of another origin.
 """
 
 import base64
@@ -28,14 +27,11 @@ _OWN_SITE = ("same-origin", "none")  # sent by browsers for their own pages and 
 
 
 class Guarded:
-    """An application behind these checks, on a local port."""
-
     def __init__(self, app: ASGIApp, *, port: int, token: str) -> None:
         self._app, self._token, self._cookie = app, token, f"mutator-{port}"
         self._hosts = (f"{HOST}:{port}", f"localhost:{port}")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request, or refuse it."""
         if scope["type"] == "lifespan":
             await self._app(scope, receive, send)
             return
@@ -53,7 +49,6 @@ class Guarded:
         await (answer or self._app)(scope, receive, send)
 
     def _refused(self, scope: Scope) -> Response | None:
-        """Return the response that refuses a request from elsewhere; None if the request may pass."""
         headers, method = Headers(scope=scope), scope["method"]
         origins = headers.getlist("origin")
         if method not in _METHODS:
@@ -69,7 +64,7 @@ class Guarded:
         return None
 
     def _entered(self, scope: Scope) -> Response | None:
-        """Return None if the cookie is valid; set it if the token is in the address, and redirect."""
+        """Return None if the cookie is valid; if the token is in the address, set the cookie and redirect."""
         query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
             if not all(self._is_token(given) for given in query["token"]):
@@ -98,7 +93,7 @@ def _refusal(why: str, status: int = 403) -> Response:
 
 
 async def _body(headers: Headers, receive: Receive) -> bytes | None:
-    """Read the body of a request; None if it is too long, whatever length was declared."""
+    """Read the body of a request; None if it is too long, whatever its declared length."""
     told = headers.get("content-length", "0")
     if not told.isascii() or not told.isdigit() or len(told) > 20 or int(told) > MOST_BYTES:
         return None
@@ -117,7 +112,6 @@ async def _body(headers: Headers, receive: Receive) -> bytes | None:
 
 
 def _replayed(body: bytes, receive: Receive) -> Receive:
-    """Return a receive function that yields a body already read, and then the rest."""
     messages: list[Message] = [{"type": "http.request", "body": body, "more_body": False}]
 
     async def replay() -> Message:
@@ -143,8 +137,7 @@ def _with_policy(send: Send) -> Send:
 
 @cache
 def policy() -> str:
-    """Return the policy for pages: they may only run code from `mutator.web`, as files or inline by hash.
-    Other code in a file of a run folder has no hash here."""
+    """Return the policy for pages: they may only run code from `mutator.web`, as files or inline by hash."""
     scripts = [_hash(f"\n{asset(name)}") for name in assets(".js")] + [_hash(f"\n{pages.script()}\n")]
     styles = [_hash(f"\n{asset(name)}") for name in assets(".css")] + [_hash(f"\n{pages.style()}")]
     return "; ".join(
@@ -165,7 +158,6 @@ def policy() -> str:
 
 @cache
 def assets(suffix: str) -> tuple[str, ...]:
-    """Return the files of `mutator.web` with this suffix."""
     return tuple(sorted(one.name for one in files("mutator.web").iterdir() if one.name.endswith(suffix)))
 
 

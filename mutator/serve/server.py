@@ -1,4 +1,4 @@
-"""The server: a socket on the loopback interface, and a token. When the server ends, it ends all jobs."""
+"""The server: a socket on the loopback interface, and a token."""
 
 import secrets
 import socket
@@ -12,7 +12,8 @@ from mutator.serve.security import HOST, Guarded
 
 
 def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
-    """Serve a site until the process is interrupted; `ready` is called with the address, including the token.
+    """Serve a site until the process is interrupted, then end all jobs; `ready` is called with the address
+    and token.
 
     `port` 0 means any free port. MutatorError for a port in use.
     """
@@ -28,7 +29,6 @@ def serve(site: Site, *, port: int, ready: Callable[[str], None]) -> None:
 
 
 def server_of(site: Site, *, port: int, token: str) -> uvicorn.Server:
-    """Return the server for a port, which answers only with the token."""
     config = uvicorn.Config(
         Guarded(application(site), port=port, token=token),
         access_log=False,  # the log would show the token

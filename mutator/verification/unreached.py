@@ -95,6 +95,6 @@ def _sentences(total: int, late: Counter[str], never: Counter[str]) -> Iterator[
     ):
         if counts:
             named = [f"{name}: {count}" for name, count in counts.most_common(_NAMED)]
-            more = [f"{len(counts) - _NAMED} more"] if len(counts) > _NAMED else []
+            more = [f"and {len(counts) - _NAMED} more"] if len(counts) > _NAMED else []
             count = f"{counts.total()} of {counted(total, 'experiment')}"
-            yield f"{what} {count}, whose faults are never active ({', '.join(named + more)})"
+            yield f"{what} {count}, which will therefore be not_activated ({', '.join(named + more)})"

@@ -20,8 +20,15 @@ def test_try_needs_no_campaign(cli: Cli, root: Path) -> None:
     assert answer.code == 0
     for wanted in ("sensor/silence/no_data", "t >= 2.0", "if not _fi.active", "verdict: "):
         assert wanted in answer.out
+    assert "method" not in answer.out
     [plot] = [line.removeprefix("plot: ") for line in answer.out.splitlines() if line.startswith("plot: ")]
     assert Path(plot).is_file()
+
+
+def test_try_says_whether_an_alert_came_before_the_hazard(cli: Cli, root: Path) -> None:
+    lane = cli("try", "sensor/lane", "-s", "A", "--value", "2.4", "--trigger", "1").out
+    assert "hazard H3" in lane
+    assert "no alert before the hazard" in lane.splitlines()
 
 
 def test_try_tells_of_hazards_without_the_fault(cli: Cli, root: Path) -> None:

@@ -136,7 +136,7 @@ def test_another_python_is_accepted_and_noted(
     assert sorted(by.values()) == ["CPython 3.11.7"] * 2 + ["CPython 3.12.1"] * 10
     for version, name in {version: name for name, version in by.items()}.items():  # one of each
         code, out, _ = cli("show", name, "--run", half, "--no-plot")
-        assert code == 0 and f"run with: {version}, " in out
+        assert code == 0 and f"recorded on: {version}, " in out
     assert cli("run", "small", "--out", half, "-n", "0")[0] == 0  # nothing is left to run
 
 
