@@ -127,7 +127,7 @@ def _splice(file: ParsedFile, span: tuple[int, int], edits: Sequence[Edit]) -> d
 
 
 def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) -> dict[str, Any]:
-    """Return a fault's status over its runs, its reason, and the runs that activated it or ended in a hazard."""
+    """Return a fault's status over its runs, its reason, and the runs that activated it or had a hazard."""
     known = {e: records[e.id] for e in experiments if e.id in records}
     of = {status: [r for r in known.values() if r.status is status] for status in Status}
     hazardous = [e for e, r in known.items() if r.hazards]

@@ -1,1 +1,1 @@
-"""A local server for reports, comparisons and reviews, with decisions and jobs. It needs the extra `serve`."""
+"""A local server for reports, comparisons and reviews, with decisions and jobs; needs the extra `serve`."""
