@@ -1,4 +1,4 @@
-"""The loop that mutator drives: a road of highway-env and IDMVehicle.act, one step at a time."""
+"""The closed loop: a car on a road of highway-env, controlled by IDMVehicle.act."""
 
 import numpy as np
 from highway_env.road.road import Road, RoadNetwork
@@ -14,7 +14,7 @@ class Drive(Run):
         self.road = Road(lanes, np_random=np.random.RandomState(seed))
         self.controller = IDMVehicle.create_random(self.road, speed=scenario["speed_mps"], lane_id=0)
         self.road.vehicles = [self.controller]
-        for i in range(scenario["others"]):  # each ahead of those that are there
+        for i in range(scenario["others"]):  # each ahead of the previous ones
             other = LinearVehicle.create_random(self.road, lane_id=i % scenario["lanes"], spacing=1.5)
             self.road.vehicles.append(other)
         self.slows_at_s = scenario["slows_at_s"]

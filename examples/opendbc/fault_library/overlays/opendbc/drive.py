@@ -1,4 +1,4 @@
-"""The loop that mutator drives: a car behind another, and a Toyota's CarInterface, one step at a time."""
+"""The closed loop: a car that follows another, controlled by opendbc's CarInterface."""
 
 from opendbc.can import CANPacker, CANParser
 from opendbc.car import structs
@@ -27,7 +27,7 @@ class Drive(Run):
         control.actuators.accel = 0.2 * (gap - 5 - 1.5 * seen.vEgo) + 0.8 * (self.lead - seen.vEgo)
         self.actuator.update([(now, self.controller.apply(control.as_reader(), now)[1])])
         command = self.actuator.vl["ACC_CONTROL"]["ACCEL_CMD"]
-        self.accel += (command - self.accel) * self.step_s / 0.3  # the engine takes its time
+        self.accel += (command - self.accel) * self.step_s / 0.3  # the engine's lag
         self.speed = max(0.0, self.speed + self.accel * self.step_s)
         self.lead = max(0.0, self.lead - self.brakes * self.step_s * (self.t > 5))
         self.gap += (self.lead - self.speed) * self.step_s
