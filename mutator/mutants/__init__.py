@@ -1,4 +1,1 @@
-"""From a fault to changed source: anchors, splicing, rendering, patches, and the probe's contract.
-
-This package does not run mutants and knows no campaigns.
-"""
+"""Turns a fault into changed source. This package does not run mutants and does not use campaigns."""

@@ -1,8 +1,4 @@
-"""Anchors: resolve a qualified function name and a statement to lines of a source file.
-
-A location resolves to exactly one statement that LibCST and `ast` see in the same place, or to an error that
-lists candidates.
-"""
+"""Resolves anchors: a function's qualified name and a statement, to lines of a source file."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
@@ -27,30 +23,27 @@ from mutator.targets.source_tree import SourceTree
 class Site:
     """A resolved anchor. The statement is on lines `first` to `last` (exclusive, from 0).
 
-    For `entry` there is no statement: `first == last`. `reindent` is the number of its lines that a guard may
-    indent: all, or only the first if a string spans lines. `names` are the names that the function uses.
+    For `entry` there is no statement, and `first == last`.
     """
 
     first: int
     last: int
     after: bool
     alone: bool
-    reindent: int
+    reindent: int  # lines that a guard may indent: all, or only the first if a string spans lines
     indent: bytes
-    names: frozenset[str]
+    names: frozenset[str]  # used in the function
 
 
 @dataclass(frozen=True)
 class ParsedFile:
-    """A Python file of the target: its lines, its functions, and the line before which an import may go."""
-
     path: str
     data: bytes
     lines: tuple[bytes, ...]
     encoding: str
     newline: bytes
     indent_unit: bytes
-    import_line: int
+    import_line: int  # an import may be inserted before it
     functions: Mapping[str, tuple[Function, ...]]
     places: frozenset[Place]  # according to `ast`
     expressions: Mapping[str, tuple[Expression, ...]]  # by function
@@ -61,19 +54,19 @@ class ParsedFile:
     _sites: dict[tuple[str, Anchor], Site] = field(default_factory=dict, repr=False, compare=False)
 
     def resolve_value(self, location: FaultLocation) -> Expression:
-        """The expression that `location` names; MutatorError with candidates unless there is exactly one."""
+        """Return the named expression; MutatorError with candidates unless exactly one matches."""
         functions = functions_named(self, location.function)
         known = self.expressions.get(plain_name(location.function), ())
         return choose_expression(known, location, self.where, functions[0].line)
 
     def resolve_fixed(self, location: FaultLocation) -> FixedValue:
-        """The constant or default that `location` names; MutatorError with candidates if there is none."""
+        """Return the named constant or default; MutatorError with candidates if there is none."""
         if location.function:
             functions_named(self, location.function)
         return choose_fixed(self.fixed, location, self.where)
 
     def span(self, location: FaultLocation) -> tuple[int, int]:
-        """The first line (from 0) of the statement or value at the location, and the line after its last."""
+        """Return the lines of the statement or value at the location, from 0, the last exclusive."""
         if location.anchor.kind in VALUE_ANCHORS:
             expression = self.resolve_value(location)
             return expression.start[0], expression.end[0] + 1
@@ -84,11 +77,11 @@ class ParsedFile:
         return site.first, site.last
 
     def outer_function(self, line: int) -> range | None:
-        """The lines of the outermost function that contains this line (from 0)."""
+        """Return the lines of the outermost function that contains this line (from 0)."""
         return next((lines for lines in self.outer if line in lines), None)
 
     def names(self, location: FaultLocation) -> frozenset[str]:
-        """The names used in the function that contains the location."""
+        """Return the names used in the function that contains the location."""
         if location.anchor.kind not in VALUE_ANCHORS:
             return self.resolve(location).names
         line = self.resolve_value(location).start[0]
@@ -96,7 +89,7 @@ class ParsedFile:
         return max(above, key=lambda one: one.line).names
 
     def resolve(self, location: FaultLocation) -> Site:
-        """The statement that `location` names; MutatorError with candidates unless there is exactly one."""
+        """Return the named statement; MutatorError with candidates unless exactly one matches."""
         key = (location.function, location.anchor)
         if key not in self._sites:
             self._sites[key] = _resolve(self, location)
@@ -104,7 +97,7 @@ class ParsedFile:
 
 
 def parsed(tree: SourceTree, path: str) -> ParsedFile:
-    """The file at `path`, parsed once; MutatorError if it is not a Python file of the target."""
+    """Parse the file, cached; MutatorError if it is not a Python file of the target."""
     return tree.derived(path, parse_file)
 
 
@@ -134,12 +127,12 @@ def parse_file(path: str, data: bytes, root: Path) -> ParsedFile:
 
 
 def plain_name(function: str) -> str:
-    """The qualified name of a function without `<locals>`, normalized as the compiler does."""
+    """Return a function's qualified name without `<locals>`, normalized as the compiler does."""
     return as_compiled(function.replace(".<locals>", ""))
 
 
 def functions_named(file: ParsedFile, function: str) -> tuple[Function, ...]:
-    """The functions with that qualified name; MutatorError that lists the known ones if there is none."""
+    """Return the functions with that qualified name; MutatorError with candidates if there is none."""
     name = plain_name(function)
     functions = file.functions.get(name)
     if not functions:
@@ -175,13 +168,11 @@ def _resolve(file: ParsedFile, location: FaultLocation) -> Site:
 
 
 def _inside(file: ParsedFile, first: int, names: frozenset[str]) -> Site:
-    """The site at the beginning of the block whose head binds the name."""
     indent = _indent(file.lines[first])
     return Site(first=first, last=first, after=True, alone=True, reindent=0, indent=indent, names=names)
 
 
 def _check_place(file: ParsedFile, place: Place | None) -> None:
-    """Raise MutatorError unless `ast` sees the anchored statement, or the function, in the same place."""
     if place is not None and place.in_bytes(file.lines, file.encoding) not in file.places:
         raise MutatorError(
             "LibCST and Python's own parser see this statement in different places",
@@ -210,10 +201,10 @@ def _entry(file: ParsedFile, location: FaultLocation, functions: tuple[Function,
     function = functions[(nth or 1) - 1]
     if function.entry is None:
         raise MutatorError(
-            f"function '{location.function}' has no line of its own to insert at",
+            f"function '{location.function}' has no line at which to insert",
             where=file.where,
             line=function.line + 1,
-            expected="a body on lines below its head, its docstring on lines of its own",
+            expected="a body below the `def` line, and nothing else on the docstring's lines",
             remedy="anchor somewhere else, or reformat the target",
         )
     _check_place(file, function.place)
@@ -236,7 +227,7 @@ def _choose(
     verb = anchor.kind.partition("_")[2]
     name = as_written(anchor.name)
     pairs = [(f, s) for f in functions for s in f.statements if name in s.names(verb)]
-    # heads of blocks count last, so that older numbers still select the same statements
+    # heads of blocks are numbered last, so that existing numbers still select the same statements
     hits = sorted(
         (pair for pair in pairs if pair[1].reason is None), key=lambda pair: pair[1].opens is not None
     )
@@ -254,9 +245,9 @@ def _no_single_hit(
     pairs: list[tuple[Function, Statement]],
     hits: list[tuple[Function, Statement]],
 ) -> MutatorError:
-    """The error about an ambiguous or missing anchor.
+    """Return the error about an ambiguous or missing anchor.
 
-    `pairs` are all matches of its name, `hits` those that are whole statements or heads of blocks.
+    `pairs` are all matches of the name, `hits` those that are whole statements or heads of blocks.
     """
     anchor = location.anchor
     verb = anchor.kind.partition("_")[2]
@@ -269,8 +260,8 @@ def _no_single_hit(
         line, expected = hits[0][1].first, "exactly one"
     elif pairs:
         statement = pairs[0][1]
-        got = f"{what} {place} is no statement of its own: {statement.reason}"
-        line, expected = statement.first, "a statement that does nothing else"
+        got = f"{what} {place} is not a separate statement: {statement.reason}"
+        line, expected = statement.first, "a separate statement"
         remedy = "anchor at another statement"
     else:
         got, line, expected = f"no {what} {place}", functions[0].line, _candidates(functions, verb)
@@ -295,16 +286,12 @@ def _candidates(functions: tuple[Function, ...], verb: str) -> str:
 
 
 def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> None:
-    """Raise MutatorError if no line can be inserted before or after the statement.
-
-    An example is a statement that shares its line with others.
-    """
     after = anchor.kind in (AnchorKind.AFTER_ASSIGN, AnchorKind.AFTER_CALL)
     reason = None
     if statement.opens is not None and not after:
         reason = "is the head of a block"
     elif statement.one_line_suite:
-        reason = "stands on the line of its `if`, `for` or `def`"
+        reason = "is on the line of its `if`, `for` or `def`"
     elif after and statement.is_return:
         reason = "returns, so nothing after it runs"
     elif after and not statement.last_in_line:
@@ -316,6 +303,6 @@ def _refuse_awkward(file: ParsedFile, anchor: Anchor, statement: Statement) -> N
             f"the anchored statement {reason}",
             where=file.where,
             line=statement.first + 1,
-            expected="a statement on lines of its own",
+            expected="a statement that shares no line with others",
             remedy="anchor at another statement, or reformat the target",
         )

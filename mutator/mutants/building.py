@@ -1,4 +1,4 @@
-"""Build mutants: turn a fault and a trigger into changed files, a patch and an id."""
+"""Builds mutants: turns a fault and a trigger into changed files, a patch and an id."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,28 +48,26 @@ class InvalidMutant(MutatorError):
 class Mutant:
     """A mutated tree, stored as its difference from the target.
 
-    Equal faults, triggers, targets and templates give equal ids. `files` maps paths relative to the root to
-    the full new content, including the probe.
+    The id depends only on fault, trigger, target and templates.
     """
 
     id: str
-    files: dict[str, bytes]
+    files: dict[str, bytes]  # full new content by path, including the probe
     patch: str  # git style, a/ and b/ prefixes; applies with `patch -p1` at the root
     tree_digest: str  # of the whole mutated tree
     injections: tuple[str, ...]  # the ids in tags and in the probe's report, in the fault's order
 
     @cached_property
     def patch_bytes(self) -> bytes:
-        """The patch as bytes, since sources need not be UTF-8."""
+        """The patch as bytes, because sources need not be UTF-8."""
         return self.patch.encode("utf-8", "surrogateescape")
 
 
 def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger) -> Mutant:
-    """Build the mutant of `manifest`'s tree with `fault` under `trigger`; without a fault, the null mutant.
+    """Build the mutant of `manifest`'s tree with `fault` under `trigger`, or the null mutant without a fault.
 
-    The null mutant contains only the probe and its observation. `fault.hold` overrides `trigger.hold`.
-    MutatorError if an anchor is missing or ambiguous (candidates are listed), InvalidMutant if the result
-    does not compile.
+    `fault.hold` overrides `trigger.hold`. MutatorError with candidates if an anchor is missing or ambiguous,
+    InvalidMutant if the result does not compile.
     """
     return _build(manifest, models, fault, trigger, _ReusingSplicer(manifest.tree))
 
@@ -77,7 +75,7 @@ def build(manifest: TargetManifest, models: FaultModels, fault: Fault | None, tr
 def build_directly(
     manifest: TargetManifest, models: FaultModels, fault: Fault | None, trigger: Trigger
 ) -> Mutant:
-    """Like `build`, but splices, compares and compiles every file; `build` must return the same bytes."""
+    """Like `build`, but splice and compile every file without reuse; `build` must return the same bytes."""
     return _build(manifest, models, fault, trigger, _Splicer())
 
 
@@ -111,7 +109,6 @@ def _build(
 def _edits(
     manifest: TargetManifest, models: FaultModels, injections: Sequence[Injection], ids: Sequence[str]
 ) -> dict[str, list[Edit]]:
-    """The edits by file: the observation first, then the injections in order."""
     edits: dict[str, list[Edit | ValueEdit]] = {manifest.observation.location.path: [_observation(manifest)]}
     for name, injection in zip(ids, injections, strict=True):
         check_location(manifest, injection.location)
@@ -141,7 +138,7 @@ def _probe(
         raise MutatorError(
             f"the target has a file {taken[0]}",
             where=manifest.root,
-            expected="that name free for the probe",
+            expected="no file of this name, which the probe needs",
             remedy="rename the target's file, or point the manifest at the original tree",
         )
     observation, step_s = manifest.observation, manifest.step_s
@@ -166,17 +163,14 @@ class _Splicer:
     """Splices and compiles every file. `ids` are the ids in the injected lines."""
 
     def check_probe(self, text: str, ids: Sequence[str], where: Path) -> None:
-        """Raise InvalidMutant unless the probe compiles."""
         _compile(text.encode(), where)
 
     def change(self, file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Change:
-        """The edited file; InvalidMutant unless it compiles and un-splices to the original."""
         change = self.spliced(file, edits)
         _compile(change.data, file.where)
         return change
 
     def spliced(self, file: ParsedFile, edits: Sequence[Edit]) -> Change:
-        """Return the edited file without compiling it; InvalidMutant unless it un-splices to the original."""
         pieces = apply_edits(file, edits)
         data = joined(pieces)
         if unsplice(data) != file.data:
@@ -189,7 +183,7 @@ class _Splicer:
 
 
 class _ReusingSplicer(_Splicer):
-    """Reuses a known change of a file if there is one; otherwise splices the file and keeps the change."""
+    """Reuses a known change of a file if possible; otherwise splices the file and keeps the change."""
 
     def __init__(self, tree: SourceTree) -> None:
         self._tree = tree
@@ -203,7 +197,7 @@ class _ReusingSplicer(_Splicer):
         key = reuse_key(file, edits, ids)
         if key in known:
             found = known[key]
-            if isinstance(found, Change):  # only now, since most changes of an expression occur once
+            if isinstance(found, Change):  # not earlier, because most changes of an expression occur once
                 found = known[key] = ReusableChange.of(found)
             return found.filled(inserted_lines(edits))
         if compile_changed(file, edits, key):
@@ -217,7 +211,6 @@ class _ReusingSplicer(_Splicer):
 
 
 def write_tree(manifest: TargetManifest, mutant: Mutant, dest: Path) -> None:
-    """Write the mutated tree (the manifest's files, so no bytecode) below `dest`."""
     for path, data in {**manifest.tree.files, **mutant.files}.items():
         place = dest / path
         place.parent.mkdir(parents=True, exist_ok=True)

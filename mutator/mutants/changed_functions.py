@@ -1,7 +1,4 @@
-"""Check whether a changed file compiles by compiling only its changed functions.
-
-The rest of the file is unchanged.
-"""
+"""Checks whether a changed file compiles by compiling only its changed functions."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -14,11 +11,10 @@ from mutator.mutants.splicing import Edit, Rank, apply_edits, in_order, joined
 
 
 def compile_changed(file: ParsedFile, edits: Iterable[Edit], key: ReuseKey) -> bool:
-    """Whether the file certainly compiles with these edits, and with all other edits of their key.
+    """Return whether the file certainly compiles with these edits and with all other edits of their key.
 
     True if the changed functions compile, both with these edits and with normalized ones, and the file
-    compiles with the import of the probe. False is inconclusive: for example, an edit may lie outside
-    functions.
+    compiles with the import of the probe. False is inconclusive.
     """
     as_they_are = in_order(edits)
     normalized = [
@@ -33,7 +29,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
     outside: list[Edit] = []
     for edit in edits:
         function = file.outer_function(edit.index - 1 if edit.rank is Rank.AFTER else edit.index)
-        if function is None or edit.rank is Rank.AFTER_WHOLE:  # the latter is between functions
+        if function is None or edit.rank is Rank.AFTER_WHOLE:  # AFTER_WHOLE is between functions
             outside.append(edit)
         else:
             functions[function].append(edit)
@@ -43,7 +39,7 @@ def _all_compile(file: ParsedFile, edits: Iterable[Edit]) -> bool:
 
 
 def _compile_with(file: ParsedFile, outside: tuple[Edit, ...]) -> bool:
-    """Whether the file compiles with edits outside functions, i.e. the probe's import; success is cached."""
+    """Return whether the file compiles with edits outside functions, such as the probe's import; cached."""
     if len(outside) > 1 or any(edit.index != file.import_line for edit in outside):
         return False
     if outside not in file.sound:

@@ -1,4 +1,4 @@
-"""Resolve an anchor to the one expression that it names."""
+"""Resolves an anchor to the one expression that it names."""
 
 import ast
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ _MOST = 12  # candidates listed in an error
 
 
 def as_written(name: str) -> str:
-    """The normalized text that anchors compare. Invalid text is returned unchanged."""
+    """Return the normalized text that anchors compare, or invalid text unchanged."""
     try:
         return ast.unparse(ast.parse(name.strip(), mode="eval"))
     except (SyntaxError, ValueError, RecursionError, MemoryError):
@@ -25,8 +25,7 @@ def choose_expression(
 ) -> Expression:
     """Choose from a function's expressions the one that the location's anchor names.
 
-    The function begins at `line` (from 0). MutatorError with candidates unless exactly one expression
-    matches.
+    The function begins at `line` (from 0). MutatorError with candidates unless exactly one matches.
     """
     anchor, kind = location.anchor, location.anchor.kind
     name = as_written(anchor.name)

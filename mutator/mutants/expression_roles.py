@@ -1,4 +1,4 @@
-"""List the expressions of a function and the role of each, using Python's parser."""
+"""Lists the expressions of a function and the role of each, using Python's parser."""
 
 import ast
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,9 +13,9 @@ _BLOCKS = ("body", "orelse", "finalbody")
 
 
 def source_of(node: ast.AST) -> str:
-    """The source of a node, or empty if `ast` cannot write it.
+    """Return the source of a node, or "" if `ast` cannot write it.
 
-    Examples are an int of thousands of digits, and an f-string that would need a backslash inside braces.
+    `ast` fails for ints of thousands of digits, and for f-strings with a backslash inside braces.
     """
     try:
         return ast.unparse(node)
@@ -42,7 +42,7 @@ def _of_scope(body: Iterable[ast.stmt], scope: tuple[str, ...], *, inside: bool)
 
 
 def blocks(statement: ast.stmt) -> Iterator[list[ast.stmt]]:
-    """The blocks of a statement: its body, alternatives, cases."""
+    """Yield the blocks of a statement: its body, alternatives, cases."""
     for name in _BLOCKS:
         yield getattr(statement, name, [])
     for part in (*getattr(statement, "handlers", ()), *getattr(statement, "cases", ())):
@@ -53,7 +53,6 @@ _Pairs = Iterator[tuple[ast.expr, tuple[Role, ...]]]
 
 
 def _of_statement(statement: ast.stmt) -> _Pairs:
-    """The expressions of one statement, without those of nested statements."""
     match statement:
         case ast.Assign(targets=targets, value=value):
             yield from _assigned(targets, value)
@@ -94,7 +93,7 @@ def _condition(test: ast.expr) -> _Pairs:
 
 
 def _in_target(target: ast.expr) -> _Pairs:
-    """The expressions evaluated to find an assignment's target, such as an index."""
+    """Yield the expressions evaluated to find an assignment's target, such as an index."""
     match target:
         case ast.Tuple(elts=elements) | ast.List(elts=elements):
             for element in elements:
@@ -109,7 +108,7 @@ def _in_target(target: ast.expr) -> _Pairs:
 
 
 def _base(node: ast.expr) -> _Pairs:
-    """The object of an attribute, item or method; plain names do not count as values."""
+    """Yield the object of an attribute, item or method. Plain names are skipped."""
     if isinstance(node, ast.Attribute):
         yield from _base(node.value)
     elif not isinstance(node, ast.Name):

@@ -1,8 +1,7 @@
-"""Expressions whose value can be changed in place, such as returned values, conditions and arguments.
+"""Finds expressions whose value can be changed in place, such as returned values and arguments.
 
-Python's parser finds them and their roles; an expression counts only if LibCST sees one in the same place.
-Expressions that begin or end on a line that cannot carry a tag are left out. Such a line ends inside a string
-or in a backslash.
+Python's parser finds them; LibCST must see an expression in the same place. Expressions are skipped if they
+begin or end on a line that cannot end in a tag, because it ends inside a string or in a backslash.
 """
 
 import ast
@@ -28,26 +27,24 @@ _ATOMS = ast.Name | ast.Attribute | ast.Call | ast.Subscript | ast.Constant | as
 class Expression:
     """An expression of a function, from `start` to before `end`.
 
-    `roles` are the anchors that match it, each with kind, name and `which`. The last is always VALUE, named
-    by the expression's text. `written` is its source on one line, in parentheses if an adjacent operator
-    could split it.
+    `roles` are the anchors that match it: kind, name, `which`. The last is always VALUE, named by the text.
     """
 
     function: str
     start: _Point
     end: _Point
     roles: tuple[Role, ...]
-    written: str
+    written: str  # source on one line, in parentheses if an adjacent operator could split it
     bare: bool  # an unparenthesized tuple or a `:=`; parentheses around it are not part of it
     node: ast.expr
 
     @property
     def text(self) -> str:
-        """Its name in anchors, independent of spacing and quotes."""
+        """The expression's name in anchors, independent of spacing and quotes."""
         return self.roles[-1][1]
 
     def answers(self, kind: AnchorKind, name: str, which: str | None) -> bool:
-        """Whether an anchor of this kind names it: an empty name or no `which` matches any."""
+        """Return whether an anchor matches. An empty name or no `which` matches any."""
         return any(
             kind is own and name in (called, "") and which in (place, None)
             for own, called, place in self.roles
@@ -64,7 +61,6 @@ def _grouped(found: Iterable[Expression]) -> dict[str, tuple[Expression, ...]]:
 def expressions_of(
     data: bytes, module: cst.Module, positions: Positions
 ) -> dict[str, tuple[Expression, ...]]:
-    """The changeable expressions of each function of a file, in source order."""
     encoding = module.encoding.removesuffix("-sig")
     lines = [line.decode(encoding) for line in data.splitlines(keepends=True)]
     tokens = list(tokenize.tokenize(io.BytesIO(data).readline))
@@ -103,7 +99,7 @@ def _expression(
 
 
 def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
-    """Where a node begins and ends: line and column in characters, from 0. `ast` counts bytes of UTF-8."""
+    """Return begin and end of a node: line and column in characters, from 0. `ast` counts UTF-8 bytes."""
     assert node.end_lineno is not None and node.end_col_offset is not None
 
     def point(line: int, column: int) -> _Point:
@@ -114,10 +110,7 @@ def _extent(lines: Sequence[str], node: ast.expr) -> tuple[_Point, _Point]:
 
 
 def _known_by(node: ast.expr) -> Iterator[ast.expr]:
-    """Yield the nodes that LibCST must also find.
-
-    For a tuple these are its elements, because LibCST ignores its parentheses.
-    """
+    """Yield the nodes that LibCST must also find: for a tuple its elements, without its parentheses."""
     if isinstance(node, ast.Tuple):
         for element in node.elts:
             yield from _known_by(element)
@@ -145,7 +138,7 @@ def _brackets(tokens: Iterable[tokenize.TokenInfo]) -> dict[_Point, _Point]:
 
 
 def _untaggable(data: bytes, tokens: Iterable[tokenize.TokenInfo]) -> frozenset[int]:
-    """The lines (from 0) that cannot end in a comment."""
+    """Return the lines (from 0) that cannot end in a comment."""
     found = {i for i, line in enumerate(data.splitlines()) if line.endswith(b"\\")}
     begun: list[int] = []  # lines where unfinished f-strings began
     for token in tokens:
@@ -162,9 +155,9 @@ NO_PARTS: dict[str, object] = {"left": None, "right": None, "called": None, "arg
 
 
 def parts_of(expression: Expression) -> dict[str, object]:
-    """The parts of an expression that templates may use; None or empty if it has no such part.
+    """Return the parts of an expression that templates may use, None or empty if missing.
 
-    These are the operands of an operator (`left`, `right`), a call's function (`called`) and its `arguments`.
+    `left` and `right` are operands, `called` is a call's function.
     """
     node, left, right = expression.node, None, None
     if isinstance(node, ast.BinOp):
@@ -183,7 +176,7 @@ def parts_of(expression: Expression) -> dict[str, object]:
 
 
 def enclosed(text: str) -> str:
-    """The source of an expression, in parentheses if an adjacent operator could split it."""
+    """Return the source of an expression, in parentheses if an adjacent operator could split it."""
     return text if isinstance(ast.parse(text, mode="eval").body, _ATOMS) else f"({text})"
 
 

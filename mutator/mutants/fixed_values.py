@@ -1,8 +1,8 @@
-"""Fixed values: constants of modules and classes, and defaults of parameters.
+"""Finds fixed values: constants of modules and classes, and defaults of parameters.
 
-The program computes them once, when a module is loaded and no fault is active. So the probe sets them while
-the fault is active, and restores them afterwards. A tagged line after the statement passes their location to
-the probe.
+The program computes them once, when it loads the module and no fault is active. So the probe sets them while
+the fault is active, and restores them afterwards. A tagged line after the statement tells the probe where
+they are.
 """
 
 import ast
@@ -27,28 +27,23 @@ _Owner = ast.stmt | None
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FixedValue:
-    """A constant or a default: `name` is `LIMIT` or `Class.LIMIT`, or the parameter of `function`.
-
-    It is on the lines `first` to `last` (exclusive, from 0). Its tagged line goes before line `index`, with
-    the indentation `indent`. `path` is the dotted path from the module to the constant or, through its
-    function, to the parameter, in the compiler's spelling. `reason` says why the value cannot be set.
-    """
+    """A constant or a default, on lines `first` to `last` (exclusive, from 0)."""
 
     kind: AnchorKind
     function: str
-    name: str
+    name: str  # `LIMIT`, `Class.LIMIT` or a parameter of `function`
     first: int
     last: int
-    index: int
+    index: int  # the tagged line goes before this line, indented by `indent`
     indent: bytes
-    path: str
-    reason: str | None = None
+    path: str  # dotted path from the module, in the compiler's spelling
+    reason: str | None = None  # why the value cannot be set
 
 
 def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
-    """All fixed values of a file, in source order.
+    """Return all fixed values of a file, in source order.
 
-    A constant that is assigned several times is represented by its last assignment.
+    Of several assignments of one constant, the last is used.
     """
     found: dict[tuple[AnchorKind, str, str], tuple[FixedValue, _Owner]] = {}
     for one, owner in _Finder(data).of_body(tree.body, ()):
@@ -68,7 +63,7 @@ def find_fixed(data: bytes, tree: ast.Module) -> tuple[FixedValue, ...]:
 
 
 def parameters(arguments: ast.arguments) -> Iterator[tuple[str, ast.expr]]:
-    """The parameters of a function that have a default, each with its default."""
+    """Yield the parameters that have a default, each with its default."""
     places = [*arguments.posonlyargs, *arguments.args]
     with_default = places[len(places) - len(arguments.defaults) :]
     for argument, value in zip(with_default, arguments.defaults, strict=True):
@@ -89,7 +84,6 @@ class _Finder:
     def of_body(
         self, body: Sequence[ast.stmt], scope: _Scope, around: ast.stmt | None = None
     ) -> Iterator[tuple[FixedValue, _Owner]]:
-        """Yield the values in statements of a module or class; `around` is the outermost statement."""
         for statement in body:
             whole = around or statement
             match statement:
@@ -148,7 +142,6 @@ class _Finder:
             )
 
     def place(self, whole: ast.stmt) -> tuple[int, bytes]:
-        """The index where a line after a statement is inserted, and its indentation."""
         line = self.lines[min(one.lineno for one in (whole, *getattr(whole, "decorator_list", ()))) - 1]
         end = self.ends[bisect_left(self.ends, whole.end_lineno or 0)]
         return end, line[: len(line) - len(line.lstrip(b" \t\f"))]
@@ -170,7 +163,7 @@ def _of(scope: _Scope) -> Iterator[str]:
 
 
 def _path(scope: _Scope, *names: str) -> str:
-    """The dotted path from the module; private names of a class are spelled as the compiler spells them."""
+    """Return the dotted path from the module, with private names spelled as the compiler spells them."""
     path, private = list[str](), ""
     for name in (*_of(scope), *names):
         hidden = private and name.startswith("__") and not name.endswith("__")
@@ -181,22 +174,21 @@ def _path(scope: _Scope, *names: str) -> str:
 
 
 def _not_a_constant(owner: ast.ClassDef, value: ast.expr) -> str | None:
-    """Why an assignment in a class is not a constant."""
     for base in owner.bases:
         name = ast.unparse(base)
         if name.endswith(_MADE_OTHERWISE):
-            return f"its class is made by {name}, which does not let it be set"
+            return f"its class derives from {name}, which prevents it from being set"
     if isinstance(value, ast.Call) and ast.unparse(value.func).endswith("field"):
         given = {keyword.arg for keyword in value.keywords}
         if "default_factory" in given or not ({"default", None} & given or value.args):
-            return "the field has no default that is made once"
+            return "the field has no default that is computed once"
     return None
 
 
 def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Path) -> FixedValue:
-    """The constant or default that the location names.
+    """Return the constant or default that the location names.
 
-    MutatorError if there is none (candidates are listed), or if it cannot be set.
+    MutatorError with candidates if there is none, or if it cannot be set.
     """
     kind, name = location.anchor.kind, as_compiled(location.anchor.name)
     function = as_compiled(location.function)
@@ -218,7 +210,7 @@ def choose_fixed(known: Sequence[FixedValue], location: FaultLocation, where: Pa
             f"the {what} cannot be set: {found.reason}",
             where=where,
             line=found.first + 1,
-            expected="a value that is made once, when the module is loaded",
+            expected="a value that is computed once, when the module is loaded",
             remedy="anchor where the value is used",
         )
     return found

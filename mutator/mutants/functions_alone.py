@@ -1,4 +1,4 @@
-"""Compile functions alone, to check a change without compiling its file."""
+"""Compiles functions alone, to check a change without compiling its file."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -6,7 +6,7 @@ from types import CodeType
 
 
 def outer_functions(tree: ast.AST) -> Iterator[range]:
-    """The lines (from 0) of each outermost function, including decorators."""
+    """Yield the lines (from 0) of each outermost function, including decorators."""
     for node in ast.iter_child_nodes(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             first = min(one.lineno for one in (node, *node.decorator_list)) - 1
@@ -16,10 +16,9 @@ def outer_functions(tree: ast.AST) -> Iterator[range]:
 
 
 def compiled_alone(lines: Sequence[bytes], encoding: str) -> CodeType | None:
-    """The code of a module with only these lines of a function; None if they do not compile.
+    """Return the code of a module with only these lines of a function, or None if they do not compile.
 
-    An outermost function compiles alone if and only if it compiles in its file, because it uses no names of
-    an enclosing function.
+    An outermost function compiles alone if and only if it compiles in its file.
     """
     text = b"".join(lines).decode(encoding).removeprefix("\ufeff")  # a byte order mark
     indented = text[:1] in (" ", "\t", "\f")

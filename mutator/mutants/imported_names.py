@@ -1,4 +1,4 @@
-"""Find modules that import a constant by name, because the constant must be set there, too."""
+"""Finds modules that import a constant by name, because the constant must be set there, too."""
 
 import ast
 from collections import Counter
@@ -17,19 +17,17 @@ _ALL = "*"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Import:
-    """`from module import name as known`, on a line (from 1), in a module or (`inside`) in a class of it."""
+    """`from module import name as known`, on a line (from 1)."""
 
     module: str
     name: str
     known: str
     line: int
-    inside: bool
+    inside: bool  # inside a class
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Imports:
-    """What a file imports by name, and which names it also sets in other ways."""
-
     path: str
     module: str
     names: tuple[_Import, ...]
@@ -38,10 +36,10 @@ class _Imports:
 
 
 def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
-    """Return `module.NAME` for each other place that imports the constant `name` of the module at `path`.
+    """Return `module.NAME` for each place that imports the constant `name` of the module at `path`.
 
-    MutatorError that lists the places where it cannot be set: star imports, imports into a class, and modules
-    that also set the name in another way.
+    MutatorError with the places where it cannot be set: star imports, imports into a class, and modules that
+    set the name in another way, too.
     """
     files = [tree.derived(file, _imports) for file in tree.files if file.endswith(".py")]
     exported = {file.module: file.exported for file in files}
@@ -60,14 +58,14 @@ def importers(tree: SourceTree, path: str, name: str) -> tuple[str, ...]:
         raise MutatorError(
             f"the constant '{name}' cannot be set everywhere: {'; '.join(sorted(refused))}",
             where=tree.root / path,
-            expected="modules that import it by its name, and leave that alone",
+            expected="modules that import it by name and never assign to the name",
             remedy="anchor where the constant is used",
         )
     return tuple(".".join(one) for one in found[1:])
 
 
 def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] | None) -> str | None:
-    """Why an import prevents setting the constant; `exported` lists the names that `*` imports, if known."""
+    """Return why an import prevents setting the constant. `*` imports `exported`, if known."""
     if one.name == _ALL:
         meant = not name.startswith("_") if exported is None else name in exported
         return "imports *" if meant else None
@@ -77,7 +75,6 @@ def _refused(one: _Import, file: _Imports, name: str, exported: frozenset[str] |
 
 
 def module_name(path: str) -> str:
-    """The dotted name of the module at a path of the tree."""
     return path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
@@ -100,7 +97,7 @@ def _imports(path: str, data: bytes, root: Path) -> _Imports:
 
 
 def _exported(tree: ast.Module) -> frozenset[str] | None:
-    """The names in `__all__`, if it is assigned once, with literal texts."""
+    """Return the names in `__all__`, if it is assigned once, with literal texts."""
     made = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "__all__"]
     for node in tree.body:
         if (
@@ -114,7 +111,7 @@ def _exported(tree: ast.Module) -> frozenset[str] | None:
 
 
 def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_Import]:
-    """Imports of a module or its classes; imports in functions hold for one call only."""
+    """Yield imports of a module or its classes. Imports in functions last for one call only."""
     for statement in body:
         match statement:
             case ast.ImportFrom(module=module, names=names, level=level, lineno=line):
@@ -132,5 +129,5 @@ def _of_body(body: Iterable[ast.stmt], path: str, *, inside: bool) -> Iterator[_
 
 
 def _package(path: str, level: int) -> str:
-    """The package where a relative import of this level starts; empty for an absolute one."""
+    """Return the package where a relative import of this level starts; empty for an absolute one."""
     return ".".join(path.split("/")[:-level]) if level else ""

@@ -50,17 +50,12 @@ _SETTING = re.compile(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tag:
-    """The tag at the end of an injected line: the injection's id, IMPORT_TAG or OBSERVE_TAG.
+    """The tag at the end of an injected line."""
 
-    If several injections change values in the line, `id` contains their ids, joined with `+`. `guarded` is
-    the number of lines that a guard indents, else 0. `code` is the line without its tag. `was` is the line of
-    the target that this line replaces, or None for an inserted line.
-    """
-
-    id: str
-    guarded: int
-    code: bytes
-    was: bytes | None = None
+    id: str  # of the injection, IMPORT_TAG or OBSERVE_TAG; several ids are joined with `+`
+    guarded: int  # lines that a guard indents
+    code: bytes  # the line without the tag
+    was: bytes | None = None  # the target's line that this line replaces
 
     @property
     def of_fault(self) -> bool:
@@ -69,35 +64,32 @@ class Tag:
 
     @property
     def asks_probe(self) -> bool:
-        """Whether the line opens a block that runs only if the probe says so."""
+        """Whether the line opens a block that the probe's answer guards."""
         return _GUARD.match(self.code) is not None
 
     @property
     def ids(self) -> list[str]:
-        """The ids of its injections."""
         return self.id.split("+")
 
     @property
     def opens_original(self) -> bool:
-        """Whether it is the `else:` under which a guard keeps the target's statements."""
+        """Whether the line is the `else:` under which a guard keeps the target's statements."""
         return self.guarded > 0 and self.code.strip() == b"else:"
 
     @property
     def asked_for(self) -> list[str]:
-        """The ids of the injections that a changed line asks the probe about."""
+        """The injections about which a changed line asks the probe."""
         return [found["id"].decode() for found in _ASKED.finditer(self.code)]
 
     @property
     def sets(self) -> bool:
-        """Whether the line makes the probe set a value while the fault is active."""
         return _SETS.match(self.code) is not None
 
 
 def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
-    """Yield the place of each changed value and instance check in a file.
+    """Yield injection id, line, start and end column of each changed value and instance check in a file.
 
-    Each is an injection's id, a line, and a start and end column. Lines count from 1, columns in bytes of
-    UTF-8, as in tracebacks.
+    Lines count from 1, columns in bytes of UTF-8, as in tracebacks.
     """
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.IfExp):
@@ -110,7 +102,7 @@ def changed_parts(source: bytes) -> Iterator[tuple[str, int, int, int]]:
 
 
 def tag_of(line: bytes) -> Tag | None:
-    """The tag of a line, with or without its line end; None for a line of the target."""
+    """Return the tag of a line, with or without its line end; None for a line of the target."""
     if _MARK_BYTES not in line:
         return None
     match = _TAG_OF_LINE.search(line)
@@ -121,22 +113,21 @@ def tag_of(line: bytes) -> Tag | None:
 
 
 def tagged(code: str, tag: str, guarded: int = 0) -> str:
-    """`code` with its tag; every line of a guard has the number of lines that it guards."""
+    """Add a tag to `code`. Every line of a guard has the number of lines that it guards."""
     return f"{code}  {_MARK}{tag}" + (f" guard:{guarded}" if guarded else "")
 
 
 def tag_instead(ids: Iterable[str], was: bytes) -> bytes:
-    """The tag of a line that replaces the target's line `was`."""
     return f"  {_MARK}{'+'.join(ids)} was:".encode() + was
 
 
 def asks(tag: str) -> str:
-    """The source of the call that asks the probe whether the injection acts."""
+    """Return the call that asks the probe whether the injection is active."""
     return f'{PROBE_NAME}.active("{tag}")'
 
 
 def asks_for(tag: str, injection: Injection) -> str:
-    """The condition under which an injection acts, including its limits to an instance or to executions.
+    """Return the condition under which an injection is active, with its limits to instances or executions.
 
     The limits are checked only while the fault is active.
     """
@@ -148,51 +139,45 @@ def asks_for(tag: str, injection: Injection) -> str:
 
 
 def changed_value(asked: str, changed: str) -> str:
-    """The source to put before an expression so that its value becomes `changed`.
+    """Return the source to put before an expression so that its value becomes `changed`.
 
-    `asked` is the source of the question to the probe, which decides whether to change the value.
+    `asked` is the call that asks the probe whether to change the value.
     """
     return f"({changed} if {asked} else "
 
 
 def set_constant(tag: str, path: str, changed: str, imported: Iterable[str]) -> str:
-    """The line that makes the probe set the constant at `path` in its module (`Class.NAME` in a class).
+    """Return the line that makes the probe set the constant at `path` in its module.
 
-    `imported` lists imports of the constant in other modules. `changed` is the new value, computed from
-    `original`.
+    `imported`: imports of the constant in other modules.
     """
     more = "".join(f', "{name}"' for name in imported)
     return f'{PROBE_NAME}.constant("{tag}", globals(), "{path}", lambda {ORIGINAL}: {changed}{more})'
 
 
 def set_default(tag: str, function: str, parameter: str, changed: str) -> str:
-    """The line that makes the probe set the default of a parameter."""
     where = f'globals(), "{function}", "{parameter}"'
     return f'{PROBE_NAME}.default("{tag}", {where}, lambda {ORIGINAL}: {changed})'
 
 
 def sets_values(data: bytes) -> bool:
-    """Whether a file may contain lines that make the probe set values; most files contain none."""
     return any(f"{PROBE_NAME}.{call}(".encode() in data for call in ("constant", "default"))
 
 
 def tag_words() -> dict[str, Any]:
-    """What a page needs to find injected lines: the mark before a tag, the tags of the probe's own lines."""
     return {"mark": _MARK, "probe": [IMPORT_TAG, OBSERVE_TAG]}
 
 
 def import_statement(package: str | None) -> str:
-    """The tagged line that imports the probe."""
     return tagged(f"from {package} import {PROBE_NAME}" if package else f"import {PROBE_NAME}", IMPORT_TAG)
 
 
 def observe_call(expressions: Sequence[tuple[str, str]]) -> str:
-    """The call that passes the ground truth to the probe: each observed value's name and expression."""
     return f"{PROBE_NAME}.observe({', '.join(f'{name}={text}' for name, text in expressions)})"
 
 
 def instrumented_line(data: bytes) -> int | None:
-    """Index of a line with a tag, or else with the probe's name; None if the file has neither."""
+    """Return the index of a line with a tag, or else with the probe's name; None if there is neither."""
     if _MARK.encode() in data:
         for index, line in enumerate(data.splitlines(keepends=True)):
             if tag_of(line):
@@ -205,25 +190,24 @@ def instrumented_line(data: bytes) -> int | None:
 
 
 def tagged_additions(patch: str, begin: int, end: int) -> Iterator[tuple[int, int]]:
-    """Begin and end of each tagged line that the patch adds between `begin` and `end`, without its `+`."""
+    """Yield begin and end of each tagged line that the patch adds between `begin` and `end`, without `+`."""
     for line in _TAGGED_ADDITION.finditer(patch, begin, end):
         yield line.start() + 1, line.end()
 
 
 def adds_fault(hunk: str) -> bool:
-    """Whether a hunk adds a line that belongs to a fault."""
     return _FAULT_ADDITION.search(hunk) is not None
 
 
 def settings(patch: str, begin: int, end: int) -> Iterator[tuple[int, int, str]]:
-    """Begin, end and name of each setting that differs between probes, in the patch that adds a probe."""
+    """Yield begin, end and name of each setting that differs between probes."""
     for match in _SETTING.finditer(patch, begin, _end_of_settings(patch, begin, end)):
         name = match.lastgroup or ""
         yield *match.span(name), name
 
 
 def _end_of_settings(patch: str, begin: int, end: int) -> int:
-    """The end of the trigger's condition. The rest of a probe is long and always the same."""
+    """Return the end of the trigger's condition. The rest of a probe is long and always the same."""
     condition = patch.find("\n+def _condition(", begin, end)
     line = patch.find("\n+    return ", condition, end) if condition >= 0 else -1
     return end if line < 0 else patch.find("\n", line + 1, end) + 1 or end

@@ -1,4 +1,4 @@
-"""Create the edit of one injection: resolve the anchor, render the snippet, protect the target's names."""
+"""Creates the edit of one injection: resolves the anchor, renders the snippet, checks names."""
 
 import ast
 from collections.abc import Iterator, Sequence
@@ -36,11 +36,10 @@ def injection_edit(
     name: str,
     tree: SourceTree | None = None,
 ) -> Edit | ValueEdit:
-    """The edit of one injection in its file; `name` tags its lines.
+    """Return the edit of one injection in its file, tagged with `name`.
 
-    `tree` has the files that may import a constant (None: there are none). MutatorError for a missing anchor,
-    a name unknown in the function, and lines that would change what the target's names mean while the fault
-    is inactive.
+    `tree` has the files that may import a constant. MutatorError for a missing anchor, a name unknown in the
+    function, and lines that would change what the target's names mean while the fault is inactive.
     """
     model = models.get(injection.model)
     if injection.location.anchor.kind in VALUE_ANCHORS:
@@ -69,7 +68,7 @@ def injection_edit(
 def replaced_value(
     file: ParsedFile, model: FaultModel, injection: Injection, name: str
 ) -> tuple[Expression, str]:
-    """The expression whose value an injection changes, and the source that replaces it."""
+    """Return the expression whose value an injection changes, and the source that replaces it."""
     expression = file.resolve_value(injection.location)
     params, parts = dict(injection.params), parts_of(expression)
     if model.needs is Needs.CALL and not parts["called"]:
@@ -87,7 +86,6 @@ def _value_edit(file: ParsedFile, model: FaultModel, injection: Injection, name:
 
 
 def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Expression, changed: str) -> None:
-    """Raise MutatorError if the changed value binds a name that the expression itself does not."""
     new = (
         _set_within(ast.parse(changed, mode="eval")) - _set_within(expression.node) if ":=" in changed else ()
     )
@@ -102,7 +100,6 @@ def _check_sets_nothing(file: ParsedFile, model: FaultModel, expression: Express
 
 
 def _set_within(node: ast.AST) -> set[str]:
-    """The names that an expression binds by `:=`, which belong to the function."""
     return {one.target.id for one in ast.walk(node) if isinstance(one, ast.NamedExpr)}
 
 
@@ -118,7 +115,7 @@ def _needs_more(file: ParsedFile, model: FaultModel, line: int) -> MutatorError:
         where=file.where,
         line=line + 1,
         expected=wanted[model.needs],
-        remedy="anchor elsewhere, or take another model",
+        remedy="anchor elsewhere, or use another model",
     )
 
 
@@ -151,7 +148,6 @@ def _setting(
 def _variables(
     file: ParsedFile, names: frozenset[str], first: int, model: FaultModel, injection: Injection
 ) -> frozenset[str]:
-    """The variables passed to the template; MutatorError for one unknown in the function."""
     params = dict(injection.params)
     found = set()
     for param in model.params:
@@ -173,7 +169,6 @@ def _variables(
 def _check_own_names(
     file: ParsedFile, site: Site, model: FaultModel, code: Sequence[str], variables: frozenset[str]
 ) -> None:
-    """Raise MutatorError if the snippet binds a name of the function that is not one of its parameters."""
     block = [*code, "    pass"] if model.kind is SnippetKind.GUARD else code
     taken = ({as_compiled(name) for name in _bound("\n".join(block))} - variables) & site.names
     if taken:
@@ -187,7 +182,7 @@ def _check_own_names(
 
 
 def _bound(code: str) -> Iterator[str]:
-    """The names that code binds or deletes, including those inside comprehensions and functions."""
+    """Yield the names that code binds or deletes, including those inside comprehensions and functions."""
     for node in ast.walk(ast.parse(code)):
         match node:
             case ast.Name(id=name, ctx=ast.Store() | ast.Del()):
@@ -203,7 +198,6 @@ def _bound(code: str) -> Iterator[str]:
 
 
 def _check_scopes(file: ParsedFile, site: Site, edit: Edit) -> None:
-    """Raise MutatorError if the edit alone changes what a name means anywhere in the file."""
     inserted = range(edit.index + 1, edit.index + 1 + len(edit.lines))
     try:
         moved = next(moved_names(file.data, joined(apply_edits(file, [edit])), inserted), None)

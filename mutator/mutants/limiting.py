@@ -1,4 +1,4 @@
-"""Limit injections to one instance or to some executions by adding a check before the probe's own check."""
+"""Limits injections to one instance or to some executions by adding a check before the probe's own check."""
 
 from mutator.config.instances import names_of
 from mutator.errors import MutatorError
@@ -9,7 +9,6 @@ from mutator.mutants.injected_lines import asks, asks_for
 
 
 def check_instance(file: ParsedFile, names: frozenset[str], first: int, injection: Injection) -> None:
-    """Raise MutatorError if `where` uses a name that is unknown in the function."""
     unknown = names_of(injection.where or "True") - names
     if unknown:
         raise MutatorError(
@@ -22,10 +21,7 @@ def check_instance(file: ParsedFile, names: frozenset[str], first: int, injectio
 
 
 def limited(code: tuple[str, ...], injection: Injection, name: str, model: FaultModel) -> tuple[str, ...]:
-    """The snippet with a check for the instance or executions that the injection selects.
-
-    If it selects none, the snippet is unchanged.
-    """
+    """Add a check for the instance or executions that the injection selects, if any, to the snippet."""
     plain, asked = asks(name), asks_for(name, injection)
     if asked == plain:
         return code

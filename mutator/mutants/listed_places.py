@@ -1,6 +1,4 @@
-"""List every place of a file where a fault can be injected, in spec syntax, with the fault models for
-each.
-"""
+"""Lists every place of a file where a fault can be injected, with the fault models that fit."""
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -25,23 +23,22 @@ _VERBS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ListedPlace:
-    """A place: its line (from 1), the location, and the names of the fault models that work there."""
+    """A place where a fault can be injected, with the names of the fault models that fit."""
 
-    line: int
+    line: int  # from 1
     location: FaultLocation
     models: tuple[str, ...]
 
     @property
     def at(self) -> dict[str, Any]:
-        """The value of `at` in a spec."""
         return as_written_at(self.location)
 
 
 def places_of(file: ParsedFile, models: FaultModels, function: str | None = None) -> list[ListedPlace]:
-    """All places of a file or function, in order: statements and the expressions in them.
+    """Return all places of a file or function, in order.
 
     A statement is listed under each name that it assigns or calls, an expression under its most specific
-    anchor. MutatorError, which lists the file's functions, if it has no function of this name.
+    anchor. MutatorError with the file's functions if `function` is not one of them.
     """
     lister = _Lister(file, [model for model in models if not model.name.startswith(_OF_OPERATORS)])
     names = tuple(file.functions)
@@ -59,7 +56,6 @@ class _Lister:
         self.models = models
 
     def of_function(self, name: str) -> Iterator[ListedPlace]:
-        """Places of the functions of this name."""
         functions = self.file.functions[name]
         for i, function in enumerate(functions):
             if function.entry is not None:
@@ -91,7 +87,6 @@ class _Lister:
             )
 
     def fits(self, model: FaultModel, kind: AnchorKind, site: Site) -> bool:
-        """Whether a model works at a statement."""
         if model.needs is Needs.CALL or (
             model.kind is SnippetKind.VALUE and kind is not AnchorKind.AFTER_ASSIGN
         ):
@@ -131,12 +126,12 @@ class _Lister:
 
 
 def writable(name: str) -> bool:
-    """Whether a spec can use this name of a statement. `None`, as in `return None`, is not a name."""
+    """Return whether a spec can use this name of a statement. `None`, as in `return None`, is not a name."""
     return not name or dotted_name(name) or assignable(name)
 
 
 def changes(model: FaultModel, expression: Expression | None) -> bool:
-    """Whether a model can change this expression or, for None, a constant or default."""
+    """Return whether a model can change this expression or, for None, a constant or default."""
     if model.expression is None:
         return False
     parts = parts_of(expression) if expression else NO_PARTS

@@ -1,12 +1,11 @@
-"""Normalize numbers and ids in source, so that one compilation covers many mutants.
+"""Normalizes numbers and ids in source, so that one compilation covers many mutants.
 
-Compiling a file takes milliseconds, and mutants of one kind differ only in the digits of their numbers and in
-their ids. If the normalized source compiles, so does every source that normalizes to it:
+Mutants of one kind differ only in the digits of their numbers and in their ids. If the normalized source
+compiles, so does every source that normalizes to it:
 
 * A number becomes 0, or 0.0 if it has a point or an exponent. Only whole literals as `repr` writes them are
-  replaced, up to a length that Python always accepts. So the kind of each token stays the same, and the
-  compiler rarely checks more. Where it does (a mapping pattern must not repeat a key), equal numbers are the
-  worst case.
+  replaced, up to a length that Python always accepts. So every token keeps its kind. Where the compiler
+  compares values (a mapping pattern must not repeat a key), equal numbers are the worst case.
 * An id (hex digits) becomes one that is neither a token alone (`0f...`) nor a character (`\\U0f...`). So
   normalized source compiles only if its ids are in strings, comments or names, where any id compiles.
   Equal ids stay equal, and different ids stay different.
@@ -16,14 +15,13 @@ import re
 from collections.abc import Iterable
 from functools import lru_cache
 
-_PART = r"[\w.\\\x80-\U0010ffff]"  # next to a number that continues, or belongs to a name or an escape
-_NUMBER = re.compile(  # the digit comes first because searching for it is fast; the lookbehind follows
+_PART = r"[\w.\\\x80-\U0010ffff]"  # next to these, digits are part of a longer token
+_NUMBER = re.compile(  # the digit precedes the lookbehind because searching for it is fast
     rf"[0-9](?<!{_PART}[0-9])(?:(?<!0)[0-9]{{1,19}})?((?:\.[0-9]{{1,20}})?(?:e[+-]?[0-9]{{1,3}})?)(?!{_PART})"
 )
 
 
 def normalized(text: str, ids: Iterable[str]) -> str:
-    """`text` with its numbers and `ids` replaced."""
     for i, name in enumerate(ids):
         text = text.replace(name, f"0f0f{i:04x}")
     return _NUMBER.sub(_zero, text)
@@ -35,7 +33,7 @@ def _zero(number: re.Match[str]) -> str:
 
 @lru_cache(maxsize=256)
 def compiles(text: bytes) -> bool:
-    """Whether normalized source compiles, and with it every source that normalizes to it."""
+    """Return whether normalized source, and so every source that normalizes to it, compiles."""
     try:
         compile(text, "<normalized>", "exec", dont_inherit=True)
     except (SyntaxError, ValueError, RecursionError):

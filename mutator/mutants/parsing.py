@@ -1,4 +1,4 @@
-"""Parse a source file with both Python and LibCST, and refuse it if they disagree."""
+"""Parses a source file with both Python and LibCST, and refuses it if they disagree."""
 
 import ast
 import re
@@ -18,7 +18,6 @@ _LONE_CR = re.compile(rb"\r(?!\n)")
 
 
 def refuse_unfit(data: bytes, where: Path) -> None:
-    """Raise MutatorError for unsupported line ends, and for a file with injected lines."""
     if found := _LONE_CR.search(data):
         raise MutatorError(
             "line ends of CR alone",
@@ -34,12 +33,11 @@ def refuse_unfit(data: bytes, where: Path) -> None:
             where=where,
             line=line + 1,
             expected="a tree without injected lines",
-            remedy="point the manifest at the original tree, or rename it in the target",
+            remedy="point the manifest at the original tree, or rename the name in the target",
         )
 
 
 def python_tree(data: bytes, where: Path) -> ast.Module:
-    """Parse the file with `ast`; MutatorError unless it compiles."""
     try:
         compile(data, str(where), "exec", dont_inherit=True)
         return ast.parse(data)
@@ -65,8 +63,8 @@ def reading(where: Path) -> Iterator[None]:
             f"LibCST cannot read it: {message}",
             where=where,
             line=line,
-            expected="Python that LibCST reads, not nested too deeply",
-            remedy="write it in another way, or inject into another file",
+            expected="Python that LibCST can parse, not nested too deeply",
+            remedy="rewrite it, or inject into another file",
         ) from None
 
 
@@ -79,17 +77,17 @@ def libcst_module(data: bytes, where: Path) -> tuple[cst.Module, Positions]:
         line = next(i for i, (one, other) in enumerate(pairs) if one != other)
         text = b"".join(data.splitlines()[line : line + 1]).decode(errors="replace").strip()
         raise MutatorError(
-            f"LibCST does not give back the line `{text}` as it is",
+            f"LibCST does not reproduce the line `{text}`",
             where=where,
             line=line + 1,
-            expected="lines that LibCST keeps whole: no backslash alone, no form feed before code",
-            remedy="write it in another way, or inject into another file",
+            expected="no line with only a backslash, no form feed before code",
+            remedy="rewrite it, or inject into another file",
         )
     return module, MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
 
 
 def import_line(module: cst.Module, positions: Positions) -> int:
-    """Index of the line before which an import goes: after docstring and `__future__` imports, if any."""
+    """Return the index of the line before which an import goes: after docstring and `__future__` imports."""
     after = None
     for i, node in enumerate(module.body):
         if not isinstance(node, cst.SimpleStatementLine):
@@ -114,6 +112,5 @@ def import_line(module: cst.Module, positions: Positions) -> int:
 
 
 def _first_line(node: cst.CSTNode, positions: Positions) -> int:
-    """Index of the first line of a statement, including decorators."""
     decorators = node.decorators if isinstance(node, cst.FunctionDef | cst.ClassDef) else ()
     return min(positions[n].start.line for n in (node, *decorators)) - 1

@@ -1,4 +1,4 @@
-"""Patches: unified diffs in git's style, written from the edits; `patch -p1` applies them."""
+"""Writes patches from the edits: unified diffs in git's style, for `patch -p1`."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -24,13 +24,13 @@ class _Hunk:
 
 
 def changed_file(path: str, pieces: Iterable[Piece]) -> str:
-    """The patch of one changed file; bytes that are not UTF-8 become surrogate escapes."""
+    """Return the patch of one changed file; bytes that are not UTF-8 become surrogate escapes."""
     hunks = "".join(hunk.text() for hunk in _hunks([p for p in pieces if p.lines]))
     return f"diff --git a/{path} b/{path}\n--- a/{_name(path)}\n+++ b/{_name(path)}\n{hunks}"
 
 
 def new_file(path: str, text: str) -> str:
-    """The patch that adds a file with this text, whose lines end with LF."""
+    """Return the patch that adds a file with this text, whose lines end with LF."""
     lines, end = text.removesuffix("\n"), "" if text.endswith("\n") else _NO_NEWLINE
     body = "+" + lines.replace("\n", "\n+")
     return (
@@ -40,7 +40,7 @@ def new_file(path: str, text: str) -> str:
 
 
 def _hunks(pieces: Sequence[Piece]) -> Iterator[_Hunk]:
-    """Changes with three lines of context; those at most six lines apart share a hunk."""
+    """Yield changes with three lines of context; those at most six lines apart share a hunk."""
     hunk = _Hunk(0, 0)
     old = new = 0
     for i, piece in enumerate(pieces):
@@ -68,12 +68,12 @@ def _count(pieces: Iterable[Piece], sign: str) -> int:
 
 
 def _span(before: int, count: int) -> str:
-    """`start,count` of one side of a hunk; `start` of an empty side is the line before it."""
+    """Return `start,count` of one side of a hunk; `start` of an empty side is the line before it."""
     return f"{before + 1 if count else before},{count}"
 
 
 def _name(path: str) -> str:
-    """A name with a space ends with a tab; otherwise `patch` takes the part after the space for a date."""
+    """End a name that has a space with a tab; otherwise `patch` takes the part after the space for a date."""
     return f"{path}\t" if " " in path else path
 
 

@@ -1,4 +1,4 @@
-"""Positions of functions and statements, which count only if LibCST and `ast` agree.
+"""Finds positions of functions and statements in both LibCST and `ast`, to compare them.
 
 If a parser drops a line, all positions below it shift. A mutant made with such positions would compile and
 un-splice, but its fault would be on the wrong line.
@@ -18,19 +18,18 @@ _STATEMENTS = ast.Assign | ast.AugAssign | ast.AnnAssign | ast.Expr | ast.Return
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """The position of a function or a small statement; `kind` is its class in `ast`.
+    """The position of a function or a small statement: line (from 1) and column.
 
-    `start` and `to` are (line from 1, column). `to` is the end of a statement; of a function, the start of
-    its first statement, including a docstring. LibCST counts columns in characters, `ast` in bytes of UTF-8.
+    LibCST counts columns in characters, `ast` in bytes of UTF-8.
     """
 
-    kind: str
+    kind: str  # the node's class in `ast`
     start: _Point
-    to: _Point
+    to: _Point  # end of a statement; start of a function's first statement, including a docstring
     docstring: bool = False
 
     def in_bytes(self, lines: Sequence[bytes], encoding: str) -> "Place":
-        """The same place with columns in bytes of UTF-8; `lines` are the lines of the file."""
+        """Convert the columns to bytes of UTF-8; `lines` are the lines of the file."""
 
         def column(point: _Point) -> _Point:
             line, characters = point
@@ -58,7 +57,7 @@ def statement_place(node: cst.BaseSmallStatement, positions: Positions) -> Place
 
 
 def line_after(node: cst.SimpleStatementLine | cst.SimpleStatementSuite, positions: Positions) -> int:
-    """Index of the first line after a line of statements, including backslash continuations."""
+    """Return the index of the first line after a line of statements, including backslash continuations."""
     space = node.trailing_whitespace.whitespace.value
     semicolon = node.body[-1].semicolon
     if isinstance(semicolon, cst.Semicolon):
@@ -71,7 +70,7 @@ def _point(position: CodePosition) -> _Point:
 
 
 def places_by_ast(tree: ast.Module) -> frozenset[Place]:
-    """The positions of functions and anchorable statements in `ast`; columns in bytes of UTF-8."""
+    """Return the positions of functions and anchorable statements, with columns in bytes of UTF-8."""
     found = set()
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

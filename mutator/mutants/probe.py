@@ -1,7 +1,6 @@
-"""The probe's contract: the path of `_fi`, its template values, its operation and its report.
+"""The contract of the probe `_fi`, rendered from `templates/_fi.py.j2`: its path, template values and report.
 
-Every mutant contains the probe `_fi`, rendered from `templates/_fi.py.j2`. Code inside a target's process
-cannot import this contract, so engines pass on the values that are needed.
+Code inside a target's process cannot import this module, so engines pass it the values that it needs.
 """
 
 import math
@@ -25,7 +24,7 @@ _ARMED = re.compile(r"^ARMED_AFTER_S = (.+)$(?s:.*)^_TINY = (.+)$", re.MULTILINE
 
 
 def probe_path(package: str | None) -> str:
-    """Path of the probe in a mutated tree, relative to the tree's root; None: outside of packages."""
+    """Return the path of the probe in a mutated tree; without a package, it is at the tree's root."""
     return f"{package}/{PROBE_NAME}.py" if package else f"{PROBE_NAME}.py"
 
 
@@ -34,12 +33,11 @@ def probe_module(package: str | None) -> str:
 
 
 def is_probe(path: str) -> bool:
-    """Whether a file of a mutated tree is the probe."""
     return path.rpartition("/")[2] == f"{PROBE_NAME}.py"
 
 
 def injection_id(index: int, injection: Injection) -> str:
-    """The id of an injection in tags and reports, from its content and its position in the fault."""
+    """Return the id of an injection in tags and reports, from its content and position in the fault."""
     return content_id([index, injection])[:8]
 
 
@@ -53,12 +51,12 @@ def template_values(
     *,
     sets: bool = False,
 ) -> dict[str, object]:
-    """The values for the probe's template; with `sets`, the probe sets constants or defaults.
+    """Return the values for the probe's template; with `sets`, the probe sets constants or defaults.
 
-    MutatorError for a missing hold time, and for a condition over unobserved values.
+    MutatorError for a missing hold time, and for a condition on unobserved values.
     """
     if hold is Hold.FOR and trigger.hold_s is None:
-        raise MutatorError(f"trigger '{trigger.name}' holds for a time", expected="hold_s with it")
+        raise MutatorError(f"trigger '{trigger.name}' has the hold `for` without a time", expected="hold_s")
     names = [value.name for value in observation.values]
     return {
         "mutant": mutant,
@@ -77,11 +75,11 @@ def template_values(
     }
 
 
-# A probe at work
+# A running probe
 
 
 def parts_of(probe: str) -> tuple[str, str]:
-    """A probe's source in two parts: its own, and the part that all probes of a target share.
+    """Split a probe's source into its own part and the part that all probes of a target share.
 
     Run one after the other, the parts do the same as the whole. Blank lines keep the line numbers unchanged.
     """
@@ -95,10 +93,9 @@ def parts_of(probe: str) -> tuple[str, str]:
 
 
 def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
-    """The time (s) from which a probe is armed, and its condition as a function of the observed values.
+    """Return the time (s) from which a probe is armed, and its condition as a function of observed values.
 
-    A fault first becomes active when the probe is armed and the condition holds. Calling `observe` for every
-    value instead takes almost four times as long.
+    Calling `observe` for every value instead takes almost four times as long.
     """
     module: dict[str, Any] = {"__name__": PROBE_NAME}
     exec(probe, module)
@@ -106,20 +103,17 @@ def decision(probe: CodeType) -> tuple[float, Callable[..., bool]]:
 
 
 def decision_in(own: str) -> tuple[float, str]:
-    """Like `decision`, but from the source of a probe's own part. The condition is the source of its
-    function.
-    """
+    """Like `decision`, but from the source of a probe's own part. The condition is source, too."""
     armed = _ARMED.search(own)
     assert armed is not None
     return float(armed[1]) - float(armed[2]), own[own.index("def _condition(") :]
 
 
 def state_after(observed: int, began: float | None, t: float | None) -> tuple[str, dict[str, object]]:
-    """The name of the probe's object that holds its observations, and its attributes after `observed` of
-    them.
+    """Return the name of the probe's object that holds its observations, and its attributes.
 
-    The first observation was at time `began` (s), the last at `t`. A probe that replaces another one gets
-    these attributes.
+    The first of `observed` observations was at time `began` (s), the last at `t`. A probe that replaces
+    another one gets these attributes.
     """
     return "_run", {"observed": observed, "began": began, "t": t} if observed else {}
 
@@ -128,12 +122,12 @@ def state_after(observed: int, began: float | None, t: float | None) -> tuple[st
 
 
 def silent_report(mutant: str | None) -> dict[str, Any]:
-    """The report of a mutant whose trigger never holds, with only the parts that are read."""
+    """Return the report of a mutant whose trigger never holds, with only the parts that are read."""
     return {"mutant": mutant, "triggered": None, "injections": {}}
 
 
 def report_problem(report: object, mutant: str, injections: Sequence[str]) -> str:
-    """What is wrong with a probe's report for a mutant with these injections; empty if it is valid.
+    """Return what is wrong with a probe's report for a mutant with these injections; empty if it is valid.
 
     Nothing in the report is trusted, because a mutant may have overwritten anything in its probe.
     """
@@ -152,7 +146,7 @@ def report_problem(report: object, mutant: str, injections: Sequence[str]) -> st
 
 
 def _is_told(told: object, number: str) -> bool:
-    """Whether this is a valid entry: a first time, a last time and a count, or None, None and 0."""
+    """Return whether an entry is valid: a first time, a last time and a count, or None, None and 0."""
     if not isinstance(told, dict) or told.keys() != {"first", "last", number}:
         return False
     first, last, count = told["first"], told["last"], told[number]
@@ -162,12 +156,11 @@ def _is_told(told: object, number: str) -> bool:
 
 
 def was_triggered(report: Mapping[str, Any] | None) -> bool:
-    """Whether the trigger held in the reported run."""
     return bool(report and report["triggered"])
 
 
 def activation_of(report: Mapping[str, Any]) -> Activation | None:
-    """First and last execution of all injections together, and their number; None if nothing ran."""
+    """Return first and last execution of all injections together, and their number; None if nothing ran."""
     injections = report.get("injections")
     ran = [i for i in injections.values() if i and i["count"]] if isinstance(injections, dict) else []
     if not ran:

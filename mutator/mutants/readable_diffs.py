@@ -1,4 +1,4 @@
-"""Read patches file by file, without the probe that every mutant has."""
+"""Reads patches file by file, without the probe that every mutant has."""
 
 import re
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ _NEW_NAME = re.compile(r"^\+\+\+ b/(.+?)\t?$", re.MULTILINE)
 
 
 def readable(patch: str) -> tuple[str, str]:
-    """The patch without its new files, and a sentence that names them (empty if there are none)."""
+    """Return the patch without its new files, and a sentence that names them (empty if there are none)."""
     sections = list(file_patches(patch))
     left_out = [m[1] for s in sections if adds_file(s) and (m := _NEW_NAME.search(s))]
     note = f"not shown: {', '.join(left_out)}, the probe, which evaluates the trigger" if left_out else ""
@@ -15,7 +15,6 @@ def readable(patch: str) -> tuple[str, str]:
 
 
 def file_patches(patch: str) -> Iterator[str]:
-    """The patch of each file in a patch of several."""
     begin = 0
     while begin < len(patch):
         end = patch.find("\ndiff --git ", begin) + 1 or len(patch)
@@ -24,5 +23,4 @@ def file_patches(patch: str) -> Iterator[str]:
 
 
 def adds_file(file_patch: str) -> bool:
-    """Whether the patch of one file adds that file."""
     return file_patch.startswith("new file mode ", file_patch.find("\n") + 1)

@@ -1,4 +1,4 @@
-"""Render a fault model's template and its parameters to lines of Python.
+"""Renders a fault model's template and its parameters to lines of Python.
 
 Templates run in Jinja2's sandbox, where an undefined name is an error. Every printed value is a Python
 literal or a checked name, so it cannot become other code.
@@ -26,8 +26,8 @@ from mutator.faults.fault_models import NAMES, FaultModel, ParamSchema, SnippetK
 from mutator.model import Value
 from mutator.mutants.normalized_source import normalized
 
-_EXACT = 2.0**53  # up to it every integer is a double
-_EXPECTED = {  # of some types of parameters
+_EXACT = 2.0**53  # every integer up to this is a double
+_EXPECTED = {  # by parameter type
     "variable": "the name of a variable",
     "import": "a dotted name to import",
     "integer": "an integer",
@@ -36,7 +36,7 @@ _ARGUMENT = re.compile(r"(?P<keyword>\w+=)?(?P<value>.*)", re.DOTALL)  # as `ast
 
 
 def literal(value: object) -> str:
-    """A value as Python source: numbers exactly, non-finite ones as `float('nan')`; names as they are."""
+    """Return a value as Python source, numbers exactly; names are unchanged."""
     if value is None or isinstance(value, bool):
         return repr(value)
     if isinstance(value, float):
@@ -49,10 +49,9 @@ def literal(value: object) -> str:
 
 
 def signed(value: int | float) -> str:
-    """A term to add in an expression: `+ 3` or `- 2.5`.
+    """Return a term to add in an expression: `+ 3` or `- 2.5`.
 
-    A whole number is written without a point, so that adding it to an integer gives an integer. For a float,
-    this makes no difference.
+    A whole number is written without a point, so that an integer stays an integer.
     """
     negative = math.copysign(1.0, value) < 0.0 and not math.isnan(value)
     size = -value if negative else value
@@ -61,10 +60,7 @@ def signed(value: int | float) -> str:
 
 
 def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
-    """A call's arguments after exchanging the values of arguments `first` and `second`, counted from 1.
-
-    Keywords stay in place.
-    """
+    """Exchange the values of two arguments of a call, counted from 1; keywords stay in place."""
     parts = [_ARGUMENT.fullmatch(text) for text in arguments]
     for place in (first, second):
         part = parts[place - 1] if 0 < place <= len(parts) else None
@@ -80,7 +76,7 @@ def exchanged(arguments: Sequence[str], first: int, second: int) -> list[str]:
 
 
 def taken_for(written: str, read: str) -> float:
-    """The factor by which a quantity changes if it is written in one unit and read in another."""
+    """Return the factor by which a quantity changes if it is written in one unit and read in another."""
     one, other = units.UNITS[written], units.UNITS[read]
     if one.dimension != other.dimension or one == other:
         raise MutatorError(
@@ -121,7 +117,7 @@ _FAILURES = (TypeError, ValueError, ArithmeticError, AttributeError, LookupError
 def snippet(
     model: FaultModel, params: Mapping[str, Value], fi: str, statements: Mapping[str, str] | None = None
 ) -> tuple[str, ...]:
-    """The model's lines for these parameters, untagged, 4 spaces a level.
+    """Return the model's lines for these parameters, untagged, 4 spaces a level.
 
     `fi` is the injection's id; `statements` are the source texts that the model needs. MutatorError if the
     template fails or its result is not whole lines of Python.
@@ -147,17 +143,17 @@ def changed_value(
     original: str,
     parts: Mapping[str, object] | None = None,
 ) -> str:
-    """The model's expression for the changed value of `original`, which is source on one line.
+    """Return the model's expression for the changed value of `original`, which is source on one line.
 
     `parts` are the components of `original`. MutatorError if the model cannot change values, or if the
     template fails or does not render one expression.
     """
     if model.expression is None:
         raise MutatorError(
-            f"model {model.name} changes no value of an expression",
+            f"model {model.name} cannot change the value of an expression",
             where=model.source.path,
             expected="a model of kind value, or one with `expression`",
-            remedy="anchor at a statement, or take another model",
+            remedy="anchor at a statement, or use another model",
         )
     names: dict[str, object] = {
         param.name: _checked(param, params) for param in model.params if param.name != "target"
@@ -177,7 +173,7 @@ def changed_value(
 
 @lru_cache(maxsize=1024)
 def _is_expression(text: str) -> bool:
-    """Whether normalized source, and so all source that it covers, is an expression without `yield`."""
+    """Return whether normalized source, and all source that it covers, is an expression without `yield`."""
     try:
         tree = ast.parse(text, mode="eval")
         ast.parse(f"({text})", mode="eval")  # a comment would hide the bracket
@@ -188,7 +184,7 @@ def _is_expression(text: str) -> bool:
 
 @lru_cache(maxsize=1024)
 def _holds_together(text: str) -> bool:
-    """Whether an expression binds tighter than a following `if`: not a tuple, a lambda or another `if`."""
+    """Return whether an expression binds tighter than a following `if`. A tuple or lambda does not."""
     whole = ast.parse(f"{text} if 0 else 0", mode="eval").body
     return isinstance(whole, ast.IfExp) and ast.dump(whole.body) == ast.dump(
         ast.parse(text, mode="eval").body
@@ -196,7 +192,7 @@ def _holds_together(text: str) -> bool:
 
 
 def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
-    """The template's value for this parameter.
+    """Return the template's value for this parameter; MutatorError if the type is wrong.
 
     A constant that is not a number is passed as Python source, so that None differs from a missing value.
     """
@@ -219,7 +215,7 @@ def _checked(param: ParamSchema, params: Mapping[str, Value]) -> Value:
 
 
 def render(template: str, names: Mapping[str, object], where: Path) -> str:
-    """Render one template; MutatorError with the template and, if known, its line when it fails."""
+    """Render one template; MutatorError with its line, if known."""
     try:
         return _compiled(template).render(names)
     except TemplateSyntaxError as error:
@@ -241,7 +237,7 @@ def _template_error(what: str, where: Path, line: int | None) -> MutatorError:
 
 
 def _line_in(error: BaseException) -> int | None:
-    """The template's line in a traceback (Jinja2 maps its frames back to template lines)."""
+    """Return the template's line in a traceback. Jinja2 maps its frames back to template lines."""
     line = None
     trace = error.__traceback__
     while trace:
@@ -253,7 +249,7 @@ def _line_in(error: BaseException) -> int | None:
 
 @lru_cache(maxsize=1024)
 def _are_lines(text: str, kind: SnippetKind) -> bool:
-    """Whether normalized source, and so all source that it covers, passes `_check_lines`."""
+    """Return whether normalized source, and so all source that it covers, passes `_check_lines`."""
     try:
         _check_lines(text, kind, Path())
     except MutatorError:
@@ -278,7 +274,7 @@ def _check_lines(text: str, kind: SnippetKind, where: Path) -> None:
         else:
             problem = f"{error.msg} (a guard's last line must open a block)"
         raise MutatorError(
-            f"the template does not give Python: {problem}: {text!r}",
+            f"the template does not render Python: {problem}: {text!r}",
             where=where,
             remedy="correct the template",
         ) from None

@@ -1,8 +1,6 @@
 """Reusable changes: a changed file without its inserted lines, which other mutants fill with their lines.
 
-Splicing and compiling a file takes milliseconds, and many mutants insert the same lines except for numbers
-and ids. Only the first is spliced. The number of reusable changes depends on the library, not on the number
-of mutants.
+Many mutants insert the same lines except for numbers and ids. Only the first is spliced and compiled.
 """
 
 from collections.abc import Sequence
@@ -21,7 +19,7 @@ ReuseKey = tuple[tuple[int, int, int, bytes, str], ...]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Change:
-    """A changed file: its new content, and the patch that makes it (not UTF-8: surrogate escapes)."""
+    """A changed file. In the patch, bytes that are not UTF-8 become surrogate escapes."""
 
     data: bytes
     patch: str
@@ -29,21 +27,21 @@ class Change:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReusableChange:
-    """A change without its inserted lines: the parts before, between and after them."""
+    """The parts of a change before, between and after its inserted lines."""
 
     data: tuple[bytes, ...]
     patch: tuple[str, ...]
 
     @classmethod
     def of(cls, change: Change) -> "ReusableChange":
-        """The change without its tagged lines, which are the inserted ones, since no target has tags."""
+        """Remove the tagged lines from a change."""
         patch = change.patch.encode("utf-8", "surrogateescape")
         return cls(
             data=tuple(_parts(change.data, b"")), patch=tuple(_text(part) for part in _parts(patch, b"+"))
         )
 
     def filled(self, lines: Sequence[bytes]) -> Change:
-        """The change with these lines (without their line ends) inserted."""
+        """Insert these lines, given without their line ends."""
         data: list[bytes] = [b""] * (2 * len(lines) + 1)
         patch = [""] * len(data)
         data[::2], data[1::2] = self.data, lines
@@ -52,10 +50,7 @@ class ReusableChange:
 
 
 def known_changes(tree: SourceTree, path: str) -> dict[ReuseKey, ReusableChange | Change]:
-    """The changes of a file made so far, reusable or single.
-
-    Callers add to this dictionary, which is kept with the tree.
-    """
+    """Return the known changes of a file, in a dictionary of the tree that callers extend."""
     return tree.derived(path, _none_yet)
 
 
@@ -64,7 +59,7 @@ def _none_yet(path: str, data: bytes, root: Path) -> dict[ReuseKey, ReusableChan
 
 
 def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> ReuseKey:
-    """What edits of a file must have in common to share a reusable change; `ids` are those in their lines."""
+    """Return what edits must have in common to share a reusable change; `ids` are those in their lines."""
     return tuple(
         (e.index, e.rank, e.reindent, e.unit, normalized(b"".join(e.lines).decode(file.encoding), ids))
         for e in in_order(edits)
@@ -72,14 +67,13 @@ def reuse_key(file: ParsedFile, edits: Sequence[Edit], ids: Sequence[str]) -> Re
 
 
 def inserted_lines(edits: Sequence[Edit]) -> list[bytes]:
-    """The inserted lines from the top of the file to its end, without their line ends."""
     return [line.rstrip(b"\r\n") for line in chain.from_iterable(e.lines for e in in_order(edits))]
 
 
 def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> bool:
-    """Whether the change compiles with all lines of this key, i.e. with normalized ones.
+    """Return whether the change compiles with all lines of this key, i.e. with normalized ones.
 
-    It then un-splices too, since that depends only on the tags, which are part of the key.
+    It then un-splices too, because that depends only on the tags, which are part of the key.
     """
     texts = (text.rstrip("\r\n") for *_, text in key)  # the file's last line may have no end
     lines = "\n".join(texts).encode(file.encoding).splitlines()
@@ -87,7 +81,6 @@ def always_compiles(file: ParsedFile, change: ReusableChange, key: ReuseKey) -> 
 
 
 def _parts(data: bytes, sign: bytes) -> list[bytes]:
-    """The parts around the tagged lines, with their `sign` and line ends."""
     parts = [b""]
     for line in data.splitlines(keepends=True):
         if tag_of(line):

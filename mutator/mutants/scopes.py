@@ -23,12 +23,12 @@ class Moved:
 
 
 def function_names(data: bytes) -> FunctionNames:
-    """The names that each function knows and uses, by the function's line (from 1) and name."""
+    """Return the names that each function knows and uses, by the function's line (from 1) and name."""
     return dict(_function_names(_table(data), ""))
 
 
 def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[int, str], frozenset[str]]]:
-    """The same for one table; `private` is what the compiler puts before private names (`__x`) in a class."""
+    """Like `function_names`; `private` is the compiler's prefix of private names (`__x`) in a class."""
     if table.get_type() == "class":
         name = table.get_name().lstrip("_")
         private = f"_{name}__" if name else ""
@@ -41,7 +41,7 @@ def _function_names(table: SymbolTable, private: str) -> Iterator[tuple[tuple[in
 
 
 def set_by_functions(data: bytes) -> frozenset[str]:
-    """The names of a module that its functions or classes bind after declaring them `global`."""
+    """Return a module's names that functions or classes bind after declaring them `global`."""
     return frozenset(
         symbol.get_name()
         for table in _below(_table(data))
@@ -57,12 +57,12 @@ def _below(table: SymbolTable) -> Iterator[SymbolTable]:
 
 
 def as_compiled(name: str) -> str:
-    """An identifier as the compiler normalizes it. For example, the two code points for `µ` become one."""
+    """Normalize an identifier as the compiler does. For example, the two code points for `µ` become one."""
     return unicodedata.normalize("NFKC", name)
 
 
 def moved_names(before: bytes, after: bytes, inserted: Container[int]) -> Iterator[Moved]:
-    """The names whose meaning the inserted lines change.
+    """Yield the names whose meaning changes with the inserted lines.
 
     `inserted` are the numbers of these lines in `after`, from 1. SyntaxError if `after` is not valid.
     """

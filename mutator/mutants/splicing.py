@@ -1,8 +1,8 @@
 """The splicer: inserts tagged lines between the lines of a source file, and removes them again.
 
-Edits are whole lines, so everything else keeps its bytes: line ends, tabs, comments, a missing newline at the
-end. A guard also indents the statement it wraps; its tag says how many lines. A line with a changed
-expression is replaced by one that keeps the old line in its tag.
+Edits are whole lines, so everything else keeps its bytes, such as line ends, tabs and comments. A guard also
+indents the statement it wraps; its tag has the number of lines. A line with a changed expression is replaced
+by one that keeps the old line in its tag.
 """
 
 from codecs import BOM_UTF8
@@ -20,17 +20,13 @@ from mutator.mutants.injected_lines import asks, changed_value, import_statement
 
 
 class Rank(IntEnum):
-    """The order of edits at one line index.
+    """The order of edits at one line index."""
 
-    First come lines after the line above, then lines after a whole statement that ends above, then lines
-    before the line itself, and last a guard around that line or its replacement.
-    """
-
-    AFTER = 0
-    AFTER_WHOLE = 1
-    BEFORE = 2
-    GUARD = 3
-    INSTEAD = 4
+    AFTER = 0  # lines after the line above
+    AFTER_WHOLE = 1  # lines after a whole statement that ends above
+    BEFORE = 2  # lines before the line itself
+    GUARD = 3  # a guard around the line
+    INSTEAD = 4  # a replacement of the line
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -49,9 +45,9 @@ class Edit:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueEdit:
-    """The bytes to write before and after an expression, which itself stays unchanged.
+    """The bytes to write before and after an expression.
 
-    `start` and `end` are a line and a byte in it, from 0.
+    `start` and `end` are a line and a byte offset, from 0.
     """
 
     start: tuple[int, int]
@@ -70,21 +66,21 @@ class Piece:
 
 
 def insertion(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
-    """The edit that inserts `code` (4 spaces an indentation level) at `site`, each line tagged."""
+    """Return the edit that inserts `code` (4 spaces an indentation level) at `site`, each line tagged."""
     lines = _lines(file, site, code, tag)
     index, rank = (site.last, Rank.AFTER) if site.after else (site.first, Rank.BEFORE)
     return Edit(index=index, rank=rank, lines=lines)
 
 
 def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
-    """The edit that wraps the statement at `site` in `code`, whose last line opens a block."""
+    """Return the edit that wraps the statement at `site` in `code`, whose last line opens a block."""
     if site.first == site.last or not site.alone or site.after:
         raise MutatorError(
-            "a guard needs a statement to wrap, alone on its lines",
+            "a guard needs a statement that is alone on its lines",
             where=file.where,
             line=site.first + 1,
             expected="an anchor before_call, before_assign or before_return",
-            remedy="anchor at the statement to leave out",
+            remedy="anchor at the statement to omit",
         )
     lines = _lines(file, site, code, tag, site.reindent)
     return Edit(
@@ -97,7 +93,6 @@ def guard(file: ParsedFile, site: Site, code: Sequence[str], tag: str) -> Edit:
 
 
 def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
-    """The edit that inserts the line `code` after the statement that makes a fixed value."""
     line = value.indent + _encoded(file, tagged(code, tag), value.first) + file.newline
     return Edit(index=value.index, rank=Rank.AFTER_WHOLE, lines=(line,))
 
@@ -105,9 +100,9 @@ def setting(file: ParsedFile, value: FixedValue, code: str, tag: str) -> Edit:
 def value_change(
     file: ParsedFile, expression: Expression, changed: str, tag: str, asked: str | None = None
 ) -> ValueEdit:
-    """The edit that gives `expression` the value `changed` (source on one line) when the probe says so.
+    """Return the edit that gives `expression` the value `changed` while the injection `tag` is active.
 
-    `asked` is the source of the question to the probe; by default, whether the injection `tag` is active.
+    `changed` is source on one line. `asked` replaces the default call that asks the probe.
     """
     opened, closed = ("(", "))") if expression.bare else ("", ")")
     return ValueEdit(
@@ -120,7 +115,7 @@ def value_change(
 
 
 def in_lines(file: ParsedFile, edits: Iterable[Edit | ValueEdit]) -> list[Edit]:
-    """The edits, with edits of values converted to edits that replace whole lines of the target."""
+    """Convert edits of values to edits that replace whole lines of the target; other edits stay."""
     edits = list(edits)
     values = sorted((e for e in edits if isinstance(e, ValueEdit)), key=lambda e: e.start)
     for one, other in pairwise(values):
@@ -151,7 +146,6 @@ def _instead(file: ParsedFile, index: int, texts: Sequence[tuple[int, bytes, str
 
 
 def probe_import(file: ParsedFile, package: str | None) -> Edit:
-    """The edit that imports the probe: after docstring and `__future__` imports."""
     if file.import_line == 0 and file.data.startswith(BOM_UTF8):
         raise MutatorError(
             "a byte order mark right before the first statement",
@@ -189,7 +183,7 @@ def _encoded(file: ParsedFile, text: str, line: int) -> bytes:
             f"{text!r} cannot be written in {file.encoding}",
             where=file.where,
             line=line + 1,
-            expected="names that the file's encoding has",
+            expected="characters that the file's encoding has",
             remedy="use other names",
         ) from None
 
@@ -207,7 +201,7 @@ def _depth(edit: Edit) -> int:
 
 
 def apply_edits(file: ParsedFile, edits: Iterable[Edit]) -> tuple[Piece, ...]:
-    """The edited file as pieces, for `joined`; MutatorError if two guards wrap one statement."""
+    """Return the edited file as pieces, for `joined`; MutatorError if two guards wrap one statement."""
     pieces: list[Piece] = []
     done = 0
     for edit in in_order(edits):
@@ -243,7 +237,7 @@ def _keep(pieces: list[Piece], lines: tuple[bytes, ...]) -> None:
 
 
 def _indented(lines: Sequence[bytes], unit: bytes) -> tuple[bytes, ...]:
-    """Lines one level deeper. The first gets `unit` after its own indentation, so that tabs and spaces do
+    """Indent lines by one level. The first gets `unit` after its own indentation, so that tabs and spaces do
     not mix.
     """
     start = len(_margin(lines[0]))
@@ -256,8 +250,8 @@ def _margin(line: bytes) -> bytes:
 
 
 def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> list[bytes]:
-    """Keep a missing newline at the end of the file: the old last line gets the newline of the last added
-    line.
+    """Keep a missing newline at the end of the file: move the newline from the last added line to the old
+    last line.
     """
     last = pieces[-1]
     if last.lines[-1].endswith((b"\n", b"\r")):
@@ -271,12 +265,11 @@ def _end_of_file(pieces: list[Piece], added: list[bytes], newline: bytes) -> lis
 
 
 def joined(pieces: Iterable[Piece]) -> bytes:
-    """The bytes of the edited file."""
     return b"".join(line for piece in pieces if piece.sign != "-" for line in piece.lines)
 
 
 def unsplice(data: bytes) -> bytes:
-    """The original bytes of a mutated file: inserted lines removed, changed and guarded ones restored."""
+    """Return the original bytes of a mutated file."""
     lines = data.splitlines(keepends=True)
     result: list[bytes] = []
     left = 0  # lines still indented by a guard

@@ -1,6 +1,4 @@
-"""The text of an anchored statement and of the next one, for fault models that repeat or reorder
-statements.
-"""
+"""The text of an anchored statement and of the next one, for fault models that repeat or reorder them."""
 
 import ast
 from collections.abc import Iterator, Mapping
@@ -27,15 +25,13 @@ def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[
     """
     anchored, following = _small_statements(file.data).get(site.first, (None, None))
     if anchored is None or site.first == site.last or not site.alone:
-        raise _unfit(file, site, "no statement that is alone on its lines is anchored here")
+        raise _unfit(file, site, "the anchor is not at a statement that is alone on its lines")
     if isinstance(anchored, _LAST):
-        raise _unfit(file, site, f"`{ast.unparse(anchored)}` is the last thing that its block does")
+        raise _unfit(file, site, f"`{ast.unparse(anchored)}` ends its block")
     texts = {"statement": _one_line(file, site, anchored)}
     if needs is Needs.NEXT_STATEMENT:
         if following is None:
-            raise _unfit(
-                file, site, "no other statement follows that is alone on its lines and opens no block"
-            )
+            raise _unfit(file, site, "the next statement is missing, shares its lines, or opens a block")
         texts["next_statement"] = _one_line(file, site, following)
         site = _with_both(file, site, following)
     return site, texts
@@ -44,7 +40,7 @@ def written_out(file: ParsedFile, site: Site, needs: Needs) -> tuple[Site, dict[
 def _with_both(file: ParsedFile, site: Site, following: ast.stmt) -> Site:
     last = following.end_lineno or 0
     if site.reindent != site.last - site.first or _has_long_string(following):
-        raise _unfit(file, site, "a string runs over the end of a line, so its statement cannot be indented")
+        raise _unfit(file, site, "a string spans several lines, so its statement cannot be indented")
     return replace(site, last=last, reindent=last - site.first)
 
 
@@ -69,14 +65,14 @@ def _unfit(file: ParsedFile, site: Site, what: str) -> MutatorError:
         what,
         where=file.where,
         line=site.first + 1,
-        expected="an anchor before or after a call, an assignment or a return, on lines of its own",
+        expected="an anchor before or after a call, an assignment or a return that shares no line",
         remedy="anchor at another statement",
     )
 
 
 @lru_cache(maxsize=32)
 def _small_statements(data: bytes) -> Mapping[int, tuple[ast.stmt, ast.stmt | None]]:
-    """The small statements that begin a line (from 0), each with the next one in its block.
+    """Return the small statements that begin a line (from 0), each with the next one in its block.
 
     The next one is None if it is missing or shares its lines with another.
     """

@@ -13,7 +13,7 @@ from mutator.mutants.scopes import FunctionNames, as_compiled
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Statement:
-    """A small statement, or something that binds or calls but is not a statement; then `reason` says why.
+    """A small statement, or another construct that binds or calls, described by `reason`.
 
     Lines count from 0, `last` is exclusive. Names are dotted, as written. A statement that returns also has
     the empty name in `returns`, which matches any return. `place` is None if there is a reason.
@@ -33,12 +33,10 @@ class Statement:
     opens: int | None = None  # for a binding in the head of a block: the block's first line
 
     def names(self, verb: str) -> tuple[str, ...]:
-        """The names that it assigns, calls or returns, as `verb` says."""
         return {"assign": self.assigns, "call": self.calls, "return": self.returns}[verb]
 
     @property
     def alone(self) -> bool:
-        """Whether it shares its lines with no other statement."""
         return self.first_in_line and self.last_in_line and not self.one_line_suite
 
     @property
@@ -48,7 +46,7 @@ class Statement:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Function:
-    """A function: its line, its statements (without those of nested functions and classes), its names.
+    """A function. Its statements do not include those of nested functions and classes.
 
     `entry` is the index of the line to insert before, and of the line whose indentation to use; None for a
     one-line body.
@@ -64,14 +62,14 @@ class Function:
 def collect(
     module: cst.Module, positions: Positions, names: FunctionNames
 ) -> dict[str, tuple[Function, ...]]:
-    """All functions by qualified name (`Class.method`, `outer.inner`), those of one name in source order."""
+    """Return all functions by qualified name (`Class.method`, `outer.inner`), in source order."""
     collector = _Collector(positions, names)
     module.visit(collector)
     return {name: tuple(functions) for name, functions in collector.functions.items()}
 
 
 def dotted(node: cst.CSTNode | None) -> str | None:
-    """`a.b.c` for a chain of names, None for anything else."""
+    """Return `a.b.c` for a chain of names, None for anything else."""
     if isinstance(node, cst.Name):
         return as_compiled(node.value)
     if isinstance(node, cst.Attribute):
@@ -81,7 +79,7 @@ def dotted(node: cst.CSTNode | None) -> str | None:
 
 
 def item(node: cst.Subscript) -> str | None:
-    """`a['b']`, as anchors name it; None if it has a computed part, which could change."""
+    """Return `a['b']`, as anchors name it; None if it has a computed part, which could change."""
     text = ast.unparse(ast.parse(cst.Module([]).code_for_node(node), mode="eval"))
     return text if assignable(text) else None
 
@@ -178,7 +176,7 @@ class _Collector(cst.CSTVisitor):
             )
 
     def _add_head(self, target: cst.CSTNode, body: cst.BaseSuite, reason: str) -> None:
-        """Add what the head of a block binds; the snippet goes into the block if that has its own lines."""
+        """Add what the head of a block binds. The snippet goes into the block if it has separate lines."""
         self.heads.add(id(target))
         statements, names = self.open[-1] if self.open else None, _targets(target)
         if statements is None or not names:
@@ -215,7 +213,6 @@ def _value(small: cst.BaseSmallStatement) -> cst.BaseExpression | None:
 
 
 def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
-    """The call that is the statement's whole value, with or without `await`."""
     value = _value(small)
     if isinstance(value, cst.Await):
         value = value.expression
@@ -225,7 +222,6 @@ def _outer_call(small: cst.BaseSmallStatement) -> cst.Call | None:
 def _effects(
     small: cst.BaseSmallStatement, call: cst.Call | None
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
-    """(assigned, called, returned) names of one small statement."""
     assigns: list[str] = []
     if isinstance(small, cst.Assign):
         assigns = [name for target in small.targets for name in _targets(target.target)]
@@ -272,7 +268,7 @@ def _inner_calls(small: cst.BaseSmallStatement, outer: cst.Call | None) -> Itera
 
 
 def _spanning_string(small: cst.BaseSmallStatement, positions: Positions) -> bool:
-    """Whether a string literal spans lines, which must then not be indented."""
+    """Return whether a string literal spans lines, which must then not be indented."""
     stack: list[cst.CSTNode] = [small]
     while stack:
         node = stack.pop()

@@ -1,2 +1,1 @@
-"""Writes a first library for a user's controller from its source tree, which is read but never imported.
-Campaigns do not use this package; they use the manifest."""
+"""Writes a first library for a user's controller from its source tree, which is read but never imported."""

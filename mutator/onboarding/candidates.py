@@ -1,4 +1,4 @@
-"""Guesses where in a tree the loop and its values are, from names, state and calls, best first."""
+"""Guesses from names, state and calls which functions of a tree are steps of the loop."""
 
 import ast
 import re
@@ -28,29 +28,25 @@ _NUMBERS = re.compile("abs|min|max|float|int|round|clip|interp|hypot|sum|dot|nor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ValueCandidate:
-    """A name that is assigned a number, with its line; `nth` among several assignments in its function (None:
-    the only one)."""
+    """A name to which a number is assigned."""
 
     name: str
     line: int
-    nth: int | None
+    nth: int | None  # number of this assignment to the name in the function; None: it is the only one
     score: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LoopCandidate:
-    """A function that a loop may call in each step, and the values that it computes, best first.
-
-    `needs` are its required arguments, `builds` those of its class's constructor.
-    """
+    """A function that a loop may call in each step, and the values that it computes, likeliest first."""
 
     module: str
     path: str
     line: int
-    owner: str | None  # its class
+    owner: str | None  # the class of a method
     function: str
-    needs: tuple[str, ...]
-    builds: tuple[str, ...]
+    needs: tuple[str, ...]  # required arguments
+    builds: tuple[str, ...]  # required arguments of the class's constructor
     score: int
     values: tuple[ValueCandidate, ...]
 
@@ -61,7 +57,7 @@ class LoopCandidate:
 
 
 def loop_candidates(found: Survey) -> tuple[LoopCandidate, ...]:
-    """Public functions that may be the step of a loop, likeliest first."""
+    """Return public functions that may be the step of a loop, likeliest first."""
     looped = Counter(name for module in found.modules for name in _called_in_loops(module.tree))
     candidates = [one for module in found.modules for one in _of_module(module, looped)]
     return tuple(sorted(candidates, key=lambda one: (-one.score, one.path, one.line)))
@@ -78,7 +74,6 @@ def _of_module(module: Module, looped: Counter[str]) -> Iterator[LoopCandidate]:
 
 
 def _may_step(function: Function) -> bool:
-    """Whether the function is public, and neither a property, class method or coroutine nor empty."""
     if isinstance(function, ast.AsyncFunctionDef):
         return False
     if function.name.startswith("_") and function.name not in _STEP:
@@ -132,7 +127,7 @@ def _class_score(name: str) -> int:
 
 
 def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
-    """The arguments without defaults."""
+    """Return the arguments without defaults."""
     given = function.args
     positional = [*given.posonlyargs, *given.args]
     positional = positional[: len(positional) - len(given.defaults)]
@@ -142,7 +137,6 @@ def _needed(function: Function, *, is_method: bool) -> tuple[str, ...]:
 
 
 def _state(owner: ast.ClassDef) -> set[str]:
-    """The attributes that a class's methods assign on `self`."""
     return {
         target.attr
         for node in ast.walk(owner)
@@ -160,7 +154,6 @@ def _targets(node: ast.AST) -> Iterable[ast.expr]:
 
 
 def _called_in_loops(tree: ast.Module) -> Iterator[str]:
-    """The names of functions and methods called in loops."""
     for loop in ast.walk(tree):
         if isinstance(loop, ast.For | ast.While):
             for node in ast.walk(loop):
@@ -170,7 +163,7 @@ def _called_in_loops(tree: ast.Module) -> Iterator[str]:
 
 
 def _values(function: Function) -> Iterator[ValueCandidate]:
-    """The names that a function assigns numbers to, likeliest first: arithmetic, then names assigned once."""
+    """Yield the names to which a function assigns numbers, likeliest first."""
     assigned = [(node, target) for node in _statements(function.body) for target in _targets(node)]
     names = [ast.unparse(target) for _, target in assigned]
     found = []
@@ -186,7 +179,7 @@ def _values(function: Function) -> Iterator[ValueCandidate]:
 
 
 def _statements(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
-    """The statements of a function in order, without those of nested functions and classes."""
+    """Yield the statements in order, without those of nested functions and classes."""
     for node in body:
         yield node
         if isinstance(node, Function | ast.ClassDef):
@@ -198,7 +191,7 @@ def _statements(body: Iterable[ast.stmt]) -> Iterator[ast.stmt]:
 
 
 def _number_score(value: ast.expr | None) -> int:
-    """The certainty that an expression is a computed number; 0: it is not."""
+    """Score how likely an expression is to be a computed number; 0: impossible."""
     if isinstance(value, ast.BinOp):
         return 0 if any(isinstance(n, ast.JoinedStr) or _is_text(n) for n in ast.walk(value)) else 4
     if isinstance(value, ast.UnaryOp):

@@ -9,7 +9,7 @@ MARK = "TODO(init)"
 
 
 def unfilled(library: Path) -> Iterator[MutatorError]:
-    """Every line of the library's YAML and Python that has the mark, in file order."""
+    """Yield an error for each mark in the library's YAML and Python files, in file order."""
     for path in sorted(library.rglob("*")):
         if path.suffix not in (".yaml", ".py") or not path.is_file():
             continue
@@ -26,7 +26,7 @@ def unfilled(library: Path) -> Iterator[MutatorError]:
 
 
 def _whole(text: str, following: list[str]) -> str:
-    """A comment together with the comments on the lines directly below."""
+    """Join a comment with the comments on the lines directly below it."""
     words = [text.strip()]
     for line in map(str.strip, following):
         if not line.startswith("# ") or MARK in line:

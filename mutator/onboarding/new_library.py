@@ -30,8 +30,10 @@ _FILES = {
 
 
 def write_library_for(found: Survey, folder: Path) -> None:
-    """Write the files into a new or empty folder; MutatorError if it has content. MutatorWarning if no
-    function in the source looks like a controller's step."""
+    """Write the files into a new or empty folder. MutatorError if the folder has content.
+
+    MutatorWarning if no function in the source looks like a controller's step.
+    """
     make_empty(folder)
     words = _words(found, folder.resolve())
     templates = Environment(
@@ -53,22 +55,19 @@ def write_library_for(found: Survey, folder: Path) -> None:
 
 
 def _nothing_found(found: Survey) -> str:
-    """The warning that no controller was found, with reasons."""
     why = [f"{place} cannot be read: {problem}" for place, problem in found.unread[:MOST_SHOWN]]
     if found.modules:
         why.insert(0, f"no function in {counted(len(found.modules), 'file')} looks like a step")
-    reasons = "; ".join(why) or "no Python files except tests and the like"
+    reasons = "; ".join(why) or "no Python files apart from tests, docs and scripts"
     return f"{found.installed or found.root}: no controller found: {reasons}; fill in the files by hand"
 
 
 def _as_yaml(text: str) -> str:
-    """A text as a YAML value, quoted if necessary."""
     plain = re.fullmatch(r"[\w./][\w./ -]*", text) and yaml.safe_load(text) == text
     return text if plain else json.dumps(text, ensure_ascii=False)
 
 
 def _words(found: Survey, folder: Path) -> dict[str, Any]:
-    """The variables of the templates."""
     candidates = loop_candidates(found)[:MOST_SHOWN]
     title = found.installed or (found.packages[0] if len(found.packages) == 1 else found.root.name)
     name = re.sub(r"\W+", "_", title.removesuffix(".py")).strip("_").lower()
@@ -96,7 +95,7 @@ def _words(found: Survey, folder: Path) -> dict[str, Any]:
 
 
 def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
-    """The variables for the likeliest step of the loop, in the entry and the first fault."""
+    """Return the template variables that depend on the likeliest step of the loop."""
     if best is None:
         return dict.fromkeys(
             ("module", "imported", "builder", "call", "path", "function", "value", "others"), ""
@@ -128,7 +127,7 @@ def _of_loop(best: LoopCandidate | None) -> dict[str, Any]:
 
 
 def _arguments(best: LoopCandidate) -> str:
-    """The state for the first required argument, and a placeholder for every other except a time step."""
+    """Return call arguments: the state first, then the time step, and `...` for all others."""
     first, *others = best.needs or ("",)
     texts = [f"{name}={'self.step_s' if name in _TIME_STEPS else '...'}" for name in others]
     return ", ".join(["state", *texts]) if first else ""

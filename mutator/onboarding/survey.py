@@ -22,32 +22,26 @@ _NO_MODULES = {"setup.py", "conftest.py", "noxfile.py", "__init__.py", "__main__
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Module:
-    """A Python file: its path relative to the root, and its syntax tree."""
+    """A Python file. The path is relative to the root."""
 
     path: str
     tree: ast.Module
 
     @property
     def name(self) -> str:
-        """The import name."""
         return self.path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Survey:
-    """A source tree, described in a manifest's terms.
+    """A source tree, described in a manifest's terms."""
 
-    `root` is the folder for `sys.path`; `packages` are its import packages and flat modules (`drive.py`).
-    `modules` were read; `unread` were not: path and line, and reason. `requires` is the tree's installed
-    distribution, as a requirement.
-    """
-
-    root: Path
-    packages: tuple[str, ...]
-    modules: tuple[Module, ...]
-    unread: tuple[tuple[str, str], ...] = ()
+    root: Path  # the folder for `sys.path`
+    packages: tuple[str, ...]  # import packages and flat modules (`drive.py`)
+    modules: tuple[Module, ...]  # the files that were read
+    unread: tuple[tuple[str, str], ...] = ()  # `path:line` and reason of each file that cannot be read
     installed: str | None = None
-    requires: str | None = None
+    requires: str | None = None  # requirement for the installed distribution
 
 
 def look_at(target: str) -> Survey:
@@ -70,7 +64,6 @@ def look_at(target: str) -> Survey:
 
 
 def _installed(name: str) -> Survey:
-    """The package or module that `import NAME` would find."""
     place = installed_at(name) if name.isidentifier() else None
     if place is None:
         raise MutatorError(
@@ -83,13 +76,12 @@ def _installed(name: str) -> Survey:
 
 
 def _distribution(name: str) -> str | None:
-    """The installed distribution of an import package, with its version as the minimum."""
     owners = metadata.packages_distributions().get(name)
     return f"{owners[0]}>={metadata.version(owners[0])}" if owners else None
 
 
 def _packages_in(folder: Path) -> Iterator[str]:
-    """Packages (with or without `__init__.py`) and flat modules of a folder, except tests and the like."""
+    """Yield packages (with or without `__init__.py`) and flat modules, except tests, docs and scripts."""
     try:
         entries = sorted(folder.iterdir())
     except OSError as err:
@@ -108,7 +100,7 @@ def _packages_in(folder: Path) -> Iterator[str]:
 
 
 def _files(folder: Path) -> Iterator[Path]:
-    """Python files below a folder, without tests, hidden folders and environments."""
+    """Yield Python files below a folder, except in tests, hidden folders and virtual environments."""
     for place, folders, names in os.walk(folder):
         folders[:] = sorted(n for n in folders if _importable(n) and n not in _NOT_THE_CONTROLLER)
         if "pyvenv.cfg" in names:
@@ -118,7 +110,6 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _is_module(path: Path) -> bool:
-    """Whether the file name allows an import."""
     return path.suffix == ".py" and _importable(path.stem) and path.is_file()
 
 
@@ -142,7 +133,7 @@ def _of(root: Path, packages: tuple[str, ...]) -> Survey:
                     f"more than {_MOST_FILES} Python files",
                     where=root,
                     expected="the source of one controller",
-                    remedy="use a subfolder",
+                    remedy="pass a subfolder",
                 )
             relative = path.relative_to(root).as_posix()
             try:

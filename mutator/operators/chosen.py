@@ -1,4 +1,4 @@
-"""Select mutations: by operator, by place in the source, by lines that golden runs execute."""
+"""Selects mutations: by operator, by place in the source, by lines that golden runs execute."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,21 +25,17 @@ _GLOB = "*?["
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Found:
-    """The mutations of some places, and the numbers of those left out, by reason.
-
-    `unexecuted`: no golden run executes the line. `equal`: the code equals the original's code. `twins`: the
-    code equals that of another mutation. `invalid`: the code does not compile.
-    """
+    """The selected mutations, and the numbers of those left out, by reason."""
 
     mutations: tuple[Mutation, ...] = ()
-    unexecuted: int = 0
-    equal: int = 0
-    twins: int = 0
-    invalid: int = 0
+    unexecuted: int = 0  # no golden run executes the line
+    equal: int = 0  # same code as the original
+    twins: int = 0  # same code as an earlier mutation
+    invalid: int = 0  # does not compile
 
     @property
     def told(self) -> str:
-        """A summary of how many there are and what was left out."""
+        """A summary of the numbers for the user."""
         left_out = {
             "in lines that no golden run executes": self.unexecuted,
             "with the code of the original": self.equal,
@@ -58,10 +54,10 @@ def find_mutations(
     places: Sequence[str],
     executed: Lines | None = None,
 ) -> Found:
-    """The mutations that the operators make at these places, in the order of files and lines.
+    """Return the operators' mutations at these places, by file and line.
 
     A place is `PATH` or `PATH::FUNCTION`; `*` is a wildcard, and `**` also matches across folders. `executed`
-    restricts the lines (None: all). MutatorError for a place that matches nothing.
+    limits the mutations to these lines. MutatorError if a place matches nothing.
     """
     wanted: dict[str, dict[str, None]] = {}
     for place in places:
@@ -106,7 +102,7 @@ def _added(one: Found, other: Found) -> Found:
 
 
 def _functions(manifest: TargetManifest, place: str) -> Iterator[tuple[str, str]]:
-    """Yield path and qualified name of each function that a place names; at least one."""
+    """Yield path and qualified name of each function that a place names; MutatorError if there is none."""
     path, _, function = place.partition("::")
     paths = _paths(manifest, path)
     hits = [
@@ -151,9 +147,9 @@ def _may_be_mutated(manifest: TargetManifest, path: str) -> bool:
 
 
 def sampled(found: Found, count: int | None, seed: int) -> tuple[Mutation, ...]:
-    """Sample `count` of the mutations, in proportion to the number from each operator in each function.
+    """Sample `count` mutations, stratified by operator and function, in their original order.
 
-    They keep their order. The sample is systematic over a seeded order, so each mutation has the same chance.
+    The sample is systematic over a seeded order, so each mutation has the same chance.
     """
     total = len(found.mutations)
     if count is None or count >= total:

@@ -1,4 +1,4 @@
-"""All mutations of a function, in source order."""
+"""Lists all mutations of a function."""
 
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -22,7 +22,7 @@ _ID = "ffffffff"  # no operator template writes it
 def mutations_of(
     file: ParsedFile, facts: Facts, function: str, models: FaultModels, operators: Collection[Operator]
 ) -> list[Mutation]:
-    """The operators' mutations of the functions with that qualified name, by place, then by operator."""
+    """Return the mutations of all functions with that qualified name, by line, then by operator."""
     found = list(_of_values(file, facts, function, models, operators))
     if Operator.OMISSION in operators:
         found += _omissions(file, facts, function)
@@ -60,7 +60,7 @@ def _of_values(
 
 
 def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutation]:
-    """Omissions of assignments, augmented assignments and calls that stand alone on their lines."""
+    """Yield omissions of assignments and calls that are alone on their lines."""
     every = ((f.line + 1, one) for f in file.functions.get(function, ()) for one in f.statements)
     found = [(line, one) for line, one in every if one.reason is None and one.opens is None]
     seen: Counter[tuple[str, str]] = Counter()
@@ -93,10 +93,7 @@ def _omissions(file: ParsedFile, facts: Facts, function: str) -> Iterator[Mutati
 
 
 def _can_be_left_out(statement: Statement, facts: Facts, function: int) -> bool:
-    """False for the statement that first binds a local name: every later use of the name would fail.
-
-    `function` is the line of the function that contains it.
-    """
+    """Return False for the first binding of a local name: without it, later uses of the name would fail."""
     if not statement.alone or statement.is_return:
         return False
     names = [name for name in statement.assigns if name.isidentifier()]

@@ -1,4 +1,4 @@
-"""Find mutations whose function compiles to the code of the original or of another mutation."""
+"""Drops mutations whose function compiles to the same code as the original or an earlier mutation."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -12,21 +12,17 @@ from mutator.operators.mutations import Mutation
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Distinct:
-    """Mutations with distinct code, and the numbers of those left out.
-
-    `equal`: the code equals the original's. `twins`: it equals that of an earlier mutation. `invalid`: it
-    does not compile.
-    """
+    """Mutations with distinct code, and the numbers of those left out."""
 
     mutations: tuple[Mutation, ...]
-    equal: int
-    twins: int
-    invalid: int
+    equal: int  # same code as the original
+    twins: int  # same code as an earlier mutation
+    invalid: int  # does not compile
 
 
 def distinct(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct:
-    """One file's mutations whose code, while active, differs from the original's and from earlier ones'."""
-    known: dict[range, list[object]] = {}  # codes seen for a function, the original's first
+    """Keep the mutations of a file whose code, while active, differs from the original and earlier ones."""
+    known: dict[range, list[object]] = {}  # by function, the original's code first
     kept: list[Mutation] = []
     equal = twins = invalid = 0
     for mutation in mutations:
@@ -48,7 +44,6 @@ def distinct(file: ParsedFile, mutations: Iterable[Mutation]) -> Distinct:
 
 
 def mutated(file: ParsedFile, function: range, mutation: Mutation) -> list[bytes]:
-    """The lines of the function with the mutation written into its source."""
     before, place = list(file.lines[function.start : mutation.line]), mutation.place
     if isinstance(place, Expression):
         first, last = file.lines[place.start[0]], file.lines[place.end[0]]

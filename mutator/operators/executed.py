@@ -1,7 +1,6 @@
-"""The lines that golden runs execute, measured once per run in a separate process and cached.
+"""Finds the lines that golden runs execute, each run measured once in a separate process and cached.
 
-Only lines executed from the first observation on count. Code that runs earlier, such as a constructor, ends
-before a fault can be active.
+Lines executed before the first observation are ignored, because no fault can be active then.
 """
 
 import json
@@ -27,7 +26,7 @@ Executed = dict[str, frozenset[int]]  # lines (from 1) by file
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GoldenDrive:
-    """A run without a fault: scenario file, changes, seed."""
+    """What determines a golden run."""
 
     scenario: Path
     changes: tuple[str, ...]
@@ -35,7 +34,7 @@ class GoldenDrive:
 
 
 def lines_of(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
-    """The executed lines of each drive, measured unless cached. MutatorError if a drive fails."""
+    """Return the executed lines of each drive, measured unless cached. MutatorError if a drive fails."""
     found = [_recalled(_key(manifest, drive)) for drive in drives]
     if any(lines is None for lines in found):
         with ScratchFolder("mutator-lines-") as scratch:
@@ -57,7 +56,7 @@ def _measured(engine: ReferenceEngine, drive: GoldenDrive, folder: Path) -> Exec
             f"no executed lines: the golden run of {drive.scenario.stem} failed: {execution.detail}",
             where=engine.manifest.path,
             expected="a fault-free run that succeeds",
-            remedy="see `mutator check --drive`",
+            remedy="run `mutator check --drive`",
         )
     return {file: frozenset(lines) for file, lines in execution.lines.items()}
 

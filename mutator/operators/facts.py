@@ -15,11 +15,11 @@ _OWN_NAMES: dict[type[ast.AST], str] = {ast.comprehension: "target", ast.Lambda:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Facts:
-    """Statements of a file's functions. Lines count from 1.
+    """Statements of a file's functions. Line numbers start at 1.
 
-    * `augmented`: the operator of an augmented assignment, by the extent of the assigned expression
-    * `texts`: the source of each statement that begins on a line
-    * `bound`: the line that first binds a name in a function, which is identified by its `def` line, since
+    * `augmented`: the operator of an augmented assignment, by the extent of its right-hand side
+    * `texts`: the source of simple statements, by first line
+    * `bound`: the line that first binds a name in a function. The key has the function's `def` line, because
       a property and its setter share a name
     * `own`: the lines of each statement without those of nested statements
     """
@@ -30,7 +30,7 @@ class Facts:
     own: list[range] = field(default_factory=list)
 
     def executed(self, lines: Collection[int]) -> frozenset[int]:
-        """All lines of the statements that contain one of these lines; a statement executes as a whole."""
+        """Extend the lines to whole statements."""
         ran = [own for own in self.own if any(line in lines for line in own)]
         return frozenset(lines).union(*ran)
 
@@ -40,7 +40,6 @@ def extent(node: ast.expr) -> Extent:
 
 
 def facts_of(tree: SourceTree, path: str) -> Facts:
-    """The facts of a file of the target, cached."""
     return tree.derived(path, _facts)
 
 
@@ -51,7 +50,6 @@ def _facts(path: str, data: bytes, root: Path) -> Facts:
 
 
 def _block(body: list[ast.stmt], function: int | None, facts: Facts) -> None:
-    """Add the statements of a function, known by its line, or of a module or class."""
     for statement in body:
         if function is not None:
             _statement(statement, function, facts)
@@ -88,9 +86,7 @@ def _statement(statement: ast.stmt, function: int, facts: Facts) -> None:
 
 
 def _own_nodes(statement: ast.stmt) -> Iterator[ast.AST]:
-    """Yield a statement's nodes without nested statements and without names local to comprehensions and
-    lambdas.
-    """
+    """Yield a statement's nodes, except nested statements and names local to comprehensions and lambdas."""
     todo: list[ast.AST] = [statement]
     while todo:
         node = todo.pop()

@@ -1,4 +1,4 @@
-"""Mutations: what an operator does at a place in a function. Each becomes one fault."""
+"""Mutations: changes that operators make in a function. Each becomes one fault."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ _AROUND = 20  # unchanged characters kept at either end
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Rule:
-    """A fault model with its parameters, which an operator applies to an expression."""
+    """A fault model with parameters that an operator applies to an expression."""
 
     operator: Operator
     model: str
@@ -22,9 +22,9 @@ class Rule:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mutation:
-    """One change of a function: `was` becomes `now`, in source.
+    """One change of a function: the source text `was` becomes `now`.
 
-    `place` is the expression whose value changes, or the statement that is left out.
+    `place` is the changed expression or the omitted statement.
     """
 
     operator: Operator
@@ -37,7 +37,7 @@ class Mutation:
 
     @property
     def line(self) -> int:
-        """The line, from 0, on which its place begins."""
+        """The line on which the place begins, counted from 0."""
         return self.place.start[0] if isinstance(self.place, Expression) else self.place.first
 
     @property
@@ -51,7 +51,6 @@ class Mutation:
         return " -> ".join(_part(text, before, after) for text in (was, now))
 
     def fault(self, reading: str) -> Fault:
-        """The fault that makes this change."""
         injection = Injection(location=self.location, model=self.model, params=self.params)
         return Fault(
             spec=f"{OPERATORS}/{self.operator}/{self.location.path}::{self.location.function}",
@@ -73,7 +72,6 @@ def _in_common(one: str, other: str) -> int:
 
 
 def _part(text: str, before: int, after: int) -> str:
-    """The part of a text that differs, with some context; the middle of a long text is left out."""
     part = text[before : len(text) - after]
     half = _LONGEST // 2
     if len(part) > _LONGEST + 4:

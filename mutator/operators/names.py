@@ -12,7 +12,7 @@ MODELS = (*(f"operator_{name}" for name in _OWN), "omission")  # fault models th
 
 
 class Operator(StrEnum):
-    """The mutation operators. If two make the same change, the first one claims it."""
+    """The mutation operators. If two make the same change, the first one gets it."""
 
     ARITHMETIC = "arithmetic"
     COMPARISON = "comparison"
@@ -24,12 +24,12 @@ class Operator(StrEnum):
 
 
 def operator_of(fault: Fault) -> Operator | None:
-    """The operator that made a fault; None for a fault from a spec, whose name contains no `::`."""
+    """Return the operator that made a fault, or None if a spec did. Names of specs contain no `::`."""
     return Operator(fault.fault_type) if fault.module == OPERATORS and "::" in fault.spec else None
 
 
 def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
-    """The operators with these names, without duplicates; MutatorError for an unknown name, and for none."""
+    """Return the named operators without duplicates. MutatorError for an unknown name, or for none."""
     known = [one.value for one in Operator]
     found: dict[Operator, None] = {}
     for name in names:
@@ -42,5 +42,5 @@ def operators_named(names: Iterable[str]) -> tuple[Operator, ...]:
             )
         found[Operator(name)] = None
     if not found:
-        raise MutatorError("no operator", argument="operators", expected=f"some of {', '.join(known)}")
+        raise MutatorError("no operator given", argument="operators", expected=f"some of {', '.join(known)}")
     return tuple(found)

@@ -1,4 +1,4 @@
-"""Choose the mutation rules that fit an expression, as listed in docs/reference/operators.md."""
+"""Chooses the mutation rules for an expression, as listed in docs/reference/operators.md."""
 
 import ast
 from collections.abc import Iterator
@@ -47,9 +47,9 @@ _UNCALCULATED = (ast.Yield, ast.YieldFrom)
 
 
 def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterator[Rule]:
-    """The rules that fit an expression.
+    """Yield the rules that fit an expression.
 
-    `augmented` is the operator of the augmented assignment whose value the expression is, if any.
+    `augmented`: the operator, if the expression is the right-hand side of an augmented assignment.
     """
     node = expression.node
     if any(isinstance(inner, _UNCALCULATED) for inner in ast.walk(node)):
@@ -62,7 +62,7 @@ def rules_for(expression: Expression, augmented: ast.operator | None) -> Iterato
         yield _rule(Operator.BRANCH, "operator_prefix", to="not")
         if not any(
             isinstance(inner, ast.NamedExpr) for inner in ast.walk(node)
-        ):  # without `:=`, its name would be missing
+        ):  # replacing `:=` would leave its name unbound
             yield _rule(Operator.BRANCH, "operator_constant", to=True)
             yield _rule(Operator.BRANCH, "operator_constant", to=False)
     if expression.answers(AnchorKind.RETURN_VALUE, "", None):
@@ -91,7 +91,6 @@ def _arithmetic(node: ast.expr, augmented: ast.operator | None) -> Iterator[Rule
 
 
 def _is_number(node: ast.expr) -> bool:
-    """Whether it may be a number: not a text or container."""
     if isinstance(node, ast.Constant):
         return isinstance(node.value, int | float | complex)
     return not isinstance(node, _NO_NUMBERS)
@@ -109,7 +108,7 @@ def _comparison(node: ast.expr) -> Iterator[Rule]:
 
 
 def _constants(node: ast.expr) -> list[Value]:
-    """Replacements of a constant: 0, 1, -1, one more, one less, negated; distinct, of the constant's type."""
+    """Return distinct replacements of a constant: 0, 1, -1, one more, one less, negated, all of its type."""
     sign = 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
         sign, node = -1, node.operand
@@ -147,7 +146,7 @@ def _is_denied(node: ast.expr) -> bool:
 
 
 def _called(node: ast.Call) -> Iterator[Rule]:
-    """Adjacent positional arguments swapped, and keywords dropped."""
+    """Swap adjacent positional arguments, drop keyword arguments."""
     operator = Operator.ARGUMENT
     known = 0
     while known < len(node.args) and not isinstance(node.args[known], ast.Starred):

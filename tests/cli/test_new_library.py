@@ -149,7 +149,7 @@ def test_check_lists_every_place_to_fill_in(
         assert sum(line.startswith(place) for line in lines) == 1, place
 
 
-EMPTY = "no Python files except tests and the like"
+EMPTY = "no Python files apart from tests, docs and scripts"
 NOTHING: dict[str, tuple[dict[str, str], str]] = {
     "empty": ({}, EMPTY),
     "tests": ({"tests/test_pilot.py": CONTROLLER, "test_all.py": CONTROLLER}, EMPTY),

@@ -19,11 +19,11 @@ TARGET = CLONE / "target"
 FEW = [TARGET / "selfdrive/controls/lib/longcontrol.py"]
 ALL = sorted(p for part in ("car", "controls") for p in (TARGET / "selfdrive" / part).rglob("*.py"))
 EXCUSES = (
-    "no other statement follows",
+    "the next statement is missing",
     "no statement that is alone on its lines",
     "the anchored statement",
     "the template yields",
-    "is the last thing that its block does",
+    "ends its block",
 )
 
 

@@ -149,11 +149,11 @@ def test_functions_are_found_by_qualified_name() -> None:
         (AnchorKind.AFTER_CALL, "inner", "A.run", None, ["m.py:31:", "returns, so nothing after it runs"]),
         (AnchorKind.AFTER_ASSIGN, "u", "A.run", None, ["m.py:25:", "its line with statements after it"]),
         (AnchorKind.BEFORE_ASSIGN, "v", "A.run", None, ["shares its line with statements before it"]),
-        (AnchorKind.AFTER_ASSIGN, "b", "A.run", 2, ["m.py:24:", "stands on the line of its `if`"]),
+        (AnchorKind.AFTER_ASSIGN, "b", "A.run", 2, ["m.py:24:", "is on the line of its `if`"]),
         (AnchorKind.BEFORE_RETURN, "self._width", "A.width", None, ["m.py:7:", "`if`, `for` or `def`"]),
         (AnchorKind.AFTER_ASSIGN, "a", "A.runn", None, ["no function 'A.runn'", "A.run,", "mean 'A.run'"]),
         (AnchorKind.ENTRY, "", "A.width", None, ["2 functions 'A.width'", "line 7, line 10", "from 1 to 2"]),
-        (AnchorKind.ENTRY, "", "A.width", 1, ["no line of its own to insert at"]),
+        (AnchorKind.ENTRY, "", "A.width", 1, ["has no line at which to insert"]),
         (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another anchor: there is none of this kind"]),
     ],
 )  # fmt: skip

@@ -175,7 +175,7 @@ def test_all_stand_beside_each_other(clone: Workspace) -> None:
         (at("self", "Gains.h"), "there is none of this kind"),
         (at("x", "Gains.gone"), "no function 'Gains.gone'"),
         (at("Field.b"), "m.py:29: the constant 'Field.b' cannot be set: the field has no default"),
-        (at("Gear.DRIVE"), "its class is made by Enum"),
+        (at("Gear.DRIVE"), "its class derives from Enum"),
         (at("COUNT"), "a function sets it, too"),
     ],
 )

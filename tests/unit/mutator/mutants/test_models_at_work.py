@@ -176,12 +176,12 @@ def test_the_target_raises_where_order_matters(toy: Make) -> None:
 @pytest.mark.parametrize(
     ("source", "said"),
     [
-        ("def f(x):\n    y = x\n", "no other statement follows"),
-        ("def f(x):\n    y = x\n    if x:\n        pass\n", "no other statement follows"),
-        ("def f(x):\n    y = x\n    x += 1; x += 2\n", "no other statement follows"),
+        ("def f(x):\n    y = x\n", "the next statement is missing"),
+        ("def f(x):\n    y = x\n    if x:\n        pass\n", "the next statement is missing"),
+        ("def f(x):\n    y = x\n    x += 1; x += 2\n", "the next statement is missing"),
         ("def f(x):\n    y = x; x += 1\n", "alone on its lines"),
-        ("def f(x):\n    y = x\n    return '''a\nb'''\n", "a string runs over the end of a line"),
-        ("def f(x):\n    y = '''a\nb'''\n    return x\n", "a string runs over the end of a line"),
+        ("def f(x):\n    y = x\n    return '''a\nb'''\n", "a string spans several lines"),
+        ("def f(x):\n    y = '''a\nb'''\n    return x\n", "a string spans several lines"),
     ],
 )
 def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) -> None:
@@ -197,7 +197,7 @@ def test_no_statement_to_repeat(toy: Make) -> None:
 
 def test_a_return_is_not_repeated(toy: Make) -> None:
     """A return statement is refused, because it ends the function. Its result can be repeated."""
-    with pytest.raises(MutatorError, match=r"`return g\(x\)` is the last thing that its block does"):
+    with pytest.raises(MutatorError, match=r"`return g\(x\)` ends its block"):
         toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
 
 

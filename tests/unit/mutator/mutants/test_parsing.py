@@ -13,16 +13,16 @@ BODY = "def f(x):\n    x = 1\n    return x\n"
 @pytest.mark.parametrize(
     ("source", "line", "said"),
     [
-        ("\\\n" + BODY, 1, "LibCST does not give back the line `\\`"),
+        ("\\\n" + BODY, 1, "LibCST does not reproduce the line `\\`"),
         (
             "def f(x):\n    x = 1\n    \\\n    y = 2\n    return x\n",
             3,
-            "LibCST does not give back the line `\\`",
+            "LibCST does not reproduce the line `\\`",
         ),
-        ("def f(x):\r\n    x = 1\r\n\\\r\n    return x\r\n", 3, "LibCST does not give back the line `\\`"),
-        ("# coding: latin-1\nx = '\xe9'\n\n\\\n" + BODY, 4, "LibCST does not give back the line `\\`"),
+        ("def f(x):\r\n    x = 1\r\n\\\r\n    return x\r\n", 3, "LibCST does not reproduce the line `\\`"),
+        ("# coding: latin-1\nx = '\xe9'\n\n\\\n" + BODY, 4, "LibCST does not reproduce the line `\\`"),
         (BODY + "try:\n    f(1)\nexcept OSError :\n    pass\n", 6, "the line `except OSError :`"),
-        (BODY + "\n  \n", 4, "LibCST does not give back the line `` as it is"),
+        (BODY + "\n  \n", 4, "LibCST does not reproduce the line ``"),
         (BODY + "\n\x0cdef g(): pass\n", 5, "the line `def g(): pass`"),
         ("def f(x):\n    (x): int = 1\n", 2, "LibCST cannot read it: parser error"),
         ("x = 1\ny = (" + "1 + " * 400 + "1)\n", None, "LibCST cannot read it: maximum recursion depth"),

@@ -78,7 +78,7 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
 
 def test_a_hold_time_is_needed(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
-    with pytest.raises(MutatorError, match="holds for a time"):
+    with pytest.raises(MutatorError, match="without a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
 
 

@@ -137,7 +137,7 @@ def test_guards_in_all_shapes(text: str) -> None:
 def test_a_guard_needs_its_statement_alone(text: str, kind: AnchorKind) -> None:
     """A statement that shares its line cannot be wrapped, nor can anything that is not a statement."""
     file = parsed(text)
-    with pytest.raises(MutatorError, match="a guard needs a statement to wrap"):
+    with pytest.raises(MutatorError, match="a guard needs a statement that is alone"):
         edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
 
 
