@@ -1,4 +1,1 @@
-"""Turn a campaign file into its frozen plan: experiments, sampling, filters, chunks and provenance.
-
-This package does not run or judge experiments.
-"""
+"""Turns a campaign file into its frozen plan. This package does not run or judge experiments."""

@@ -24,26 +24,19 @@ _Told = TypeVar("_Told")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Selection:
-    """A selection of faults: specs by a glob over `<module>/<fault_type>/<variant>`, a spec `file`, or
-    `operators`.
-
-    `values` is the number of values to take from each variant, spread evenly in spec order (None: all).
-    """
+    """A selection of faults: a glob over `<module>/<fault_type>/<variant>`, a spec `file`, or `operators`."""
 
     spec: str
     file: Path | None = None
-    values: int | None = None
+    values: int | None = None  # number of values from each variant, spread evenly; None: all
     operators: OperatorSelection | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Canary:
-    """A fault known to be harmful: its largest value, active from `at_s` on, must reach `hazard`.
+    """A fault known to be harmful: its largest value, active from `at_s` on, must reach `hazard`."""
 
-    `spec` is the full name of a variant, `<module>/<fault_type>/<variant>`.
-    """
-
-    spec: str
+    spec: str  # the full name of a variant
     scenario: str
     hazard: str
     at_s: float
@@ -51,41 +44,28 @@ class Canary:
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """A checked campaign file. Times are simulated seconds; `source` is the file as read.
-
-    * `sample`: the number of experiments to take, equally per variant. With `proportional`, experiments are
-      taken in pairs, in proportion to the number of each fault type and scenario.
-    * `study`: the published work that reports compare with (None: none)
-    * `setting_in(reading)`: the manifest changes that apply to every run
-    * `reading`: None for the library's default
-    * `armed_after(reading)`: the time before which no trigger fires and no random time is drawn; None: as in
-      the manifest
-    * `table`, `listed`: the triggers, from a context table or a list
-    * `seeds`: the seeds; the campaign is repeated with each
-    * `hold_s`: how long a triggered fault stays active (None: while its context holds, or to the end)
-    * `after_hazard`: whether runs continue or end at their first terminal hazard
-    """
+    """A checked campaign file. Times are simulated seconds."""
 
     name: str
     about: str
-    study: str | None
+    study: str | None  # the published work with which reports compare
     path: Path
     source: bytes
     target: str
     scenarios: tuple[str, ...]
     setting: Mapping[str, tuple[str, ...]]
     faults: tuple[Selection, ...]
-    reading: str | None
+    reading: str | None  # None: the library's default
     methods: tuple[Method, ...]
     table: str | None
     rows: tuple[str, ...] | None
     listed: tuple[ListedTrigger, ...]
     armed_after_s: Mapping[str, float]
     random_until_s: float | None
-    hold_s: float | None
-    sample: int | None
-    proportional: bool
-    seeds: range
+    hold_s: float | None  # how long faults stay active; None: while the context holds, or to the end
+    sample: int | None  # number of experiments, equally per variant
+    proportional: bool  # instead: in pairs, in proportion to each fault type and scenario
+    seeds: range  # the campaign is repeated with each
     canary: Canary
     limits: Limits
     chunk: int
@@ -98,15 +78,14 @@ class Campaign:
         return self.seeds[0]
 
     def armed_after(self, reading: str) -> float | None:
-        """The time at which triggers are armed under a reading; None if the campaign does not set it."""
+        """Return the time at which triggers are armed; None if the campaign does not set it."""
         return _in(self.armed_after_s, reading) if self.armed_after_s else None
 
     def setting_in(self, reading: str) -> tuple[str, ...]:
-        """The manifest changes that apply under a reading."""
         return _in(self.setting, reading)
 
     def setting_keys(self, reading: str) -> Keys:
-        """The position of these manifest changes in the file."""
+        """Return the position of these manifest changes in the file."""
         return ("setting", reading) if reading in self.setting else ("setting",)
 
     def error(self, keys: Keys, got: str, *, expected: str, remedy: str) -> MutatorError:
@@ -182,7 +161,6 @@ def _seeds(model: CampaignModel) -> range:
 
 
 def _check_once(model: CampaignModel, source: Source) -> None:
-    """Check that no scenario, method or manifest change appears twice."""
     settings: dict[Keys, Sequence[str]] = {
         ("setting",) if name == EVERY_READING else ("setting", name): names
         for name, names in model.setting.items()
@@ -197,14 +175,10 @@ def _check_once(model: CampaignModel, source: Source) -> None:
 
 
 def _spec_file(campaign: Path, spec: str) -> Path | None:
-    """The spec file that a selection names; None if it selects specs of the library."""
     return campaign.parent / spec if spec.endswith((".yaml", ".yml")) else None
 
 
 def load_study(campaign: Campaign) -> Study | None:
-    """Load the study that a campaign names (None: none); MutatorError with file and line if it is
-    unavailable.
-    """
     if campaign.study is None:
         return None
     try:

@@ -18,13 +18,12 @@ from mutator.operators.names import Operator
 
 
 class SelectionModel(StrictModel, title="A selection"):
-    """Select specs of the library by name, a spec file, or mutants of `operators`."""
+    """Selects specs of the library by name, a spec file, or mutants of `operators`."""
 
     spec: str | None = Field(
         None,
-        description="A glob over `<module>/<fault_type>/<variant>`, such as `sensor/*` or "
-        "`sensor/speed/low`. Or a spec file outside the library, as a path relative to the "
-        "campaign's folder: `my_fault.yaml`.",
+        description="A glob over `<module>/<fault_type>/<variant>`, such as `sensor/*`, or the path of a "
+        "spec file outside the library, relative to the campaign's folder: `my_fault.yaml`.",
     )
     values: int | None = Field(
         None, ge=1, description="How many values to take from each variant, spread evenly. Default: all."
@@ -93,8 +92,7 @@ class _LimitsModel(StrictModel, title="Limits"):
         default=1024,
         ge=1,
         le=MOST,
-        description="MiB in the run's output folder and TMPDIR together. It also limits each single file "
-        "that the run writes.",
+        description="MiB in the run's output folder and TMPDIR together. Also the limit of each single file.",
     )
 
 
@@ -112,12 +110,12 @@ class SeedsModel(StrictModel, title="Seeds"):
 
 
 class CampaignModel(StrictModel, title="The file"):
-    """What a campaign runs, and what each run may use."""
+    """What a campaign runs, and the limits of each run."""
 
     name: str = Field(pattern=r"^[a-z0-9_]+$", description="The name: lowercase letters, digits and `_`.")
     about: str = Field(description="The purpose of the campaign.")
     study: str | None = Field(
-        None, description="The [study](../how-to/add-a-study.md) that its reports compare the results with."
+        None, description="The [study](../how-to/add-a-study.md) with which its reports compare the results."
     )
     target: str = Field(description="The target, named by its manifest.")
     scenarios: list[str] = Field(min_length=1, description="The scenarios by name, each once.")
@@ -129,7 +127,7 @@ class CampaignModel(StrictModel, title="The file"):
         "one list for each reading by its name.",
     )
     faults: list[SelectionModel] = Field(
-        min_length=1, description="The selections of faults. The campaign runs the faults of all of them."
+        min_length=1, description="The selections of faults. The campaign runs all of them."
     )
     reading: str | None = Field(
         None,
@@ -149,8 +147,8 @@ class CampaignModel(StrictModel, title="The file"):
     )
     proportional: bool = Field(
         False,
-        description="Sample each fault type in each scenario in proportion to its number of experiments. "
-        "Draw guided and random experiments in pairs.",
+        description="Sample each fault type in each scenario in proportion to its number of experiments, "
+        "with guided and random experiments in pairs.",
     )
     seed: int | None = Field(
         None,
@@ -183,7 +181,7 @@ class CampaignModel(StrictModel, title="The file"):
         if self.proportional and self.sample is None:
             raise ValueError("`proportional` without `sample`; set `sample` to the number of experiments")
         if self.proportional and any(one.operators for one in self.faults):
-            raise ValueError("proportional with `operators`: they have a `sample` of their own")
+            raise ValueError("`proportional` with `operators`: use their own `sample`")
         if (self.seed is None) == (self.seeds is None):
             raise ValueError(
                 "either `seed` or `seeds`" if self.seed is None else "`seed` or `seeds`, not both"

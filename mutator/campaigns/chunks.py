@@ -1,4 +1,4 @@
-"""Chunks: the experiments that one pytest item runs. Freezing a plan cuts it into chunks."""
+"""Chunks: the experiments that one pytest item runs."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from mutator.store.run_folder import RunFolder
 
 
 def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
-    """The lengths of a plan's chunks: at most `size` experiments each; no chunk spans two groups.
+    """Return the lengths of a plan's chunks: at most `size` experiments each; no chunk spans two groups.
 
     The experiments of a group share a golden run, so an engine can share work within a chunk.
     """
@@ -25,9 +25,7 @@ def cut(groups: Sequence[Hashable], size: int) -> tuple[int, ...]:
 
 
 def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]:
-    """Cut chunks of at most `size` runs, and return the number of experiments in each. A shared run is never
-    split.
-    """
+    """Cut chunks of at most `size` runs and return their numbers of experiments. Shared runs stay whole."""
     lengths = iter([len(same) for same in runs])
     counts = cut([(same[0].scenario, same[0].changes) for same in runs], size)
     return tuple(sum(islice(lengths, count)) for count in counts)
@@ -35,15 +33,16 @@ def cut_runs(runs: Sequence[Sequence[Experiment]], size: int) -> tuple[int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Pending:
-    """The unfinished part of a chunk: the chunk's index, and the positions in it that have no record."""
+    """The unfinished part of a chunk."""
 
     chunk: int
-    places: tuple[int, ...]
+    places: tuple[int, ...]  # positions in the chunk
 
 
 def pending(folder: RunFolder, records: Mapping[str, Record]) -> tuple[Pending, ...]:
-    """Yield the chunks of this folder's share in which experiments have no record, or a harness error, which
-    is retried.
+    """Return the chunks of this folder's share that have experiments to run.
+
+    These have no record, or a harness error, which is retried.
     """
     done = {one.experiment_id for one in endings(records) if one.counts}
     names = plan_file.ids(folder.path) if done else None

@@ -1,4 +1,4 @@
-"""Turn a campaign into experiments: select and expand faults, create triggers, draw random times."""
+"""Turns a campaign into experiments: selects and expands faults, creates triggers, draws random times."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -46,20 +46,17 @@ class Expansion:
         self._operators = OperatorFaults(manifest, self._models, campaign.limits)
 
     def with_seed(self, seed: int) -> "Expansion":
-        """The same expansion with another seed, without reading files again."""
+        """Return the same expansion with another seed, without reading files again."""
         other = copy(self)
         other.seed = seed
         return other
 
     @property
     def told(self) -> tuple[str, ...]:
-        """How many mutants the operators produced, and what was left out."""
         return tuple(self._operators.told)
 
     def experiments(self) -> tuple[Experiment, ...]:
-        """All experiments. Those with the same scenario and changes are adjacent, because they share a golden
-        run.
-        """
+        """Return all experiments. Those that share a golden run are adjacent."""
         self._check_setting()
         faults = self._selected()
         mutants = self._mutants()
@@ -76,7 +73,6 @@ class Expansion:
         return tuple(experiment for _, experiment in made)
 
     def canary(self) -> Experiment:
-        """The canary: the variant's largest value, active from a given time."""
         canary = self.campaign.canary
         if canary.hazard not in self.manifest.hazards:
             raise self.campaign.error(
@@ -105,23 +101,20 @@ class Expansion:
                 )
 
     def _library(self) -> list[_Numbered]:
-        """Every fault of the library, with its position within its variant."""
         if not self._specs:
             self._specs.append(self.workspace.specs())
         return self._expanded(self._specs[0])
 
     def _files(self) -> dict[int, list[_Numbered]]:
-        """The faults of the spec files that the campaign names, by selection."""
         files = {i: one.file for i, one in enumerate(self.campaign.faults) if one.file is not None}
         return {i: self._expanded([self._spec_of_file(("faults", i, "spec"), files[i])]) for i in files}
 
     def _spec_of_file(self, keys: Keys, file: Path) -> FaultSpec:
-        """Read the spec in a file; its name must differ from all names in the library."""
         if not file.is_file():
             raise self.campaign.error(
                 keys,
                 f"no file {file}",
-                expected="a spec file, by its path from the folder of the campaign",
+                expected="the path of a spec file, relative to the campaign's folder",
                 remedy="correct the path",
             )
         spec = self.workspace.spec(file)
@@ -129,7 +122,7 @@ class Expansion:
         if known.exists() and not known.samefile(file):
             raise self.campaign.error(
                 keys,
-                f"{file.name} has the name {spec.name} of a spec in the library",
+                f"{file.name} has the name of a spec in the library, {spec.name}",
                 expected="a unique name",
                 remedy="change `fault_type` in the file",
             )
@@ -163,8 +156,9 @@ class Expansion:
         return list(selected.values())
 
     def _mutants(self) -> list[OperatorFault]:
-        """The mutants of operators, without duplicates. A mutant in several selections is active whenever one
-        of them requires it.
+        """Return the mutants of operators, without duplicates.
+
+        A mutant in several selections is active whenever one of them requires it.
         """
         found: dict[str, OperatorFault] = {}
         for i, selection in enumerate(self.campaign.faults):
@@ -177,7 +171,6 @@ class Expansion:
         return list(found.values())
 
     def _drives(self) -> dict[str, GoldenDrive]:
-        """The golden run of each scenario, used to find the lines that it executes."""
         return {
             name: GoldenDrive(
                 scenario=self._scenario_file(name),
@@ -198,9 +191,7 @@ class Expansion:
         )
 
     def _triggers(self) -> tuple[Trigger, ...]:
-        """The triggers of the context table or the list. Random times are drawn for the same triggers, which
-        forms pairs.
-        """
+        """Return the triggers of the context table or list. Each random time is paired with one of them."""
         if self.campaign.table is None:
             return listed_triggers(
                 self.campaign.listed,
@@ -229,8 +220,9 @@ class Expansion:
     def _of_operators(
         self, scenario: str, mutants: list[OperatorFault], triggers: tuple[Trigger, ...]
     ) -> Iterator[Experiment]:
-        """Experiments with mutants, in scenarios that execute them. Permanent mutants are always active;
-        transient ones follow the other triggers.
+        """Yield experiments with mutants, in scenarios that execute them.
+
+        Permanent mutants are always active; transient ones follow the other triggers.
         """
         permanent = always(armed_after_s=self.armed_after_s)
         for one in mutants:
@@ -250,8 +242,9 @@ class Expansion:
         return row
 
     def _random(self, scenario: str, fault: Fault, number: int, row: Trigger) -> Trigger:
-        """The random partner of a row's trigger. It depends on the reading only through the earliest possible
-        time.
+        """Return the random partner of a row's trigger.
+
+        It depends on the reading only through the earliest possible time.
         """
         assert self.campaign.random_until_s is not None  # the schema requires it for random times
         time = draw_time(
@@ -287,13 +280,13 @@ class Expansion:
                 self._scenario_keys(scenario),
                 f"no scenario '{scenario}' in the library",
                 expected=f"one of {', '.join(known) or 'none'}",
-                remedy="correct the name, or put the file into the library's scenarios/",
+                remedy="correct the name, or add the file to the library's scenarios/",
             )
         return self.workspace.scenario(scenario)
 
     @contextmanager
     def _placed(self, keys: Keys) -> Iterator[None]:
-        """Report an unknown name at the campaign's `keys`. Mistakes in other files keep their own place."""
+        """Report an unknown name at the campaign's `keys`. Errors in other files keep their own place."""
         try:
             yield
         except MutatorError as err:

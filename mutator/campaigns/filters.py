@@ -31,9 +31,8 @@ _ALLOWED = (
 def compile_filter(text: str, columns: Collection[str]) -> Predicate:
     """Compile a filter into a predicate over rows.
 
-    A filter may contain columns, numbers, strings, tuples and lists of them, comparisons, `in`, `not in`,
-    and/or/not, parentheses, and `match(column, "glob*")`. An empty cell equals only `None`, and is neither
-    less nor greater than any value. MutatorError shows the text, the mistake and the known columns.
+    An empty cell equals only `None`, and is neither less nor greater than any value. MutatorError shows the
+    text, the mistake and the known columns.
     """
     if len(text) > _LONGEST:
         raise _error(text[:60] + "...", f"a filter of {len(text)} characters", f"at most {_LONGEST}")
@@ -50,8 +49,6 @@ def _error(text: str, got: str, expected: str, remedy: str = "") -> MutatorError
 
 
 class _Compiler:
-    """Compiles the nodes of one expression into closures."""
-
     def __init__(self, text: str, columns: Collection[str]) -> None:
         self.text = text
         self.columns = columns

@@ -1,4 +1,4 @@
-"""Freeze a plan into a run folder, together with its sources."""
+"""Freezes a plan into a run folder, together with its sources."""
 
 import csv
 import io
@@ -85,7 +85,7 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
                 "holds another plan",
                 where=out,
                 expected=f"plan {found[:16]}",
-                remedy="use another folder, or the campaign and options it was planned with",
+                remedy="use another folder, or the campaign and options with which this one was planned",
             )
         check_version(out, folder.head["schema"], folder.head["provenance"])
         check_sources(out, folder.head["sources"], _sources(tally, plan, workspace))
@@ -98,7 +98,6 @@ def freeze_owned(plan: Plan | Planning, out: Path, workspace: Workspace) -> tupl
 
 
 def _counted(plan: Plan | Planning, each: Callable[[Part], None] = lambda part: None) -> tuple[Tally, str]:
-    """A plan's totals and digest; `each` is called with each part."""
     tally, made = plan.empty_tally(), PlanDigest()
     for part in plan.parts():
         tally.add(part)
@@ -183,7 +182,6 @@ def _head(
 
 
 def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes:
-    """The rows of plan.csv for these experiments, with or without column names."""
     writer = csv.writer(text := io.StringIO(), lineterminator="\n")
     if head:
         writer.writerow(PLAN_COLUMNS)
@@ -193,5 +191,4 @@ def csv_bytes(experiments: Iterable[Experiment], *, head: bool = False) -> bytes
 
 
 def plan_csv(plan: Plan) -> bytes:
-    """The content of plan.csv."""
     return csv_bytes(plan.experiments, head=True)

@@ -1,6 +1,4 @@
-"""Find what a run computes with: Python, operating system, processor, BLAS, packages and the state of git
-clones.
-"""
+"""Finds what a run computes with: Python, operating system, processor, BLAS, packages and git commits."""
 
 import json
 import os
@@ -25,9 +23,7 @@ _BLAS = "import json, numpy, threadpoolctl; print(json.dumps(threadpoolctl.threa
 
 
 def surroundings() -> list[Any]:
-    """Everything outside the target's sources that may change what it computes, including all installed
-    packages.
-    """
+    """Return everything outside the target's sources that may change what it computes."""
     return [python(), platform.platform(), cpu(), blas(), threads(), versions()]
 
 
@@ -36,7 +32,6 @@ def python() -> str:
 
 
 def cpu() -> str | None:
-    """The processor model."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
     except OSError:
@@ -46,15 +41,15 @@ def cpu() -> str | None:
 
 
 def threads() -> dict[str, str]:
-    """The thread limits for numerical libraries in the target's environment."""
+    """Return the thread limits for numerical libraries in the target's environment."""
     return dict.fromkeys(THREADS, "1")
 
 
 @lru_cache(maxsize=1)
 def blas() -> tuple[dict[str, Any], ...]:
-    """The BLAS that numpy loads in the target's environment; empty without numpy.
+    """Return the BLAS that numpy loads in the target's environment; empty without numpy.
 
-    `library`, `version`, `threads`, and the `kernel` chosen for this processor.
+    `kernel` is the one chosen for this processor.
     """
     with tempfile.TemporaryDirectory() as folder:
         done = subprocess.run(
@@ -71,8 +66,9 @@ def blas() -> tuple[dict[str, Any], ...]:
 
 @lru_cache(maxsize=1)
 def _installed() -> dict[str, tuple[str, list[str]]]:
-    """The version and requirements of each installed package. If a package is installed twice, these are of
-    the imported one.
+    """Return the version and requirements of each installed package.
+
+    If a package is installed twice, these are of the imported one.
     """
     found: dict[str, tuple[str, list[str]]] = {}
     for distribution in metadata.distributions():
@@ -84,18 +80,16 @@ def _installed() -> dict[str, tuple[str, list[str]]]:
 
 
 def versions(names: Iterable[str] | None = None) -> dict[str, str | None]:
-    """The version of each of these packages (default: all installed), sorted; None if a package is not
-    installed.
-    """
+    """Return the version of each of these packages (default: all installed); None: not installed."""
     installed = _installed()
     wanted = installed if names is None else names
     return {name: installed.get(name, (None,))[0] for name in sorted(wanted)}
 
 
 def required() -> frozenset[str]:
-    """The packages that mutator requires, and their dependencies.
+    """Return the packages that mutator requires, directly or indirectly.
 
-    If mutator is not installed, its requirements are unknown, and all installed packages are returned.
+    If mutator is not installed, all installed packages are returned.
     """
     installed = _installed()
     seen: set[tuple[str, str]] = set()
@@ -112,9 +106,7 @@ def required() -> frozenset[str]:
 
 
 def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
-    """The packages that provide these top-level modules, sorted. Modules that no package provides are
-    omitted.
-    """
+    """Return the packages that provide these top-level modules. Modules without a package are omitted."""
     providers = metadata.packages_distributions()
     # a package installed as a link to its sources may be listed only under its own name
     names = (name for module in modules for name in providers.get(module, [module]))
@@ -122,9 +114,7 @@ def packages_of(modules: Iterable[str]) -> tuple[str, ...]:
 
 
 def clone_state(folder: Path) -> dict[str, Any] | None:
-    """The state of the git clone at this folder: its `commit`, and whether the folder has `changed` since.
-    None if unknown.
-    """
+    """Return the git commit of a folder, and whether the folder has changed since; None if unknown."""
     head = git(folder, "rev-parse", "HEAD", "HEAD:./")
     changes = git(folder, "status", "--porcelain", "--", ".")
     if head is None or changes is None:
@@ -133,7 +123,6 @@ def clone_state(folder: Path) -> dict[str, Any] | None:
 
 
 def git(folder: Path, *words: str) -> str | None:
-    """The output of a git command in a folder; None if it fails."""
     outside = {name: value for name, value in os.environ.items() if not name.startswith("GIT_")}
     command = ["git", "--no-optional-locks", "-C", str(folder), *words]
     try:

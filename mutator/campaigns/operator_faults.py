@@ -35,7 +35,6 @@ class OperatorFaults:
     def of(
         self, selection: OperatorSelection, drives: Mapping[str, GoldenDrive], seed: int, reading: str
     ) -> list[OperatorFault]:
-        """The faults of a selection in these scenarios; MutatorError if there are none."""
         executed = dict(
             zip(drives, lines_of(self._manifest, list(drives.values()), self._limits), strict=True)
         )

@@ -15,9 +15,9 @@ class When(StrEnum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OperatorSelection:
-    """Select mutants of operators in places of the source; `sample` is their number (None: all)."""
+    """A selection of mutants of operators in places of the source."""
 
     operators: tuple[Operator, ...]
     places: tuple[str, ...]
-    sample: int | None
+    sample: int | None  # number of mutants; None: all
     when: tuple[When, ...]

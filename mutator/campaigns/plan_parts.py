@@ -18,9 +18,7 @@ Group = tuple[str, str, str]  # module, fault type, method
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Part:
-    """Experiments in run order, the lengths of their chunks, and the number of runs. Scenarios may share a
-    run.
-    """
+    """Experiments in run order, the lengths of their chunks, and the number of runs, which may be shared."""
 
     experiments: Sequence[Experiment]
     chunks: Sequence[int]
@@ -29,19 +27,16 @@ class Part:
 
 @dataclass(slots=True, kw_only=True)
 class Tally:
-    """The totals of a plan, once all its parts have been added.
-
-    With `several_seeds`, each seed has its own golden runs. `variants` has one fault per variant.
-    """
+    """The totals of a plan, once all its parts have been added."""
 
     canary: Experiment
-    several_seeds: bool
+    several_seeds: bool  # each seed has its own golden runs
     experiments: int = 0
     runs: int = 0
     chunks: list[int] = field(default_factory=list)
     groups: Counter[Group] = field(default_factory=Counter)
     goldens: dict[GoldenRun, None] = field(default_factory=dict)
-    variants: dict[str, Fault] = field(default_factory=dict)
+    variants: dict[str, Fault] = field(default_factory=dict)  # one fault per variant
 
     def add(self, part: Part) -> None:
         self.experiments += len(part.experiments)
@@ -54,7 +49,6 @@ class Tally:
             self.variants[fault.spec] = fault
 
     def needed(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that the plan needs, including the canary's."""
         own = GoldenRun.of(self.canary, several_seeds=self.several_seeds)
         return tuple(dict.fromkeys((*self.goldens, own)))
 
@@ -67,20 +61,17 @@ class PlanDigest:
         self._joint = ""
 
     def add(self, ids: Sequence[str]) -> None:
-        """Add the ids of the next experiments."""
         if ids:
             self._hash.update((self._joint + ",".join(f'"{name}"' for name in ids)).encode())
             self._joint = ","
 
     def end(self, chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-        """The digest, once all ids have been added."""
         rest = [chunks, canary, plain(campaign.canary), plain(campaign.limits)]
         self._hash.update(f"],{canonical(rest)[1:]}".encode())
         return self._hash.hexdigest()
 
 
 def plan_digest(ids: Sequence[str], chunks: Sequence[int], canary: str, campaign: Campaign) -> str:
-    """The digest of a plan with these ids, chunks, and canary id."""
     made = PlanDigest()
     made.add(ids)
     return made.end(chunks, canary, campaign)

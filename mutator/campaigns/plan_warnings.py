@@ -1,4 +1,4 @@
-"""Warn about experiments whose fault changes nothing."""
+"""Warns about experiments whose fault changes nothing."""
 
 import warnings
 from collections.abc import Sequence
@@ -20,7 +20,6 @@ class IdleValues:
         self._count = self._of = 0
 
     def add(self, experiments: Sequence[Experiment]) -> None:
-        """Check more experiments."""
         faults = {experiment.fault.id: experiment.fault for experiment in experiments}
         idle = {name: fault for name, fault in faults.items() if changes_nothing(fault, self._models)}
         self._labels += [fault.label for fault in idle.values()]
@@ -28,7 +27,6 @@ class IdleValues:
         self._of += len(experiments)
 
     def warn(self) -> None:
-        """Issue a MutatorWarning if there are such faults."""
         if labels := list(dict.fromkeys(self._labels)):
             more = f" and {len(labels) - _NAMED} more" if len(labels) > _NAMED else ""
             warnings.warn(
@@ -40,5 +38,4 @@ class IdleValues:
 
 
 def changes_nothing(fault: Fault, models: FaultModels) -> bool:
-    """Whether a fault with its value changes nothing."""
     return all(models.get(one.model).changes_nothing(dict(one.params)) for one in fault.injections)

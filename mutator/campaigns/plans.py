@@ -39,7 +39,7 @@ _DEFAULT_CPU_S = 1.4  # one run on the reference engine, including interpreter s
 _START_S = 3.0  # time of a campaign outside its runs
 _BYTES_PER_EXPERIMENT = 9_000  # series, patch, record and table rows of an experiment
 _BYTES_PER_GOLDEN = 1_200_000
-_IN_MEMORY = 50_000  # the most experiments for which a plan is read as a whole
+_IN_MEMORY = 50_000  # larger plans are not read as a whole
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -70,16 +70,13 @@ class Choices:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cost:
-    """The expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk.
-
-    `measured` says whether the rate comes from this run folder's golden runs; otherwise it is a default.
-    """
+    """The expected cost of a plan: CPU seconds, wall seconds on `workers`, bytes on disk."""
 
     cpu_s: float
     wall_s: float
     disk_bytes: int
     workers: int
-    measured: bool
+    measured: bool  # whether the rate comes from this run folder's golden runs
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -116,7 +113,7 @@ class Plan:
         return found
 
     def empty_tally(self) -> Tally:
-        """A tally without parts."""
+        """Return a tally without parts."""
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[Part]:
@@ -131,25 +128,25 @@ class Plan:
         return f"<p>{escape(repr(self))}</p>{table}"
 
     def frame(self) -> "pd.DataFrame":
-        """The planned experiments as a pandas frame: the columns of `rows`, indexed by experiment id."""
+        """Return the planned experiments as a pandas frame: `rows`, indexed by experiment id."""
         import pandas as pd
 
         return pd.DataFrame(self.rows()).set_index("experiment_id")
 
     def groups(self) -> Counter[Group]:
-        """The number of experiments for each (module, fault type, method)."""
+        """Return the number of experiments for each (module, fault type, method)."""
         return self.tally.groups
 
     def rows(self) -> list[dict[str, object]]:
-        """Yield one dict per experiment: the result columns that are known before it runs."""
+        """Return one dict per experiment: the result columns that are known before it runs."""
         return [plan_row(experiment) for experiment in self.experiments]
 
     def goldens(self) -> tuple[GoldenRun, ...]:
-        """Every fault-free run that the plan needs, including the canary's."""
+        """Return every golden run that the plan needs, including the canary's."""
         return self.tally.needed()
 
     def cost(self, workers: int = 2) -> Cost:
-        """The expected time and disk space."""
+        """Return the expected time and disk space."""
         goldens = len(self.goldens())
         runs = self.runs + RUNS_PER_GOLDEN * goldens + 1
         cpu_s = runs * (self.run_cpu_s or _DEFAULT_CPU_S)
@@ -181,13 +178,12 @@ class Planning:
             readings.check(self.choices.reading)
         self._workspace, self._manifest = workspace, workspace.manifest(self.campaign.target)
         if self.campaign.after_hazard is AfterHazard.STOP:
-            stop_source(self._manifest)  # rejected here, before any run starts
+            stop_source(self._manifest)  # raises before any run starts
         self._expansion = Expansion(workspace, self.campaign, self._manifest, self.seeds[0], self.reading)
         self.canary = self._expansion.canary()
 
     @property
     def seed(self) -> int:
-        """The seed, or the first of several."""
         return self.seeds[0]
 
     @property
@@ -196,7 +192,6 @@ class Planning:
         return self._expansion.told
 
     def empty_tally(self) -> Tally:
-        """A tally without parts."""
         return Tally(canary=self.canary, several_seeds=len(self.seeds) > 1)
 
     def parts(self) -> Iterator[Part]:
@@ -254,8 +249,8 @@ def _seeds(campaign: Campaign, choices: Choices) -> range:
 def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | None = None) -> Plan:
     """Expand a campaign (a library name or a file) into its plan, without writing or running anything.
 
-    MutatorError for a choice that is invalid in this campaign, and if no experiment is left; MutatorWarning
-    for values that change nothing.
+    MutatorError for an invalid choice, and if no experiment is left; MutatorWarning for values that change
+    nothing.
     """
     planning = Planning(workspace, campaign, choices)
     parts = tuple(planning.parts())
@@ -279,7 +274,6 @@ def make_plan(workspace: Workspace, campaign: str | Path, choices: Choices | Non
 def _choose(
     experiments: tuple[Experiment, ...], campaign: Campaign, choices: Choices, seed: int, most: int | None
 ) -> tuple[Experiment, ...]:
-    """Choose at most `most` of a seed's experiments."""
     if campaign.sample is not None:
         experiments = _sample(experiments, campaign, campaign.sample, seed)
     for text, wanted in ((choices.only, True), (choices.exclude, False)):
@@ -305,7 +299,7 @@ def _sample(
 def load_plan(folder: RunFolder, tally: Tally | None = None) -> Plan:
     """Load the frozen plan of a run folder; `tally` has its totals, if known.
 
-    The experiments of a very large plan are not kept in memory. Workers read single chunks instead.
+    The experiments of a very large plan are not kept in memory.
     """
     head = folder.head
     large = head["experiments"] > _IN_MEMORY

@@ -1,4 +1,4 @@
-"""Record what a run depends on: digests of its sources and versions of its software."""
+"""Records what a run depends on: digests of its sources and versions of its software."""
 
 import platform
 from collections.abc import Iterable, Mapping
@@ -25,7 +25,7 @@ _OWN = Path(__file__).parents[1]  # the harness
 
 
 def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str]) -> dict[str, str]:
-    """The digest, by name, of everything outside the plan that affects results."""
+    """Return the digest, by name, of everything outside the plan that affects results."""
     return {
         "target": manifest.tree.digest,
         "manifest": digest(manifest.path.read_bytes()),
@@ -35,7 +35,6 @@ def sources(workspace: Workspace, manifest: TargetManifest, scenarios: set[str])
 
 
 def check_sources(run: Path, frozen: dict[str, str], now: dict[str, str]) -> None:
-    """Raise MutatorError if a source has changed since the plan was frozen."""
     changed = [name for name in frozen if now.get(name) != frozen[name]]
     if changed:
         raise MutatorError(
@@ -85,16 +84,13 @@ def other_versions(run: Path, what: str, found: Iterable[str]) -> MutatorError:
 
 
 def _packages(folder: RunFolder, more: Iterable[str] = ()) -> dict[str, str | None]:
-    """The versions of the harness's requirements, of the packages that a folder's golden runs loaded, and of
-    `more`.
-    """
+    """Return the versions of the harness's requirements, packages that golden runs loaded, and `more`."""
     before = (name for stretch in folder.stretches[-1:] for name in stretch.packages)
     return machine.versions({*machine.required(), *loaded_packages(folder), *before, *more})
 
 
 def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, accept: bool) -> None:
-    """Record the software and machine of this session in run.json, after its checks and before its first
-    experiment.
+    """Record this session's software and machine in run.json, before its first experiment.
 
     `records` is the glob of the session's files. MutatorError as in `check_versions`.
     """
@@ -120,12 +116,10 @@ def begin_stretch(folder: RunFolder, workspace: Workspace, *, records: str, acce
 
 
 def add_stretch(folder: RunFolder, stretch: Stretch) -> None:
-    """Append a stretch of work to run.json in a folder that the caller owns."""
     _write_stretches(folder, [*folder.head.get("stretches", ()), plain(stretch)])
 
 
 def add_machine(folder: RunFolder, machine: Mapping[str, Any]) -> None:
-    """Add a machine to the last stretch of work in run.json, in a folder that the caller owns."""
     *before, last = folder.head["stretches"]
     _write_stretches(
         folder, [*before, last | {"machines": [*last.get("machines", ()), plain(dict(machine))]}]

@@ -1,4 +1,4 @@
-"""Draw a small, even and reproducible sample of many experiments."""
+"""Draws a small, even and reproducible sample of many experiments."""
 
 import random
 from collections import Counter, defaultdict, deque
@@ -19,9 +19,9 @@ def spread(count: int, wanted: int) -> list[int]:
 
 
 def pick(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """Draw `count` of the experiments, balanced over variants first, then over method, scenario and trigger.
+    """Draw `count` experiments, balanced over variants first, then over method, scenario and trigger.
 
-    The result keeps the order of the experiments. A hash of seed and id selects values and breaks ties.
+    The experiments keep their order. A hash of seed and id selects values and breaks ties.
     """
     return _pick(experiments, [[experiment] for experiment in experiments], count, seed)
 
@@ -64,7 +64,7 @@ def _pick(
 
 
 def _whole(experiment: Experiment) -> Experiment:
-    """The experiment without `after_hazard`, so that campaigns with and without it draw the same sample."""
+    """Remove `after_hazard`, so that campaigns with and without it draw the same sample."""
     goes_on = experiment.after_hazard is AfterHazard.GO_ON
     return experiment if goes_on else replace(experiment, after_hazard=AfterHazard.GO_ON)
 
@@ -76,7 +76,7 @@ def _cell(unit: Sequence[Experiment]) -> _Cell:
 
 
 def _marks(cell: _Cell) -> Iterable[Hashable]:
-    """The properties whose counts are balanced, the most important first."""
+    """Yield the properties whose counts are balanced, the most important first."""
     variant, method, scenario, trigger = cell
     yield variant
     yield variant, method
@@ -93,7 +93,7 @@ def _load(taken: Counter[Hashable], cell: _Cell) -> list[int]:
 
 
 def pick_in_proportion(experiments: Sequence[Experiment], count: int, seed: int) -> tuple[Experiment, ...]:
-    """Draw `count` of the experiments in proportion, in order, guided and random ones in pairs.
+    """Draw `count` experiments, guided and random ones in pairs, in their original order.
 
     A systematic sample represents each fault type and scenario in proportion to its number, with at least one
     pair each. ValueError if the count is too small or not a whole number of pairs.
@@ -123,15 +123,13 @@ _Pair = tuple[str, str, str]  # variant, row of the context table, fault
 
 
 def _pair(experiment: Experiment) -> _Pair:
-    """What a guided experiment and its random partner have in common within a scenario."""
+    """Return what a guided experiment and its random partner have in common within a scenario."""
     row = experiment.trigger.name.removeprefix("random/")
     return (experiment.fault.spec, row, experiment.fault.id)
 
 
 def _allot(sizes: dict[_Stratum, int], total: int) -> dict[_Stratum, int]:
-    """Distribute `total` seats over strata: one each, then by the Sainte-Lague method (1910) for
-    parliamentary seats.
-    """
+    """Distribute `total` seats over strata: one each, then by the Sainte-Lague method (1910)."""
     seats = dict.fromkeys(sizes, 1)
     while sum(seats.values()) < total:
         next_one = max(sizes, key=lambda key: (sizes[key] / (2 * seats[key] + 1), key))

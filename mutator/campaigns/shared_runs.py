@@ -8,7 +8,7 @@ from mutator.triggers.kinds import time_of
 
 
 def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
-    """A key that is equal for experiments that share a run.
+    """Return a key that is equal for experiments that share a run.
 
     Such experiments differ only in scenarios that a change makes identical. The manifest lists them in
     `same_in`, and the preflight checks them.
@@ -19,7 +19,6 @@ def run_key(manifest: TargetManifest, experiment: Experiment) -> Hashable:
 
 
 def same_in(manifest: TargetManifest, changes: Sequence[str]) -> tuple[str, ...]:
-    """The scenarios that these changes make identical; empty if none."""
     return next((manifest.same_in[change] for change in changes if change in manifest.same_in), ())
 
 
@@ -34,7 +33,7 @@ def in_turn(runs: Iterable[list[Experiment]]) -> list[list[Experiment]]:
 
 
 def runs(manifest: TargetManifest, experiments: Iterable[Experiment]) -> list[list[Experiment]]:
-    """The experiments of each run, in the order of each run's first experiment."""
+    """Return the experiments of each run, in the order of each run's first experiment."""
     found: dict[Hashable, list[Experiment]] = {}
     for experiment in experiments:
         found.setdefault(run_key(manifest, experiment), []).append(experiment)

@@ -23,12 +23,11 @@ class Study(Protocol):
     """The interface of a study."""
 
     def check(self, workspace: Workspace) -> Iterable[MutatorError]:
-        """The problems of the study's data in a fault library."""
+        """Return the problems of the study's data in a fault library."""
         ...
 
 
 def study_names() -> tuple[str, ...]:
-    """The names of the installed studies, sorted."""
     return tuple(sorted(entry_points(group=GROUP).names))
 
 
@@ -51,9 +50,7 @@ def find_study(name: str) -> Study:
 
 
 def study_problems(name: str, study: Study, workspace: Workspace) -> list[MutatorError]:
-    """The problems that a study finds in its data in a fault library. A check that raises an exception is
-    also a problem.
-    """
+    """Return the problems of a study's data in a fault library, including a check that raises."""
     try:
         problems = list(study.check(workspace))
     except MutatorError as error:
@@ -76,11 +73,11 @@ def _bad_check(name: str, what: str) -> MutatorError:
 
 
 def _wrong(loaded: Any) -> str:
-    """Why an object cannot be used as a study; empty if it can be."""
+    """Return why an object cannot be used as a study; empty if it can be."""
     if missing := [part for part in PARTS if not hasattr(loaded, part)]:
         return f"is a {type(loaded).__name__} without {', '.join(missing)}"
     if isinstance(loaded, type):
-        return "is a class, not an object of it"
+        return "is a class, not an instance"
     if idle := [name for name in FUNCTIONS if not callable(getattr(loaded, name))]:
         return f"has no function {', '.join(idle)}"
     if not (isinstance(loaded.panels, tuple | list) and all(map(callable, loaded.panels))):

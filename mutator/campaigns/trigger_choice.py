@@ -13,7 +13,7 @@ from mutator.triggers.conditions import check_condition
 from mutator.triggers.kinds import always, at_time
 
 EVERY_READING = "*"  # key of a value that applies to all readings
-MOST = 1_000_000_000  # largest number of a limit or a time, more than any machine or run needs
+MOST = 1_000_000_000  # maximum of any limit or time
 _LIST: Keys = ("triggers", "list")
 Seconds = Annotated[float, Field(ge=0.0, le=MOST, allow_inf_nan=False)]
 _SECONDS = {"type": "number", "minimum": 0.0, "maximum": MOST}
@@ -29,17 +29,17 @@ class ListedTrigger:
 
 
 def by_reading(given: object) -> object:
-    """Values by reading; a single value applies to all."""
+    """Return values by reading; a single value applies to all."""
     return given if isinstance(given, dict) else {EVERY_READING: given}
 
 
 def or_by_reading(schema: dict[str, Any]) -> dict[str, Any]:
-    """The JSON schema of a value that may be given for each reading."""
+    """Return the JSON schema of a value that may be given for each reading."""
     return {"anyOf": [schema, {"type": "object", "additionalProperties": schema}]}
 
 
 class _ListedModel(StrictModel, title="A trigger"):
-    """Exactly one of `always`, `at_s` and `when`. The text `always` stands for `always: true`."""
+    """Exactly one of `always`, `at_s` and `when`. `always` is short for `always: true`."""
 
     always: bool = Field(False, description="`true`: from the time at which triggers are armed, to the end.")
     at_s: Seconds | None = Field(None, description="Active from this time (s) to the end.")
@@ -73,9 +73,10 @@ _Listed = Annotated[_ListedModel, BeforeValidator(_in_words, json_schema_input_t
 
 
 class TriggersModel(StrictModel, title="Triggers"):
-    """When faults become active. Guided experiments wait for the contexts of a table or the triggers of a
-    list; random experiments start at a drawn time. `triggers` may be the list itself: `triggers: [always,
-    {at_s: 3}, {when: speed > 5}]`.
+    """When faults become active.
+
+    Guided experiments wait for the contexts of a table or the triggers of a list; random experiments start at
+    a drawn time. `triggers` may be the list itself: `triggers: [always, {at_s: 3}, {when: speed > 5}]`.
     """
 
     table: str | None = Field(None, description="The context table, by its name.")
@@ -122,7 +123,6 @@ class TriggersModel(StrictModel, title="Triggers"):
         return self
 
     def triggers(self) -> tuple[ListedTrigger, ...]:
-        """The triggers of its list."""
         return tuple(ListedTrigger(at_s=t.at_s, when=t.when, hold_s=t.hold_s) for t in self.listed or ())
 
 
@@ -130,7 +130,7 @@ def _as_it_is(given: object) -> object:
     return given
 
 
-# the list has become a mapping before this check, so that errors have its lines
+# `with_list` has already converted the list, so that errors have its lines
 Triggers = Annotated[
     TriggersModel, BeforeValidator(_as_it_is, json_schema_input_type=TriggersModel | list[_Written])
 ]
@@ -154,9 +154,9 @@ def listed_triggers(
     armed_after_s: float,
     hold_s: float | None,
 ) -> tuple[Trigger, ...]:
-    """The triggers of a campaign's list in `source`; `hold_s` is how long they hold by default.
+    """Return the triggers of a campaign's list in `source`; `hold_s` is the default of how long they hold.
 
-    MutatorError with the line for a condition over unobserved values, and for a duplicate trigger.
+    MutatorError with the line for a condition on unobserved values, and for a duplicate trigger.
     """
     found: dict[str, Trigger] = {}
     for i, one in enumerate(listed):

@@ -1,2 +1,1 @@
-"""The outcome of a run: golden runs, differences from them, verdicts, and the results table. This package
-runs no experiments."""
+"""The outcome of a run: golden runs, differences from them, verdicts, and the results table."""

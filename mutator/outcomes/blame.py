@@ -1,8 +1,8 @@
 """Decides whether target, fault or harness caused a mutant's run to fail.
 
-An exception is blamed on its origin. If an injected line is on the stack of the exception or of its cause,
-the injection is the origin, even if the exception was raised in a function that the line called. A failure
-before the fault was first active is blamed on the harness, because the fault-free run finishes normally.
+If an injected line is on the stack of the exception or of its cause, the injection is the origin, even if a
+function that the line called raised the exception. A failure before the fault was first active is blamed on
+the harness, because the fault-free run finishes normally.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -19,8 +19,7 @@ _At = tuple[str, int, int]  # file, line, column
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class _Source:
-    """The origin of an exception outside the target: the line that the injections `ids` changed, or, without
-    a tag, the probe."""
+    """The origin of an exception outside the target: an injected line or, without a tag, the probe."""
 
     place: str
     tag: Tag | None = None
@@ -35,13 +34,13 @@ class _Files:
         self._lines = {path: data.splitlines() for path, data in files.items()}
 
     def tag_at(self, at: _At) -> Tag | None:
-        """The tag of a line; None if the line was not injected."""
         file, line = self._lines.get(at[0], ()), at[1]
         return tag_of(file[line - 1]) if 0 < line <= len(file) else None
 
     def injected_at(self, at: _At, tag: Tag, in_probe: bool) -> Sequence[str]:
-        """The injections that added the code which raised at this position. Empty if the original part of the
-        line or a probe call raised. A changed line still has original parts."""
+        """Return the injections whose code raised at this position, if any. A changed line still has original
+        parts.
+        """
         if tag.was is None:
             return tag.ids if tag.of_fault and not (in_probe and tag.asks_probe) else ()
         file, line, column = at
@@ -71,23 +70,24 @@ def assign_blame(
 
 
 def error_of(raised: Raised | None) -> RunError | None:
-    """The exception in the form in which records store it."""
     return RunError(kind=raised.kind, message=raised.message, place=raised.place) if raised else None
 
 
 def _source(raised: Raised, files: _Files) -> _Source | None:
-    """The origin of the exception; None if it is the target's own code."""
     own, *others = raised.stacks
-    if raised.kind == RecursionError.__name__:  # it is chance which call exceeds the limit
+    if raised.kind == RecursionError.__name__:  # any call may be the one that exceeds the limit
         own = tuple(dropwhile(lambda at: is_probe(at[0]) or files.tag_at(at) is not None, own))
     found = [source for stack in (own, *others) if (source := _on_stack(stack, files))]
     return min(found, key=lambda source: source.tag is not None, default=None)  # the probe comes first
 
 
 def _on_stack(stack: Stack, files: _Files) -> _Source | None:
-    """The innermost position on the stack that is not in the target's own code. If a probe helper fails on a
-    value, the calling line is the origin. If the decision whether the fault is active fails, the probe is.
-    Exceptions in calls that the target makes with a changed value belong to the target."""
+    """Return the innermost position on the stack that is not in the target's own code.
+
+    If a probe helper fails on a value, the calling line is the origin. If the probe fails to decide whether
+    the fault is active, the probe is. Exceptions in calls that the target makes with a changed value belong
+    to the target.
+    """
     in_probe = in_target = False
     for at in stack:
         place, tag = f"{at[0]}:{at[1]}", files.tag_at(at)

@@ -1,7 +1,6 @@
 """The columns of the results table and related tables, with names, types, units and meanings.
 
-The hazards, compared channels and metrics of a target add columns; the others are the same for all targets.
-The plan also has the columns that are known before a run.
+Hazards, compared channels and metrics of a target add columns; the others are the same for all targets.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -17,7 +16,7 @@ ColumnType = Literal["text", "flag", "count", "number"]
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """A column. The type `flag` is 0 or 1. `unit` is '' for a column without unit."""
+    """A column. The type `flag` is 0 or 1."""
 
     name: str
     type: ColumnType
@@ -36,7 +35,7 @@ _TO_MANIFEST = (
     Column("module", "text", "", "the module of the fault spec"),
     Column("fault_type", "text", "", "the fault type of the spec"),
     Column("reading", "text", "", "the [reading](../explanation/concepts.md#readings) of the fault"),
-    Column("value", "number", "as `unit` says", "the value drawn; empty for a fault without one"),
+    Column("value", "number", "as `unit` says", "the drawn value; empty for a fault without one"),
     Column("unit", "text", "", "the unit of `value` as the spec states it, `-` for a plain number"),
     Column("scenario", "text", "", "the scenario"),
     Column("method", "text", "", "`guided` (a context or a listed trigger) or `random` (a random time)"),
@@ -85,7 +84,7 @@ OF_PATHS = (
 EXTRA = (
     Column("variant", "text", "", "the variant of the spec; of an operator's mutant, place and change"),
     Column("aim", "text", "", "the hazard that the fault aims at"),
-    Column("condition", "text", "", "the condition that the trigger waits for"),
+    Column("condition", "text", "", "the condition of the trigger"),
     Column("detail", "text", "", "why the status is not `ok`"),
 )
 TIMINGS = (
@@ -112,9 +111,11 @@ def result_columns(
     *,
     paths: bool = False,
 ) -> tuple[Column, ...]:
-    """The columns of results.csv, in order. They depend on the target's hazards, compared channels and
-    metrics (from `metric_columns`), and on the run's `severity_columns`. `paths` adds the columns of the
-    fault's path."""
+    """Return the columns of results.csv, in order.
+
+    `metrics` is from `metric_columns`, `severity` from `severity_columns`. `paths` adds the columns of the
+    fault's path.
+    """
     return (
         *_TO_MANIFEST,
         *(column for name in hazards for column in hazard_columns(name)),
@@ -135,29 +136,29 @@ def result_columns(
 
 
 def severity_columns(head: Mapping[str, Any]) -> tuple[Column, ...]:
-    """The severity columns according to run.json. Older runs have none. Without contact data in the target
-    there is no column for the class."""
+    """Return the severity columns according to run.json. Older runs have none."""
     if "severity" not in head:
         return ()
     return (SEVERITY, *SINCE) if head["severity"] else SINCE
 
 
 def metric_columns(manifest: TargetManifest) -> list[list[str]]:
-    """The name, unit, meaning and worse direction of each metric column of a target. If a hazard can end the
-    drive, the end of the drive comes first."""
+    """Return name, unit, meaning and worse direction of each metric column of a target.
+
+    If a hazard can end the drive, the end of the drive comes first.
+    """
     ends = any(hazard.terminal for hazard in manifest.rules)
     end = [[T_END, "s", "when a terminal hazard ended the drive: later steps are in no metric", "lower"]]
     return [*(end if ends else ()), *([m.name, m.unit, m.about, m.worse] for m in manifest.measures)]
 
 
 def is_text(column: str) -> bool:
-    """Whether a column of the table, or a derived one, holds text. All others hold numbers."""
     return column in _TEXTS
 
 
 @lru_cache(maxsize=64)
 def hazard_columns(hazard: str) -> tuple[Column, Column]:
-    """The columns of a hazard, flag and time: `near` and `t_near` for NEAR."""
+    """Return the columns of a hazard, flag and time: `near` and `t_near` for NEAR."""
     name = hazard.lower()
     return (
         Column(name, "flag", "", f"whether hazard {hazard} occurred"),
@@ -166,14 +167,15 @@ def hazard_columns(hazard: str) -> tuple[Column, Column]:
 
 
 def hazards_in(columns: Iterable[str]) -> tuple[str, ...]:
-    """The hazards of a table, in order: those with a flag and a time of the same name."""
+    """Return the hazards of a table, in order. A hazard has a flag and a time of the same name."""
     known = dict.fromkeys(columns)
     return tuple(name.upper() for name in known if f"t_{name}" in known)
 
 
 def deviation_columns(channels: Sequence[str]) -> Mapping[str, str]:
-    """The column of each compared channel: `max_dev_` and the first word of its name (`wheel` for
-    `wheel_turn`), or the whole name if another channel begins with the same word."""
+    """Map each compared channel to its column: `max_dev_` and the first word of its name (`wheel` for
+    `wheel_turn`), or the whole name if another channel begins with the same word.
+    """
     return _deviation_columns(tuple(channels))
 
 
@@ -187,15 +189,14 @@ def _deviation_columns(channels: tuple[str, ...]) -> Mapping[str, str]:
 
 
 def driven_columns(channels: Sequence[str], metrics: Iterable[Sequence[str]]) -> dict[str, str]:
-    """The `dev_` column of each compared channel; empty if no hazard can end the drive."""
+    """Map each compared channel to its `dev_` column; empty if no hazard can end the drive."""
     if T_END not in (name for name, *_ in metrics):
         return {}
     return {name: column.removeprefix("max_") for name, column in deviation_columns(channels).items()}
 
 
 def check_names(manifest: TargetManifest) -> None:
-    """Raise MutatorError, with the manifest line, if a column of a hazard or metric collides with another, or
-    if columns would look like a hazard's flag and time."""
+    """Raise MutatorError if columns of a hazard or metric collide with others, or look like a hazard's."""
     compared = [channel.name for channel in manifest.compared]
     taken = {column.name for column in result_columns((), compared, paths=True)}
     taken |= {SEVERITY.name, *(column.name for column in SINCE)}
@@ -207,7 +208,7 @@ def check_names(manifest: TargetManifest) -> None:
             raise manifest.source.error(
                 ("hazards", hazard if named else i),
                 f"'{hazard}'",
-                expected=f"a name whose columns, {' and '.join(sorted(names))}, the results do not have yet",
+                expected=f"a name whose columns, {' and '.join(sorted(names))}, are not in the results yet",
                 remedy="rename it",
             )
         taken |= names
@@ -216,15 +217,14 @@ def check_names(manifest: TargetManifest) -> None:
             raise manifest.source.error(
                 ("metrics", metric.name),
                 f"'{metric.name}'",
-                expected="a name that no other column of the results has, with or without `t_` before it",
+                expected="a name that no other column of the results has, with or without the prefix `t_`",
                 remedy="rename it",
             )
         taken.add(metric.name)
 
 
 def plan_row(experiment: Experiment) -> dict[str, object]:
-    """The `PLAN_COLUMNS` of one experiment. `variant` includes a text value, and `condition` is that of the
-    trigger."""
+    """Return the `PLAN_COLUMNS` of one experiment. `variant` includes a text value."""
     fault, trigger = experiment.fault, experiment.trigger
     variant = fault.spec.split("/", 2)[-1]
     is_text = isinstance(fault.value, str)

@@ -1,7 +1,6 @@
 """Counts activated, manifested and hazardous faults in the results table, by column.
 
-`texts` comes from `Results.texts`. Harness errors and invalid mutants are counted separately and not included
-in other numbers.
+`texts` comes from `Results.texts`. Harness errors and invalid mutants enter no other number.
 """
 
 from collections.abc import Mapping
@@ -16,36 +15,34 @@ if TYPE_CHECKING:
 
 
 def endings(texts: "pd.DataFrame") -> "pd.Series[str]":
-    """The outcome of each row, or the status if the run failed."""
+    """Return the outcome of each row, or the status if the run failed."""
     worked = (texts["status"] == Status.OK.value) & (texts["outcome"] != "")
     return texts["outcome"].where(worked, texts["status"])
 
 
 def outcome_counts(texts: "pd.DataFrame") -> dict[str, int]:
-    """The number of rows by outcome, and by status for failed runs."""
     seen = endings(texts).value_counts()
     order = [o.value for o in Outcome] + [s.value for s in Status if s is not Status.OK]
     return {name: int(seen[name]) for name in order if name in seen}
 
 
 def hazard_names(texts: "pd.DataFrame") -> tuple[str, ...]:
-    """The hazards that were checked, including those that never occurred."""
+    """Return the hazards that were checked, including those that never occurred."""
     return tuple(sorted(name for name in hazards_in(texts.columns) if (texts[name.lower()] != "").any()))
 
 
 def came(texts: "pd.DataFrame", hazard: str) -> "pd.Series[bool]":
-    """Whether the hazard occurred, for each row."""
     name = hazard.lower()
     return (texts[name] != "") & (texts[f"t_{name}"] != "")
 
 
 def kinds(texts: "pd.DataFrame") -> "pd.Series[str]":
-    """The fault type of each row: `sensor/bias`."""
+    """Return the fault type of each row: `sensor/bias`."""
     return texts["module"] + "/" + texts["fault_type"]
 
 
 def counts_by(texts: "pd.DataFrame", groups: "pd.Series[str]") -> tuple[Count, ...]:
-    """A count for each of the `groups`, sorted by name, then the total."""
+    """Return a count for each of the `groups`, sorted by name, then the total."""
     import pandas as pd
 
     hazards = hazard_names(texts)

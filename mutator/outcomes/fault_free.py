@@ -16,19 +16,16 @@ Events = tuple[tuple[str, float], ...]  # (name, simulated time in s)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FaultFreeRun:
-    """One fault-free run. `ranges` has the name, minimum and maximum of each plotted channel that was
-    recorded."""
-
     scenario: str
     changes: tuple[str, ...]
     seed: int | None  # None: the seed of the run folder
     hazards: Events
     alerts: Events
-    ranges: tuple[tuple[str, float, float], ...]
+    ranges: tuple[tuple[str, float, float], ...]  # name, minimum and maximum of recorded plotted channels
 
 
 def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultFreeRun, ...]:
-    """The fault-free runs of a run folder, sorted by name. Raise MutatorError if one cannot be read."""
+    """Return the fault-free runs of a run folder, sorted by name. MutatorError if one cannot be read."""
     found = []
     for one in sorted(folder.goldens):
         place = folder.golden(*one)
@@ -47,8 +44,7 @@ def fault_free_runs(folder: RunFolder, manifest: TargetManifest) -> tuple[FaultF
 
 
 def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Table:
-    """The table of fault-free runs: hazards and alerts (if the target has any) with first times, and channel
-    ranges."""
+    """Return the table of fault-free runs: first times of hazards and alerts, and channel ranges."""
     channels = list(dict.fromkeys(name for run in runs for name, _, _ in run.ranges))
     rows = []
     for run in runs:
@@ -61,8 +57,7 @@ def fault_free_table(runs: Sequence[FaultFreeRun], *, alerts: bool = True) -> Ta
 
 
 def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
-    """A sentence on the alerts that fault-free runs raise, for tables that count alerts; '' if there are
-    none."""
+    """Return a sentence on the alerts that fault-free runs raise, for tables that count alerts, or ''."""
     scenarios: dict[str, dict[str, None]] = {}
     for run in runs:
         for name, _ in run.alerts:
@@ -74,8 +69,10 @@ def own_alerts(runs: Iterable[FaultFreeRun]) -> str:
 
 
 def alerts_by_drive(runs: Iterable[FaultFreeRun]) -> dict[tuple[str, str], frozenset[str]]:
-    """The alerts that fault-free runs raise, by scenario and seed ('' for the seed of the run folder). Runs
-    of a scenario with and without changes are combined."""
+    """Return the alerts that fault-free runs raise, by scenario and seed ('': the run folder's seed).
+
+    Runs of a scenario with and without changes are combined.
+    """
     names: dict[tuple[str, str], frozenset[str]] = {}
     for run in runs:
         key = (run.scenario, "" if run.seed is None else str(run.seed))

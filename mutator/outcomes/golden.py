@@ -19,7 +19,7 @@ from mutator.outcomes.trace_files import own_times
 from mutator.targets.channels import Channel
 from mutator.targets.manifest import TargetManifest
 
-Trace = Mapping[str, np.ndarray]  # channel name -> values, one for each step or own time
+Trace = Mapping[str, np.ndarray]  # channel name -> a value for each step or for each of its own times
 
 
 _LARGEST = sys.float_info.max
@@ -33,17 +33,14 @@ class BadOutput(MutatorError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference:
-    """How a trace differs from golden. `t_first` is the time (s) of the first difference beyond tolerance.
-    `max_dev` has the largest difference of each compared channel in the whole run, and `dev` that up to the
-    end of the drive."""
+    """How a trace differs from golden."""
 
-    t_first: float | None
-    max_dev: tuple[tuple[str, float], ...]
-    dev: tuple[tuple[str, float], ...]
+    t_first: float | None  # time (s) of the first difference beyond tolerance
+    max_dev: tuple[tuple[str, float], ...]  # largest difference of each compared channel in the whole run
+    dev: tuple[tuple[str, float], ...]  # the same up to the end of the drive
 
 
 def trace_digest(manifest: TargetManifest, out: Path) -> str:
-    """The digest of the trace file's bytes."""
     try:
         return digest(no_pipe(out / manifest.trace_file).read_bytes())
     except OSError as err:
@@ -57,8 +54,7 @@ def load_trace(
     channels: Sequence[Channel] | None = None,
     also: Sequence[Channel] = (),
 ) -> Trace:
-    """Load channels (default: all) and time of the trace in the output folder `out`. Channels in `also` may
-    be missing."""
+    """Load channels (default: all) and time of the trace in `out`. Channels in `also` may be missing."""
     path = out / manifest.trace_file
     kind = f"an {path.suffix} file" if path.suffix in (".npz", ".mcap") else f"a {path.suffix} file"
     try:
@@ -94,13 +90,11 @@ def _check_arrays(trace: Trace, manifest: TargetManifest, path: Path) -> None:
 
 
 def times_of(trace: Trace, channel: str, time: str) -> np.ndarray:
-    """The times (s) of a channel's values: its own times, or else those of the steps, from the channel
-    `time`."""
+    """Return the times (s) of a channel's values: its own times, or else those of the steps."""
     return trace.get(own_times(channel), trace[time])
 
 
 def until(trace: Trace, end: float, time: str) -> Trace:
-    """The trace up to the time `end` (s)."""
     cut = {}
     for name, values in trace.items():
         times = values if name.endswith(own_times("")) else times_of(trace, name, time)
@@ -109,8 +103,10 @@ def until(trace: Trace, end: float, time: str) -> Trace:
 
 
 def on_steps(trace: Trace, channel: str, steps: np.ndarray) -> np.ndarray:
-    """A channel's value at each step. A channel with its own times keeps its newest value; before the first
-    value it is NaN."""
+    """Return a channel's value at each step.
+
+    A channel with its own times keeps its newest value. Before its first value it is NaN.
+    """
     own = trace.get(own_times(channel))
     return trace[channel] if own is None else _newest(own, trace[channel], steps)
 
@@ -120,8 +116,7 @@ def _newest(times: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray
 
 
 def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
-    """Load the record that the target wrote in `out`, with hazards, alerts and more. It is empty if the
-    manifest names no record."""
+    """Load the record that the target wrote in `out`. It is empty if the manifest names no record."""
     if manifest.record_file is None:
         return {"hazards": {}, "alerts": []}
     path = out / manifest.record_file
@@ -140,8 +135,7 @@ def load_record(manifest: TargetManifest, out: Path) -> dict[str, Any]:
 
 
 def _check_is_of_output(err: Exception) -> None:
-    """Raise Shortage if mutator could not read an output because it ran out of memory or files. The run is
-    not to blame for that."""
+    """Raise Shortage if mutator ran out of memory or files. The run is not to blame for that."""
     if short := shortage(err):
         if isinstance(err, MemoryError):
             with suppress(MemoryError):
@@ -151,7 +145,7 @@ def _check_is_of_output(err: Exception) -> None:
 
 
 def _why(err: Exception) -> str:
-    """The error's text without its path, because that differs between runs."""
+    """Return the error's text without the path, because that differs between runs."""
     return str(err.strerror if isinstance(err, OSError) and err.strerror else err)
 
 
@@ -168,27 +162,27 @@ def _has_times(record: dict[str, Any], *, judges: bool) -> bool:
 
 
 def _events(record: Mapping[str, Any]) -> Any:
-    """The recorded alerts: every raise if the record has them, else only the first of each."""
+    """Return every recorded raise of an alert if the record has them, else only the first of each."""
     return record.get("alert_events") or record.get("alerts") or []
 
 
 def alerts_of(record: Mapping[str, Any], counted: Sequence[str]) -> list[tuple[str, float]]:
-    """The name and time of every recorded raise of an alert in `counted`."""
     return [(event["name"], event["t"]) for event in _events(record) if event["name"] in counted]
 
 
 def sharing_times(golden: Trace, faulty: Trace, time: str) -> Trace:
-    """The faulty trace. If its times equal golden's, it shares golden's array, so that comparisons can skip
-    times."""
+    """Let the faulty trace share golden's time array if both are equal, which makes comparisons faster."""
     return {**faulty, time: golden[time]} if np.array_equal(golden[time], faulty[time]) else faulty
 
 
 def compare(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None = None
 ) -> Difference:
-    """Compare channels value by value. NaN equals NaN. Traces of different lengths differ from the end of the
-    shorter one. Traces with different times differ from the first such time. `t_end` is the end of the drive
-    if that is before the end of the run."""
+    """Compare channels value by value. NaN equals NaN.
+
+    Traces of different lengths differ from the end of the shorter one, traces with different times from the
+    first such time. `t_end` is the end of the drive if that is before the end of the run.
+    """
     end = np.inf if t_end is None else t_end + _TINY
     first = end_of_shorter(golden[time], faulty[time])
     largest: list[tuple[str, float]] = []
@@ -204,26 +198,23 @@ def compare(
 
 @dataclass(frozen=True, slots=True)
 class Deviation:
-    """The absolute difference |faulty - golden| of a channel at the times of both runs. `t_first` is the time
-    at which it first exceeds the tolerance or the times differ; infinite if neither happens."""
+    """The absolute difference |faulty - golden| of a channel at the times of both runs."""
 
     at: np.ndarray
     values: np.ndarray
-    t_first: float
+    t_first: float  # when it first exceeds the tolerance or the times differ; infinite if never
 
     def largest(self, end: float = np.inf) -> float:
-        """The largest deviation up to a time."""
         return float(self.values[self.at <= end].max(initial=0.0))
 
 
 def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Deviation:
-    """Compute the deviation of a channel from golden."""
     times = [times_of(trace, channel.name, time) for trace in (golden, faulty)]
     values = [golden[channel.name], faulty[channel.name]]
     at, values = _on_same_times(times, values)
     apart = values[0] != values[1]
     begin = int(apart.argmax()) if apart.size else 0
-    if not apart[begin : begin + 1].any():  # the case for most channels
+    if not apart[begin : begin + 1].any():  # true of most channels
         return Deviation(at[:0], at[:0], _other_times(*times))
     at, values = at[begin:], [one[begin:] for one in values]
     values_apart = _deviation(*values)
@@ -233,7 +224,7 @@ def deviation(golden: Trace, faulty: Trace, channel: Channel, time: str) -> Devi
 
 
 def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """The time at which the times of two runs first differ or one run ends; infinite if they are equal."""
+    """Return the time at which the times of two runs first differ or one run ends, or infinity."""
     if golden is faulty:
         return np.inf
     rows = min(len(golden), len(faulty))
@@ -244,15 +235,17 @@ def _other_times(golden: np.ndarray, faulty: np.ndarray) -> float:
 
 
 def end_of_shorter(golden: np.ndarray, faulty: np.ndarray) -> float:
-    """The first time that only the longer run has; infinite if both have equal length."""
+    """Return the first time that only the longer run has, or infinity if both have equal length."""
     rows = min(len(golden), len(faulty))
     longer = max(golden, faulty, key=len)
     return float(longer[rows]) if rows < len(longer) else np.inf
 
 
 def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Common times and the values of both runs at them. If the times differ, these are the times of either
-    run, with the newest values."""
+    """Return common times and the values of both runs at them.
+
+    If the times differ, these are the times of either run, with the newest values.
+    """
     if times[0] is times[1]:
         return times[0], values
     rows = min(map(len, times))
@@ -263,8 +256,7 @@ def _on_same_times(times: list[np.ndarray], values: list[np.ndarray]) -> tuple[n
 
 
 def _deviation(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """The absolute difference |faulty - golden|. It is 0 if both are the same number, infinity or NaN, and
-    infinite if only one is NaN."""
+    """Return |faulty - golden|; equal infinities and two NaN differ by 0, NaN and a number by infinity."""
     golden, faulty = golden.astype(float), faulty.astype(float)
     same = (golden == faulty) | (np.isnan(golden) & np.isnan(faulty))
     with np.errstate(invalid="ignore", over="ignore"):

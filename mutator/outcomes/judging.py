@@ -23,26 +23,25 @@ _TINY = 1e-9  # s; times are sums of steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Judged:
-    """The judgement of a run. `hazards` are (name, first time), and `alerts` are (name, time) of every raise.
-    `t_end` is the time at which a terminal hazard ended the drive, or None. `metrics` are numbers and include
-    margins; metrics without a value are left out. Times are in s."""
+    """The judgement of a run. Times are in s."""
 
-    hazards: tuple[tuple[str, float], ...]
-    alerts: tuple[tuple[str, float], ...]
-    t_end: float | None
-    metrics: tuple[tuple[str, float], ...]
+    hazards: tuple[tuple[str, float], ...]  # name, first time
+    alerts: tuple[tuple[str, float], ...]  # name, time of every raise
+    t_end: float | None  # when a terminal hazard ended the drive
+    metrics: tuple[tuple[str, float], ...]  # including margins; metrics without a value are omitted
 
 
 def load_judged(manifest: TargetManifest, out: Path) -> tuple[Trace, Judged]:
-    """Load the recorded channels of the run in the output folder `out`, and judge it. Raise BadOutput if
-    trace or record is missing or cannot be judged."""
+    """Load and judge the run in `out`. BadOutput if trace or record is missing or cannot be judged."""
     trace = load_channels(manifest, out)
     return trace, judge_run(manifest, trace, load_record(manifest, out))
 
 
 def load_channels(manifest: TargetManifest, out: Path) -> Trace:
-    """Load the manifest's channels that the run in `out` recorded. Raise BadOutput if a channel that the
-    verdict needs is missing."""
+    """Load the manifest's channels that the run in `out` recorded.
+
+    BadOutput if a channel that the verdict needs is missing.
+    """
     needed = {*manifest.compared, *manifest.judged}
     others = [channel for channel in manifest.channels if channel not in needed]
     return load_trace(manifest, out, [c for c in manifest.channels if c in needed], others)
@@ -79,8 +78,7 @@ def judge_run(manifest: TargetManifest, trace: Trace, record: Mapping[str, Any])
 
 
 def values_of(manifest: TargetManifest, trace: Trace) -> Values:
-    """The variables of the manifest's formulas, with a number for each step: time, channels and derived
-    values.
+    """Return the variables of the manifest's formulas, with a number for each step.
 
     A channel with its own times keeps its newest value. Before its first value it is NaN.
     """
@@ -105,7 +103,6 @@ def _robustness(hazard: Hazard, values: Values, manifest: TargetManifest) -> np.
 def _first(
     hazard: Hazard, values: Values, robust: np.ndarray | None, record: Mapping[str, Any]
 ) -> float | None:
-    """The time at which a hazard first occurs; None if it does not."""
     if hazard.recorded:
         return record.get("hazards", {}).get(hazard.name)  # type: ignore[no-any-return]
     holds = robust < 0.0 if robust is not None else over_time.holds(hazard.when, values)
@@ -113,7 +110,6 @@ def _first(
 
 
 def _lasting(holds: np.ndarray, time: np.ndarray, for_s: float) -> np.ndarray:
-    """For each step, whether a condition has held for `for_s`."""
     if not for_s:
         return holds
     begins = holds & ~np.concatenate(([False], holds[:-1]))
@@ -127,7 +123,6 @@ def _first_of(holds: np.ndarray, time: np.ndarray) -> float | None:
 
 
 def _end(hazard: Hazard, first: float | None, values: Values) -> float | None:
-    """The time at which a hazard ends the drive; None if it does not."""
     if hazard.terminal == "True":
         return first
     if not hazard.terminal:
@@ -142,7 +137,7 @@ def _numbers(metric: Metric, values: Values) -> np.ndarray:
 
 
 def _aggregate(metric: Metric, numbers: np.ndarray, values: Values, t_end: float | None) -> float | None:
-    """The aggregate of a metric up to the end of the drive; None without values.
+    """Return the aggregate of a metric up to the end of the drive, or None without values.
 
     Sums are exact (`fsum`), so that they do not depend on the processor.
     """

@@ -1,7 +1,7 @@
-"""Reads .npz files with uncompressed members, as `numpy.savez` writes them.
+"""Reads .npz files with uncompressed members, as `numpy.savez` writes them (PKWARE's APPNOTE 6.3).
 
-This module exists because `numpy.load` and `zipfile` take longer than all other work on a trace. They still
-read unusual and damaged files. The format is described in PKWARE's APPNOTE 6.3.
+`numpy.load` and `zipfile` take longer than all other work on a trace. They still read unusual and damaged
+files.
 """
 
 import io
@@ -22,7 +22,7 @@ _NAME = ".npy"
 
 
 def members(data: bytes) -> dict[str, np.ndarray] | None:
-    """The arrays of a file by name, read-only; None if the file is unusual or damaged."""
+    """Return the arrays of a file by name, read-only; None if the file is unusual or damaged."""
     try:
         return _members(data)
     except Exception:  # a run can write anything; numpy then reports the error
@@ -48,7 +48,7 @@ def _members(data: bytes) -> dict[str, np.ndarray] | None:
 
 
 def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, int] | None:
-    """The member with the directory entry at `at`, and the position of the next entry."""
+    """Return name and array of the member with the directory entry at `at`, and where the next entry is."""
     (magic, _, _, _, flags, method, _, _, crc, packed, size, named, extra, comment, *_, begin) = (
         _ENTRY.unpack_from(data, at)
     )
@@ -74,7 +74,7 @@ def _member(data: bytes, view: memoryview, at: int) -> tuple[str, np.ndarray, in
 
 @lru_cache(maxsize=256)
 def _header(text: bytes) -> tuple[np.dtype, tuple[int, ...]]:
-    """Read type and shape from a .npy header. Raise ValueError unless the array is numeric and in C order."""
+    """Read type and shape from a .npy header. ValueError unless the array is numeric and in C order."""
     shape, fortran, dtype = npy.read_array_header_1_0(io.BytesIO(text))
     if fortran or dtype.hasobject or dtype.kind not in "biuf" or min(shape, default=0) < 0:
         raise ValueError(text)

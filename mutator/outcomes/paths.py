@@ -1,9 +1,8 @@
-"""Finds the path of a fault along the control structure, from the components with the injection to the
-controlled process.
+"""Finds the path of a fault along the control structure, from the injected components to the process.
 
-The path excludes feedback: links out of the process, links of people, and links that are not studied. If a
-component left golden only after the process, and feedback can have reached it no later than the fault along
-the path, it counts as changed by feedback.
+The path excludes feedback: links out of the process, links of people, and links that are not studied. A
+component counts as changed by feedback if it left golden only after the process, and feedback can have
+reached it no later than the fault along the path.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -57,7 +56,6 @@ class Stage:
 
     @property
     def t_first(self) -> float | None:
-        """The time (s) at which the first of its channels left golden."""
         return min((first for _, first, _ in self.channels), default=None)
 
 
@@ -73,27 +71,22 @@ class Crossing:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """The stages of a path in causal order, and whether the fault got through each link.
-
-    `reached` is the component nearest to the process that left golden. If the fault changed no actuator,
-    `stopped_at` are the components that held it. Both may be empty.
-    """
+    """The stages of a path in causal order, and whether the fault got through each link."""
 
     stages: tuple[Stage, ...]
     crossings: tuple[Crossing, ...]
-    reached: str
-    stopped_at: tuple[str, ...]
+    reached: str  # the component nearest to the process that left golden, or ''
+    stopped_at: tuple[str, ...]  # the components that held the fault, if it changed no actuator
 
     @property
     def injected(self) -> tuple[str, ...]:
-        """The components with the injection."""
         return tuple(stage.component for stage in self.stages if stage.state is State.INJECTED)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Course:
-    """The common part of paths with the same injected components, on which components left golden in the same
-    order: everything except times.
+    """Everything about a path except times: equal for paths with the same injected components, on which
+    components left golden in the same order.
 
     `late` has the components that changed before their own channels show it, each with the index of the time
     of that change. `entered` is the link by which the fault reached the first actuator.
@@ -108,16 +101,14 @@ class Course:
 
     @property
     def injected(self) -> tuple[str, ...]:
-        """The components with the injection."""
         return tuple(name for name, state in self.states.items() if state is State.INJECTED)
 
 
 class Sight(NamedTuple):
-    """The inputs that determine a course: the components with the injection, the rank of the time at which
-    each component left golden, and whether the fault was masked."""
+    """The inputs that determine a course."""
 
     injected: frozenset[str]
-    order: tuple[tuple[str, int], ...]
+    order: tuple[tuple[str, int], ...]  # the rank of the time at which each component left golden
     masked: bool
 
 
@@ -142,13 +133,11 @@ class Ways:
 
     @property
     def processes(self) -> frozenset[str]:
-        """The controlled components."""
         if self.structure is None:
             return frozenset(name for name, role in self._roles.items() if role == Role.TRUTH.value)
         return frozenset(n for n, c in self.structure.components.items() if c.kind is Kind.PROCESS)
 
     def _injected(self, fault: Fault) -> frozenset[str]:
-        """The components into whose files the fault is injected."""
         if fault.id not in self._where:
             files = {injection.location.path for injection in fault.injections}
             components = self.structure.components if self.structure else {}
@@ -157,8 +146,10 @@ class Ways:
         return self._where[fault.id]
 
     def path(self, experiment: Experiment, record: Record) -> Path | None:
-        """The path of an experiment. None if the fault was not active, if the run has no outcome, or if the
-        fault is in no known component."""
+        """Return the path of an experiment.
+
+        None if the fault was not active, if the run has no outcome, or if the fault is in no known component.
+        """
         course = self.course(experiment.fault, record)
         if course is None:
             return None
@@ -183,17 +174,15 @@ class Ways:
         )
 
     def course(self, fault: Fault, record: Record) -> Course | None:
-        """The course of an experiment; None in the same cases as for `path`. Equal courses are one shared
-        object."""
+        """Return the course of an experiment; None in the same cases as for `path`."""
         sight = self.sight(fault, record)
         return sight and self.course_of(sight)
 
     def course_of(self, sight: Sight) -> Course | None:
-        """The course that a sight determines."""
         return self._course(*sight)
 
     def sight(self, fault: Fault, record: Record) -> Sight | None:
-        """The sight of an experiment; None if the fault was not active or the run has no outcome."""
+        """Return the sight of an experiment; None if the fault was not active or the run has no outcome."""
         if record.outcome in (None, Outcome.NOT_ACTIVATED):
             return None
         firsts: dict[str, float] = {}
@@ -208,7 +197,6 @@ class Ways:
     def _course_of(
         self, injected: frozenset[str], order: tuple[tuple[str, int], ...], masked: bool
     ) -> Course | None:
-        """The uncached form of `course_of`."""
         way = self._way_of(injected)
         if not way.components:
             return None
@@ -236,9 +224,11 @@ class Ways:
     def _states(
         self, way: Way, shown: Collection[str], left: Mapping[str, float]
     ) -> tuple[dict[str, State], set[str]]:
-        """The state of each component of a way, and the components that the fault reached. `left` has the
-        times (s) by which components left golden. Components in `shown` have channels that show it. An
-        unrecorded component counts as reached if a component that feeds it was reached."""
+        """Return the state of each component of a way, and the components that the fault reached.
+
+        `left` has the times (s) by which components left golden. The channels of components in `shown` show
+        it. An unrecorded component counts as reached if a component that feeds it was reached.
+        """
         moved = self._moved(left)
         states: dict[str, State] = {}
         arrived: set[str] = set()
@@ -262,13 +252,16 @@ class Ways:
         return states, arrived
 
     def _moved(self, left: Mapping[str, float]) -> float:
-        """The time (s) at which the process left golden; infinite if it did not."""
+        """Return the time (s) at which the process left golden; infinite if it did not."""
         return min((left[name] for name in self.processes if name in left), default=inf)
 
     def _latest(self, way: Way, left: Mapping[str, float]) -> dict[str, float]:
-        """The times (s) by which components left golden, according to their own channels or those of
-        components that only they feed. In the second case a component passed the fault on, provided that
-        feedback cannot have reached it yet. If the place of injection is unknown, nothing is inferred."""
+        """Return the times (s) by which components left golden.
+
+        They follow from a component's own channels, or from those of a component that only it feeds, provided
+        that feedback cannot have reached the latter yet. If the place of injection is unknown, nothing is
+        inferred.
+        """
         moved, times = self._moved(left), dict(left)
         for name in reversed(way.components if way.injected else ()):
             only = way.feeders(name) | way.fed.get(name, frozenset())
@@ -284,15 +277,17 @@ class Ways:
         return structured(self.structure.components, self._links, self.processes, injected)
 
     def _fed_back(self, names: Collection[str], left: Mapping[str, float]) -> float:
-        """The earliest time (s) of feedback through one of these components; infinite if there is none. It is
-        the time at which the component left golden or, if the component is not recorded, one that leads to
-        it."""
+        """Return the earliest time (s) of feedback through one of these components, or infinity.
+
+        It is the time at which the component left golden or, if the component is not recorded, one that leads
+        to it.
+        """
         unseen = steps_from([name for name in names if name not in self._roles], self._back).keys()
         return min((left[name] for name in {*names, *unseen} if name in left), default=inf)
 
 
 def ways_of(head: Head) -> Ways | None:
-    """The ways of a run's target, from run.json. None for older runs, and if no channel names a component."""
+    """Return the ways of a run's target, from run.json. None if no channel names a component."""
     if not any(component for *_, component, _ in head.get("channels", ())):
         return None
     try:
@@ -319,8 +314,10 @@ def _passage(tail: str, tip: str, states: Mapping[str, State], arrived: Collecti
 
 
 def _holding(way: Way, states: Mapping[str, State], arrived: Collection[str]) -> tuple[str, ...]:
-    """The components that held a fault: those fed by components that it reached or, if it reached none, those
-    at its entry."""
+    """Return the components that held a fault.
+
+    These are fed by components that the fault reached. If it reached none, they are at its entry.
+    """
     held = [name for name in way.components if states[name] is State.HELD]
     reached = {name for name in way.components if states[name] is State.REACHED}
     after_reached = [name for name in held if way.feeders(name) & reached]

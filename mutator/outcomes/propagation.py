@@ -17,7 +17,7 @@ _TINY = 1e-9  # s; times are sums of steps
 COLUMNS = (
     Column("experiment_id", "text", "", "the experiment"),
     Column("channel", "text", "", "a channel that left golden beyond its tolerance"),
-    Column("component", "text", "", "the component that the channel belongs to, as the manifest says"),
+    Column("component", "text", "", "the component of the channel, from the manifest"),
     Column("role", "text", "", "`actuator`, `truth` or `internal`"),
     Column("t_first", "number", "s", "when it first left golden"),
     Column("max_dev", "number", "the channel's", "its largest difference from golden up to the drive's end"),
@@ -27,10 +27,10 @@ COLUMNS = (
 def departures(
     golden: Trace, faulty: Trace, channels: Sequence[Channel], time: str, t_end: float | None
 ) -> tuple[Departure, ...]:
-    """The `channels` that left golden beyond their tolerance before the end of the drive, in order.
+    """Return the `channels` that left golden beyond their tolerance before the end of the drive.
 
-    Channels that one run did not record are left out. If one run ends earlier, all other channels leave
-    golden there at the latest. The largest deviation is over the common time.
+    Channels that one run did not record are skipped. If one run ends earlier, all other channels leave golden
+    there at the latest. The largest deviation is over the common time.
     """
     end = np.inf if t_end is None else t_end + _TINY
     ended = end_of_shorter(golden[time], faulty[time])
@@ -45,13 +45,11 @@ def departures(
 
 
 def channel_facts(manifest: TargetManifest) -> list[list[str]]:
-    """The name, unit, role, component and meaning of every channel, as in run.json."""
     return [[c.name, c.unit, c.role.value, c.component, c.about] for c in manifest.channels]
 
 
 def columns_of(records: Iterable[Record], channels: Sequence[Sequence[str]]) -> Mapping[str, list[Any]]:
-    """The columns of propagation.parquet, which has a row for each channel that left golden, in record
-    order."""
+    """Return the columns of propagation.parquet, which has a row for each channel that left golden."""
     facts = {name: (component, role) for name, _, role, component, _ in channels}
     made: dict[str, list[Any]] = {column.name: [] for column in COLUMNS}
     for record in records:

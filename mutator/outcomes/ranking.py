@@ -1,4 +1,4 @@
-"""Ranks results from worst to best. Pages, budgets and the command line use the same order."""
+"""Ranks results from worst to best."""
 
 import math
 from collections.abc import Iterable
@@ -47,7 +47,7 @@ def worst(rows: Iterable[Row]) -> list[Row]:
 
 
 def places(texts: "pd.DataFrame") -> "np.ndarray":
-    """The rank (from 0) of each row of `Results.texts` in the order of `worst`, computed by column."""
+    """Return the rank (from 0) of each row of `Results.texts` in the order of `worst`, computed by column."""
     import numpy as np
     import pandas as pd
 
@@ -92,15 +92,15 @@ def _turn(
 
 
 def worth_of(texts: "pd.DataFrame") -> dict[str, int]:
-    """Compute `worth` for a frame from `Results.texts`."""
     found = places(texts)
     ended = (texts["status"] == Status.OK.value).to_numpy()
     return dict(zip(texts["experiment_id"][ended], found[ended].tolist(), strict=True))
 
 
 def worth(rows: Iterable[Row]) -> dict[str, int]:
-    """The rank of each finished experiment (0 is the worst), which decides whose series are kept if there is
-    no room for all."""
+    """Return the rank of each finished experiment (0 is the worst), which decides whose series are kept if
+    there is no room for all.
+    """
     return {row.experiment_id: i for i, row in enumerate(worst(rows)) if row.status is Status.OK}
 
 
@@ -109,9 +109,10 @@ def _has_class(row: Row) -> bool:
 
 
 def _turns(rows: Iterable[Row]) -> dict[str, int]:
-    """The rank of rows without a severity class among those with the same outcome, by margin to a hazard,
-    least first. A row with margins to several hazards gets its lowest rank number. Rows without a margin are
-    left out."""
+    """Rank rows without a severity class among those with the same outcome, by margin to a hazard.
+
+    A row with margins to several hazards gets its lowest rank number. Rows without a margin are omitted.
+    """
     lines: dict[tuple[str, str], list[tuple[float, str]]] = {}
     for row in rows:
         for hazard, margin in () if _has_class(row) else row.margins:

@@ -1,5 +1,4 @@
-"""The only reader of a run's results, as rows, as pandas frames, and as bytes of results.csv and
-results.parquet.
+"""The only reader of a run's results: as rows, pandas frames, or bytes.
 
 Only functions that return frames import pandas.
 """
@@ -48,27 +47,25 @@ _REMEDY = "rebuild it: `mutator report DIR`"
 class Results:
     """A results table: the results.csv at `path`, and the results.parquet next to it.
 
-    Every access reads the files. Raise MutatorError if a file is missing or not a results table.
+    Every access reads the files. MutatorError if a file is missing or not a results table.
     """
 
     path: Path
 
     @classmethod
     def of_run(cls, run: Path) -> "Results":
-        """The table of a run folder as it was last built."""
+        """Return the table of a run folder as it was last built."""
         return cls(run / results.CSV)
 
     @classmethod
     def up_to_date(cls, run: Path) -> "Results":
-        """The table of a run folder, rebuilt if it is missing or older than the records."""
+        """Return the table of a run folder, rebuilt if it is missing or older than the records."""
         return cls(results.ensure(run))
 
     def csv(self) -> bytes:
-        """The bytes of results.csv."""
         return self._read(self.path)
 
     def parquet(self) -> bytes:
-        """The bytes of results.parquet."""
         return self._read(self.path.with_name(results.PARQUET))
 
     def _read(self, path: Path) -> bytes:
@@ -85,7 +82,6 @@ class Results:
             raise MutatorError(f"the results cannot be read ({err.strerror})", where=path) from None
 
     def lines(self) -> Iterator[dict[str, str]]:
-        """The cells of each row as text, by column, in table order."""
         reader = csv.DictReader(io.TextIOWrapper(io.BytesIO(self.csv()), encoding="utf-8", newline=""))
         try:
             self._check_header(reader.fieldnames or ())
@@ -97,18 +93,16 @@ class Results:
             raise self._no_table(str(err)) from None
 
     def count(self) -> int:
-        """The number of rows."""
         return len(self.texts())
 
     def rows(self) -> tuple[Row, ...]:
-        """The rows, typed, in table order."""
         try:
             return tuple(map(row_from, self.lines()))
         except (KeyError, TypeError, ValueError) as err:
             raise self._no_table(str(err)) from None
 
     def texts(self) -> "pd.DataFrame":
-        """A frame of the cells as text ('' if empty), in table order."""
+        """Return a frame of the cells as text ('' if empty)."""
         import pandas as pd
         import pyarrow as pa  # type: ignore[import-untyped]
         from pyarrow import csv as arrow_csv
@@ -140,7 +134,7 @@ class Results:
             raise
 
     def frame(self) -> "pd.DataFrame":
-        """A frame of all columns, typed and indexed by experiment id.
+        """Return a frame of all columns, typed and indexed by experiment id.
 
         Names are categories; `outcome` and `status` are ordered. Flags are nullable booleans (NA: the run
         failed). Times are floats in simulated seconds (NaN: did not happen). Added columns are `kind`
@@ -165,17 +159,16 @@ class Results:
         return frame
 
     def _metric_units(self, frame: "pd.DataFrame") -> dict[str, str]:
-        """The units of the target's metrics, from run.json; empty if the table is not in a run folder."""
+        """Return the units of the target's metrics; empty if the table is not in a run folder."""
         folder = self.path.parent
         metrics = RunFolder.unverified(folder).head.get("metrics", ()) if RunFolder.exists(folder) else ()
         return {name: unit for name, unit, *_ in metrics if name in frame}
 
     def propagation(self) -> "pd.DataFrame":
-        """A frame of propagation.parquet, with a row for each channel of an experiment that left golden."""
+        """Return a frame of propagation.parquet, with a row for each channel that left golden."""
         return _frame(self.propagation_parquet())
 
     def propagation_parquet(self) -> bytes:
-        """The bytes of propagation.parquet. Raise MutatorError if the run has none."""
         path = self.path.with_name(results.PROPAGATION)
         if not path.exists():
             raise MutatorError(
@@ -187,11 +180,10 @@ class Results:
         return self._read(path)
 
     def timings(self) -> "pd.DataFrame":
-        """A frame of timings.parquet, with a row for each experiment that ran."""
+        """Return a frame of timings.parquet, with a row for each experiment that ran."""
         return _frame(self.timings_parquet())
 
     def timings_parquet(self) -> bytes:
-        """The bytes of timings.parquet."""
         return self._read(self.path.with_name(results.TIMINGS_PARQUET))
 
     def _check_header(self, columns: "Sequence[str] | pd.Index[str]") -> None:
@@ -206,14 +198,14 @@ class Results:
 def row_of(
     experiment: Experiment, record: Record, hazards: "Sequence[str]", scale: Scale | None = None
 ) -> Row:
-    """The results.csv row of an experiment and its record."""
     cells = result_rows.row(experiment, record, hazards, scale=scale)
     return row_from({name: "" if value is None else str(value) for name, value in cells.items()})
 
 
 def same_parquet(path: Path, made: Path) -> bool:
-    """Whether the Parquet file at `path` has the same rows as the newly built one in `made`. Another version
-    of pyarrow may have written it."""
+    """Return whether two Parquet files have the same rows. Different versions of pyarrow may write different
+    bytes.
+    """
     import pyarrow as pa
     from pyarrow import parquet
 
@@ -234,15 +226,14 @@ def _frame(data: bytes) -> "pd.DataFrame":
 
 
 def _table(source: Path | io.BytesIO) -> Any:
-    """Read the table of a Parquet file in this thread, because a pyarrow thread that frees memory at
-    interpreter exit aborts the process."""
+    """Read a Parquet file in this thread: pyarrow aborts the process if its threads free memory at exit."""
     from pyarrow import parquet
 
     return parquet.ParquetFile(source, pre_buffer=False).read(use_threads=False)
 
 
 def _units(frame: "pd.DataFrame") -> dict[str, str]:
-    """The unit of each numeric column. The unit of `value` is in the column `unit` of each row."""
+    """Return the unit of each numeric column. The unit of `value` is in the column `unit` of each row."""
     numbers = frame.select_dtypes("number").columns
     times = {name for name in numbers if name.startswith("t_")} | {"reaction_time"}
     times |= {column.name for column in SINCE}

@@ -1,4 +1,4 @@
-"""Builds rows of the results table: the cells of an experiment and its record, and their columns."""
+"""Builds rows of the results table."""
 
 from collections.abc import Sequence
 
@@ -29,8 +29,8 @@ def row(
 ) -> dict[str, object]:
     """Build one row, by column name. If the run left no trace, the row has no largest differences.
 
-    `hazards` are those that the target checks. `ends` says whether a hazard can end the drive. `scale`
-    classifies delta-v. None stands for an empty cell. Flags are 0 or 1. Times are in simulated seconds.
+    `hazards` are those that the target checks. `ends`: a hazard can end the drive. `scale` classifies
+    delta-v. None is an empty cell. Flags are 0 or 1. Times are in simulated seconds.
     """
     cells = plan_row(experiment) | _verdict_cells(record, scale)
     ok, times = record.status is Status.OK, dict(record.hazards)
@@ -48,7 +48,6 @@ def row(
 
 
 def _verdict_cells(record: Record, scale: Scale | None) -> dict[str, object]:
-    """The cells that the results of all targets have."""
     activation = record.activation
     ok = record.status is Status.OK
     return {
@@ -88,7 +87,6 @@ class ResultRows:
         self._names = [column.name for column in self.columns]
 
     def cells(self, experiment: Experiment, record: Record) -> list[object]:
-        """The cells of a row in column order."""
         made = row(experiment, record, self._hazards, ends=self._ends, scale=self._scale)
         course = self._ways.course(experiment.fault, record) if self._ways else None
         if course:

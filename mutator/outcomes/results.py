@@ -1,5 +1,4 @@
-"""Builds the results table from plan and records, with a row for each experiment. Equal inputs give equal
-bytes."""
+"""Builds the results table from plan and records. Equal inputs give equal bytes."""
 
 import gc
 import warnings
@@ -40,8 +39,10 @@ def ensure(run: Path) -> Path:
 
 
 def build(run: Path) -> Path:
-    """Write the tables of a run folder from plan and records, and return the path of results.csv. Warn
-    (MutatorWarning) if a table that was edited by hand is overwritten."""
+    """Write the tables of a run folder from plan and records, and return the path of results.csv.
+
+    MutatorWarning if a table that was edited by hand is overwritten.
+    """
     folder = RunFolder.open(run)
     made_from = _made_from(folder)
     with ExitStack() as stack:
@@ -50,8 +51,8 @@ def build(run: Path) -> Path:
         made = {name: stack.enter_context(half_written(path)) for name, path in paths.items()}
         write(folder, made)
         now = {name: found.sha256 for name, path in made.items() if (found := Digest.of_file(path))}
-        # Record old and new digests first, so that a table left by a kill is not taken for an edited one;
-        # then, at the end of the block, replace the tables.
+        # Record old and new digests before the tables are replaced at the end of the block. Otherwise a kill
+        # could leave tables that look edited.
         before = _unedited(folder, now)
         stamp = {"schema": SCHEMA, "made_from": made_from, "tables": now, "before": before}
         write_json(folder.path / STAMP, stamp)
@@ -59,12 +60,12 @@ def build(run: Path) -> Path:
 
 
 def names(folder: RunFolder) -> tuple[str, ...]:
-    """The names of a run folder's tables. Older runs have no table of propagation."""
+    """Return the names of a run folder's tables. Older runs have no table of propagation."""
     return tuple(name for name in TABLES if name != PROPAGATION or "channels" in folder.head)
 
 
 def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    """Write the tables of a run folder, built from plan, records and timings, to the given `paths`.
+    """Write the tables of a run folder to the given `paths`.
 
     Experiments are read in batches, so that a million needs only some hundred MB. For a large run, two
     processes build the batches.
@@ -75,7 +76,6 @@ def write(folder: RunFolder, paths: Mapping[str, Path]) -> None:
 
 
 def _write_results(folder: RunFolder, paths: Mapping[str, Path]) -> None:
-    """Write all tables except the timings; see `write`."""
     records, planned, rows = folder.records(), Planned(folder.path), ResultRows(folder)
     tells_propagation = PROPAGATION in paths
 
@@ -121,7 +121,7 @@ def _batches(items: Iterable[str]) -> list[list[str]]:
 
 
 def _made_from(folder: RunFolder) -> str:
-    """The digest of all inputs of the tables, including the version of mutator."""
+    """Return the digest of all inputs of the tables, including the version of mutator."""
     run = folder.path
     lines = sorted(path for kind in ("records", "timings") for path in (run / kind).glob("*.jsonl"))
     files = [run / plan_file.EXPERIMENTS, run / plan_file.FAULTS, *lines]
@@ -134,14 +134,12 @@ def _made_from(folder: RunFolder) -> str:
 
 
 def _found(folder: RunFolder) -> dict[str, str | None]:
-    """The digests of the current tables; None for a missing table."""
     known = names(folder)
     found = dict(zip(known, digests.of_files([folder.path / name for name in known]), strict=True))
     return {name: one.sha256 if one else None for name, one in found.items()}
 
 
 def _stamp(folder: RunFolder) -> dict[str, Any]:
-    """The content of results.json, with empty values if the file is missing or damaged."""
     try:
         known = read_json(folder.path / STAMP, SCHEMA)
         if all(isinstance(known[key], dict) for key in ("tables", "before")):
@@ -152,8 +150,10 @@ def _stamp(folder: RunFolder) -> dict[str, Any]:
 
 
 def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
-    """The digests of the tables that a build made. A warning names any other table. Older folders without
-    results.json cannot be checked."""
+    """Return the digests of the tables that a build made, and warn about any other table.
+
+    Older folders without results.json cannot be checked.
+    """
     stamp = _stamp(folder)
     tells = folder.verifiable or stamp.get("made_from")
     found = {name: one for name, one in _found(folder).items() if one is not None}
@@ -166,7 +166,6 @@ def _unedited(folder: RunFolder, now: Mapping[str, str]) -> dict[str, str]:
 
 
 def _write_timings(folder: RunFolder, path: Path) -> None:
-    """Write the cost and the worker of each experiment."""
     newest = folder.timings()
 
     def made(batch: Sequence[str]) -> Any:

@@ -1,4 +1,4 @@
-"""Typed rows of the results table, one for each experiment, and the table of counts."""
+"""Typed rows of the results table, and the table of counts."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,8 +16,7 @@ UNUSABLE = (Status.HARNESS_ERROR, Status.INVALID_MUTANT)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """One line of results.csv, typed. Times are in simulated seconds; None means that the event did not
-    happen."""
+    """One line of results.csv. Times are in simulated seconds; None: the event did not happen."""
 
     experiment_id: str
     module: str
@@ -58,7 +57,6 @@ class Row:
 
     @property
     def fault(self) -> str:
-        """The label of the fault."""
         return fault_label(f"{self.module}/{self.fault_type}/{self.variant}", self.value, self.unit)
 
 
@@ -86,8 +84,7 @@ def by_fault_type(row: Row) -> str:
 def count_table(
     counts: Sequence[Count], head: str, hazards: Sequence[str], *, alerts: bool = True
 ) -> tuple[list[str], list[list[str]]]:
-    """A table of counts. It has columns for crashes, timeouts and unusable runs only if there are any, and
-    for alerts only if `alerts` is set."""
+    """Return a table of counts. It has columns for crashes, timeouts and unusable runs only if any exist."""
     heads = [head, "injected", "activated", "manifested", *hazards]
     heads += ["any hazard", "alerts", "hazard, no alert"] if alerts else ["any hazard"]
     table = [[c.group, c.injected, c.activated, c.manifested, *c.hazards, c.any_hazard] for c in counts]
@@ -103,14 +100,13 @@ def count_table(
 
 
 def lines_of(texts: "pd.DataFrame") -> list[dict[str, str]]:
-    """The cells of each row of a frame as text, by column."""
     names = list(map(str, texts.columns))
     columns = [texts[name].tolist() for name in names]
     return [dict(zip(names, cells, strict=True)) for cells in zip(*columns, strict=True)]
 
 
 def row_from(line: Mapping[str, str]) -> Row:
-    """Parse a line of results.csv, given by column. Raise KeyError or ValueError if it is invalid."""
+    """Parse a line of results.csv, given by column. KeyError or ValueError if it is invalid."""
     checked = [name for name in hazards_in(line) if line[name.lower()]]
     times = {name: line[f"t_{name.lower()}"] for name in checked}
     hazards = [(name, float(time)) for name, time in times.items() if time]

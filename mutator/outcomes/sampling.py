@@ -1,5 +1,4 @@
-"""Samples a run's channels into its series, with six digits. A channel keeps at most 20 values a second;
-internal channels keep 10.
+"""Samples a run's channels into its series: six digits, at most 20 values a second (internal channels: 10).
 
 A sample is the newest value at its time, so events shorter than 50 ms may fall between samples. Channels that
 differ therefore keep extra points: the first differing step, the steps of the largest difference in the drive
@@ -49,11 +48,9 @@ class Sampler:
 
     @cached_property
     def encoded(self) -> bytes:
-        """The golden run's series in bytes."""
         return encode(self.golden)
 
     def series(self, faulty: Trace, record: Record) -> Series:
-        """The series of a faulty run and its record."""
         own = np.asarray(faulty[self._clock], dtype=float)
         last = own[-1] if len(own) else -np.inf
         time, golden, values = self._together(faulty, own)
@@ -70,14 +67,12 @@ class Sampler:
         )
 
     def _sampled(self, count: int, at: np.ndarray) -> np.ndarray:
-        """Whether a channel (row) keeps a step (column) as a sample."""
         if count == len(self._time) and len(at) == len(self._at):
             return self._usual
         return self._marked(count, at)
 
     @cached_property
     def _usual(self) -> np.ndarray:
-        """The result of `_sampled` for a run as long as golden."""
         return self._marked(len(self._time), self._at)
 
     def _marked(self, count: int, at: np.ndarray) -> np.ndarray:
@@ -91,8 +86,7 @@ class Sampler:
         return [np.ascontiguousarray(row[::every]) for row, every in zip(single, self._every, strict=True)]
 
     def _together(self, faulty: Trace, own: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The union of the step times of both runs, and the values of each run, which are NaN after its
-        end."""
+        """Return the step times of both runs together, and each run's values, which are NaN after its end."""
         rows = min(len(own), len(self._time))
         if np.array_equal(own[:rows], self._time[:rows]):
             time = max(own, self._time, key=len)
@@ -101,7 +95,7 @@ class Sampler:
         return time, self._held(self._values, self._time, time), self._held(self._on(faulty, own), own, time)
 
     def _on(self, trace: Trace, time: np.ndarray) -> np.ndarray:
-        """An array with a row for each channel and a column for each step. Missing channels are NaN."""
+        """Return an array with a row for each channel and a column for each step. Missing channels: NaN."""
         rows = np.full((len(self._channels), len(time)), np.nan)
         for row, channel in zip(rows, self._channels, strict=True):
             if channel.name in trace:
@@ -110,14 +104,14 @@ class Sampler:
 
     @staticmethod
     def _held(values: np.ndarray, own: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """The newest value of each row at other times; NaN before its first and after its last value."""
+        """Return the newest value of each row at other times; NaN before its first and after its last."""
         place = np.searchsorted(own, time + _TINY, side="right") - 1
         there = (place >= 0) & (time <= own[-1] + _TINY)
         return np.where(there, values[:, np.maximum(place, 0)], np.nan)
 
 
 def _thinned(time: np.ndarray) -> np.ndarray:
-    """The steps to keep: the first, the last, and at most RATE a second in between."""
+    """Return the steps to keep: the first, the last, and at most RATE a second in between."""
     kept: list[int] = []
     due = -np.inf
     for place, t in enumerate(time.tolist()):
@@ -137,8 +131,7 @@ def _filled(values: np.ndarray, count: int) -> np.ndarray:
 
 
 def _single(values: np.ndarray) -> np.ndarray:
-    """The values in single precision, rounded to six digits (20 bits). More digits would add a tenth to the
-    size."""
+    """Round the values to single precision and six digits (20 bits). More would add a tenth to the size."""
     with np.errstate(over="ignore"):  # overflow becomes infinity
         single = values.astype("<f4")
         words = (single.view("<u4") + _HALF) & ~np.uint32(2 * _HALF - 1)
@@ -155,8 +148,10 @@ def _points(
     end: int,
     record: Record,
 ) -> Points:
-    """The steps that each channel keeps in addition to the `sampled` ones. `end` is the last step that both
-    runs have."""
+    """Return the steps that each channel keeps in addition to the `sampled` ones.
+
+    `end` is the last step that both runs have.
+    """
     golden, faulty = golden[:, : end + 1], faulty[:, : end + 1]
     drive = end + 1 if record.t_end is None else _until(time, record.t_end)
     hazards = {_until(time, t) - 1 for _, t in record.hazards} & set(range(end + 1))
@@ -176,13 +171,11 @@ def _points(
 
 
 def _until(time: np.ndarray, t: float) -> int:
-    """The number of steps up to and including a time."""
     return int(np.searchsorted(time, t + _TINY, side="right"))
 
 
 def _gap(golden: np.ndarray, faulty: np.ndarray) -> np.ndarray:
-    """The difference of two runs at each step. It is 0 if they are equal or both have no value, and infinite
-    if only one has no value."""
+    """Return the absolute difference of two runs at each step; infinite if only one has a value."""
     with np.errstate(invalid="ignore", over="ignore"):
         gap: np.ndarray = np.abs(faulty - golden)
     odd = np.isnan(gap)
@@ -215,8 +208,7 @@ def _happened(record: Record) -> dict[str, Any]:
 
 
 def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Trace]:
-    """The runs of a series as traces with the time channel `time`. Between its samples, a channel holds its
-    value."""
+    """Return the runs of a series as traces. Between its samples, a channel holds its value."""
     names = [str(channel["name"]) for channel in golden.about["channels"]]
 
     def trace(run: Series) -> Trace:
@@ -227,7 +219,6 @@ def sampled_traces(golden: Series, faulty: Series, time: str) -> tuple[Trace, Tr
 
 
 def keep_series(run: Path, manifest: TargetManifest, golden: Trace, faulty: Trace, record: Record) -> None:
-    """Write the series of one experiment into its own file in the run folder `run`."""
     sampler = Sampler(manifest, golden)
     data = encode(sampler.series(faulty, record), sampler.golden)
     write_kept(SeriesFolder(run).kept(record.experiment_id), sampler.encoded, data)

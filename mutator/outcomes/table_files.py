@@ -9,8 +9,8 @@ from typing import Any
 
 from mutator.outcomes.columns import Column
 
-_ROWS = 1 << 20  # rows of a row group (pyarrow's default); fewer with many columns:
-_CELLS = 1 << 23  # cells of a row group, because a whole group is in memory
+_ROWS = 1 << 20  # maximum of rows in a row group (pyarrow's default)
+_CELLS = 1 << 23  # maximum of cells in a row group, because a whole group is in memory
 _TYPES = {"text": "string", "flag": "int8", "count": "int64", "number": "float64"}
 
 
@@ -47,7 +47,6 @@ class CsvTable:
         return self
 
     def append(self, lines: bytes) -> None:
-        """Append rows from `csv_lines`."""
         self._file.write(lines)
 
     def __exit__(self, *error: object) -> None:
@@ -73,14 +72,12 @@ class ParquetTable:
         return self
 
     def append(self, batch: Any) -> None:
-        """Append rows from `record_batch`."""
         self._held.append(batch)
         self._count += batch.num_rows
         while self._count >= self._group:
             self._write(self._group)
 
     def _write(self, count: int) -> None:
-        """Write the first `count` waiting rows as a row group."""
         held = self._pa.Table.from_batches(self._held, self._schema)
         self._writer.write_table(held.slice(0, count).combine_chunks(), self._group)
         self._held = held.slice(count).to_batches()

@@ -1,5 +1,4 @@
-"""Reads trace files of runs. The suffix selects the reader, which returns the arrays of the requested
-channels."""
+"""Reads the trace files of runs. The suffix selects the reader."""
 
 import json
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -25,19 +24,19 @@ class BadTrace(ValueError):
 
 
 def own_times(name: str) -> str:
-    """The name under which a trace stores the times of a channel that does not have a value at each step."""
+    """Return the name of the times of a channel that does not have a value at each step."""
     return f"{name}@"
 
 
 def read(
     path: Path, manifest: TargetManifest, channels: Iterable[Channel] | None, also: Sequence[Channel] = ()
 ) -> Arrays:
-    """Read channels and time of a trace, by manifest name. `own_times` names have the times of channels that
+    """Read channels and time of a trace, by manifest name, and under `own_times` the times of channels that
     lack some steps.
 
     Without `channels`, read everything, including names that are not in the manifest. Channels in `also` may
-    be missing. Raise BadTrace for an invalid file and KeyError for any other missing channel. Errors of the
-    readers pass through.
+    be missing. BadTrace for an invalid file, KeyError for any other missing channel. Errors of the readers
+    pass through.
     """
     wanted = manifest.channels if channels is None else (*channels, *also)
     if path.suffix == ".mcap":
@@ -74,7 +73,7 @@ def _read_npz(path: Path, names: Iterable[str] | None, may_miss: Collection[str]
         return {name: members[name] for name in _wanted(members, names, may_miss)}
     loaded = np.load(no_pipe(path), allow_pickle=False)
     if not isinstance(loaded, np.lib.npyio.NpzFile):
-        raise BadTrace("an array alone", "an .npz file")
+        raise BadTrace("a single array", "an .npz file")
     with loaded as file:
         return {name: np.asarray(file[name]) for name in _wanted(file.files, names, may_miss)}
 
@@ -98,7 +97,7 @@ def _columns(frame: Any, names: Iterable[str] | None, may_miss: Collection[str])
 def _wanted(
     there: Collection[str], names: Iterable[str] | None, may_miss: Collection[str]
 ) -> dict[str, None]:
-    """The names to read from a file that contains `there`: `names`, or all if None."""
+    """Return the names to read from a file that contains `there`: `names`, or all if None."""
     if names is None:
         return dict.fromkeys(there)
     return {name: None for name in names if name in there or name not in may_miss}
@@ -116,7 +115,7 @@ def _read_mcap(path: Path, steps: str, channels: Iterable[Channel], also: Sequen
     try:
         from mcap.reader import make_reader
     except ImportError:
-        raise BadTrace("an .mcap file, and no package mcap", "pip install mcap") from None
+        raise BadTrace("an .mcap file, but the package mcap is missing", "pip install mcap") from None
     places = {channel.name: channel.in_trace.partition(":")[::2] for channel in channels}
     may_miss = {channel.name for channel in also}
     topics = {steps, *(topic for topic, _ in places.values())}

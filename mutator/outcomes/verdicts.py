@@ -9,7 +9,7 @@ Events = Sequence[tuple[str, float]]  # (name, time in s), sorted by time
 
 
 def first_events(events: Iterable[tuple[str, float]], activation: Activation | None) -> Events:
-    """The first event of each name at or after activation, by time and then name; empty without activation.
+    """Return the first event of each name at or after activation, by time and then name.
 
     The fault cannot have caused earlier events.
     """
@@ -23,9 +23,9 @@ def first_events(events: Iterable[tuple[str, float]], activation: Activation | N
 
 
 def judge(*, activation: Activation | None, t_manifest: float | None, hazards: Events) -> Outcome:
-    """The outcome of an experiment that ran: the first that applies of not_activated, hazard, sdc and masked.
+    """Return the first that applies of not_activated, hazard, sdc and masked.
 
-    `hazards` are those at or after activation. A hazard counts even without an actuator difference, because
+    `hazards` are those at or after activation. A hazard applies even without an actuator difference, because
     the fault may act on the world directly.
     """
     if activation is None:
@@ -36,9 +36,9 @@ def judge(*, activation: Activation | None, t_manifest: float | None, hazards: E
 
 
 def reaction_time(hazards: Events, alerts: Events) -> float | None:
-    """The time (s) from the first alert to the first hazard, which a driver has to react.
+    """Return the time (s) from the first alert to the first hazard, which a driver has to react.
 
-    None if either is missing or if the alert did not come before the hazard.
+    None unless both happened and the alert came first.
     """
     if not hazards or not alerts or alerts[0][1] >= hazards[0][1]:
         return None
@@ -46,23 +46,21 @@ def reaction_time(hazards: Events, alerts: Events) -> float | None:
 
 
 def since_activation(record: Record) -> float | None:
-    """The fault-tolerant time: from activation to the first hazard, in s. None without a hazard."""
+    """Return the fault-tolerant time: from activation to the first hazard, in s. None without a hazard."""
     if not record.hazards or record.activation is None:
         return None
     return record.hazards[0][1] - record.activation.first
 
 
 def since_manifestation(record: Record) -> float | None:
-    """The time (s) from manifestation to the first hazard. None if either is missing or if the hazard came
-    first."""
+    """Return the time (s) from manifestation to the first hazard. None unless both happened in this order."""
     if not record.hazards or record.t_manifest is None or record.t_manifest > record.hazards[0][1]:
         return None
     return record.hazards[0][1] - record.t_manifest
 
 
 def severity_of(record: Record, scale: Scale | None) -> str | None:
-    """The class of the contact that ended the drive. None without a contact, or if the contact came before
-    the fault was active."""
+    """Return the class of the contact that ended the drive. None without a contact after activation."""
     delta_v = dict(record.metrics).get(DELTA_V)
     if scale is None or delta_v is None or record.activation is None or record.t_end is None:
         return None

@@ -1,4 +1,4 @@
-"""Finds where faults can go: the components on the way to the controlled process, in causal order."""
+"""Finds the components on the way of a fault to the controlled process, in causal order."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -20,12 +20,11 @@ class Way:
     steps: Mapping[str, int]  # by component: number of links to the process
 
     def feeders(self, component: str) -> set[str]:
-        """The components on the way that feed a component."""
         return {tail for tail, tip in self.links.values() if tip == component}
 
 
 def chained(roles: Mapping[str, str], processes: frozenset[str]) -> Way:
-    """The chain of components, ordered by the roles of their channels. The place of injection is unknown."""
+    """Return the chain of components, ordered by their channels' roles. The place of injection is unknown."""
     order = [role.value for role in (Role.INTERNAL, Role.ACTUATOR, Role.TRUTH)]
     chain = sorted(roles, key=lambda name: order.index(roles[name]))
     links = {f"{tail}-{tip}": (tail, tip) for tail, tip in pairwise(chain)}
@@ -46,7 +45,7 @@ def structured(
     processes: frozenset[str],
     injected: frozenset[str],
 ) -> Way:
-    """The way from the components with the injection along `links`, without links out of a process."""
+    """Return the way from the injected components along `links`, without links out of a process."""
     forward = {name: ends for name, ends in links.items() if ends[0] not in processes}
     steps = steps_from(processes, [(tip, tail) for tail, tip in forward.values()])
     on_way = (steps_from(injected, forward.values()).keys() & steps.keys()) | injected
@@ -66,14 +65,14 @@ def structured(
 
 
 def links_of(structure: StructureModel) -> dict[str, tuple[str, str]]:
-    """The ends of each studied link that does not involve people."""
+    """Return the ends of each studied link that does not involve people."""
     people = {name for name, one in structure.components.items() if one.kind is Kind.HUMAN}
     ends = ((name, (link.from_, link.to)) for name, link in structure.links.items() if link.studied)
     return {name: pair for name, pair in ends if not people.intersection(pair)}
 
 
 def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> dict[str, int]:
-    """The distance from `start`, in links, of everything that is reachable, including `start`."""
+    """Return the distance from `start`, in links, of everything that is reachable, including `start`."""
     found = dict.fromkeys(start, 0)
     while more := {tip for tail, tip in links if tail in found} - found.keys():
         found |= dict.fromkeys(more, max(found.values()) + 1)
@@ -83,8 +82,10 @@ def steps_from(start: Collection[str], links: Collection[tuple[str, str]]) -> di
 def _in_causal_order(
     nodes: Sequence[str], links: Mapping[str, tuple[str, str]], steps: Mapping[str, int]
 ) -> tuple[str, ...]:
-    """The nodes, each after all nodes that feed it. If several may come next, or in a cycle, the node with
-    the most `steps` to the process comes first."""
+    """Sort the nodes so that each follows all nodes that feed it.
+
+    If several may come next, or in a cycle, the node with the most `steps` to the process comes first.
+    """
     left = sorted(nodes, key=lambda name: -steps.get(name, len(nodes)))
     order: list[str] = []
     while left:

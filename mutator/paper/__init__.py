@@ -1,5 +1,4 @@
-"""The published study that the library reproduces: shows its tables, observations and figures next to those
-of a run.
+"""The published study that the library reproduces: its tables, observations and figures next to a run's.
 
 No other package imports this one. An entry point in `mutator.studies` registers it.
 """

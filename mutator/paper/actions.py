@@ -1,8 +1,4 @@
-"""Detects unsafe control actions in the traces of a fault-free and a faulty run.
-
-Each `Wanted` has a query that finds candidate runs, and a `Look` that decides whether two traces show the
-action, and in which steps.
-"""
+"""Detects unsafe control actions in the traces of a golden and a faulty run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,27 +10,25 @@ from mutator.outcomes.golden import Trace
 
 Steps = np.ndarray[tuple[int], np.dtype[np.bool_]]  # one flag per step
 
-APPLIED = 0.01  # share of full gas or brake; less counts as none
+APPLIED = 0.01  # share of full gas or brake; less is ignored
 WRONG_S = 0.5  # minimum duration of wrong gas or brake
 BRAKE_S = 0.1  # minimum duration of braking that is too short
-SHORT = 0.5  # share of the braking time in the fault-free run; more is not too short
+SHORT = 0.5  # maximum share of golden's braking time that is too short
 RELEASED_S = 1.0  # maximum time from the alert to the last gas or brake
 MISSED_S = 0.1  # minimum duration of gas, and of braking, that only the fault-free run has
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pair:
-    """Both runs over their common steps.
+    """Both runs over their common steps, with a value for each step.
 
-    `t` has the simulated time (s) of each step; a step lasts `step_s`. `golden` and `faulty` have a value for
-    each step. The search is from `start`, the activation of the fault, to `end`, the hazard or the end of the
-    run.
+    The search is from `start`, the activation of the fault, to `end`, the hazard or the end of the run.
     """
 
-    t: np.ndarray
+    t: np.ndarray  # simulated time, s
     golden: Trace
     faulty: Trace
-    step_s: float
+    step_s: float  # duration of a step, s
     start: float
     end: float
     alert: float | None  # time of the first alert after activation
@@ -43,10 +37,7 @@ class Pair:
     def of(
         cls, golden: Trace, faulty: Trace, record: Record, time: str, step_s: float, hazard: str | None
     ) -> "Pair":
-        """The pair of an experiment with an activated fault, up to `hazard` or the end of the run.
-
-        `time` is the name of the time channel.
-        """
+        """Return the pair of an experiment with an activated fault, up to `hazard` or the end of the run."""
         steps = min(len(golden[time]), len(faulty[time]))
         t = faulty[time][:steps]
         assert record.activation is not None  # the query finds only activated faults
@@ -61,13 +52,11 @@ class Pair:
         )
 
     def applied(self, channel: str) -> tuple[Steps, Steps]:
-        """The steps between `start` and `end` in which golden applies gas or brake, and those in which faulty
-        does."""
+        """Return the steps between `start` and `end` in which golden and faulty apply gas or brake."""
         within = (self.t >= self.start) & (self.t <= self.end)
         return within & (self.golden[channel] > APPLIED), within & (self.faulty[channel] > APPLIED)
 
     def seconds(self, steps: Steps) -> float:
-        """The duration of the steps, s."""
         return float(steps.sum() * self.step_s)
 
 
@@ -82,7 +71,7 @@ class Wanted:
     title: str
     query: str  # finds candidate runs by the columns of results.csv
     order: str  # candidates are examined in the order of this column, largest first
-    confirmed: str  # text that says what the look finds
+    confirmed: str  # describes what the look finds
     look: Look
     actions: tuple[str, ...]  # channels of the action, whose panels are shaded
     panels: tuple[tuple[str, str], ...]  # (channel, meaning), from the top
@@ -90,8 +79,10 @@ class Wanted:
 
 
 def brake_too_short(pair: Pair) -> Steps | None:
-    """The steps in which only golden brakes; None unless faulty brakes, but at most half as long as
-    golden."""
+    """Return the steps in which only golden brakes.
+
+    None unless faulty brakes, but at most half as long as golden.
+    """
     golden, faulty = pair.applied("brake")
     if not BRAKE_S <= pair.seconds(faulty) <= SHORT * pair.seconds(golden):
         return None
@@ -99,8 +90,7 @@ def brake_too_short(pair: Pair) -> Steps | None:
 
 
 def at_a_wrong_time(channel: str) -> Look:
-    """A look for the steps in which only faulty applies `channel` (gas or brake), if they last long
-    enough."""
+    """Return a look for steps in which only faulty applies `channel`, if they last long enough."""
 
     def look(pair: Pair) -> Steps | None:
         golden, faulty = pair.applied(channel)
@@ -111,8 +101,10 @@ def at_a_wrong_time(channel: str) -> Look:
 
 
 def both_unavailable(pair: Pair) -> Steps | None:
-    """The steps after the last gas or brake of the faulty run; None unless that was soon after the alert and
-    golden still uses both."""
+    """Return the steps after the last gas or brake of the faulty run.
+
+    None unless that was soon after the alert and golden still uses both.
+    """
     used = (pair.faulty["gas"] > 0) | (pair.faulty["brake"] > 0)
     last = pair.t[used].max(initial=pair.start)
     gone: Steps = pair.t > last

@@ -1,5 +1,4 @@
-"""Draws figures of single experiments, which are found by a query over the results and confirmed on
-traces."""
+"""Draws figures of single experiments, found by a query over the results and confirmed on traces."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from typing import Any
@@ -29,8 +28,7 @@ def example_drawings(
 ) -> tuple[Drawing, ...]:
     """Make a drawing for each wanted figure. If a figure is missing, its drawing has the reason.
 
-    `frame` comes from `statistics.frame.load`. Without a workspace there are no traces. Traces come from the
-    series of the experiments, so nothing is rerun.
+    `frame` comes from `statistics.frame.load`. Traces come from stored series, so nothing is rerun.
     """
     traces = Traces(workspace, folder) if workspace else None
     made = []
@@ -43,8 +41,10 @@ def example_drawings(
 
 
 def candidates(frame: pd.DataFrame, wanted: Wanted) -> pd.DataFrame:
-    """The rows that the query finds, in the order in which they are examined. Empty if the target lacks the
-    hazard or channel."""
+    """Return the rows that the query finds, in the order in which they are examined.
+
+    Empty if the target lacks the hazard or channel.
+    """
     numbers = frame.assign(**{n: pd.to_numeric(frame[n]) for n in frame.columns if n.startswith("max_dev_")})
     try:
         found = numbers.query(wanted.query, engine="python")
@@ -60,7 +60,7 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
     if found.empty:
         return _none(wanted, "no experiment of this run matches the query")
     if traces is None:
-        return _none(wanted, "no fault library was found, which defines the channels")
+        return _none(wanted, "no fault library was found, so the channels are unknown")
     manifest = traces.manifest
     recorded = {channel.name for channel in (*manifest.compared, *manifest.plotted)}
     if missing := [name for name in wanted.actions if name not in recorded]:
@@ -87,7 +87,8 @@ def _drawing(frame: pd.DataFrame, traces: Traces | None, wanted: Wanted) -> Draw
                 ),
             )
     return _none(
-        wanted, f"the first {len(looked_at)} of the {len(found)} that the query finds do not show it"
+        wanted,
+        f"the first {len(looked_at)} of the {len(found)} experiments that the query finds do not show it",
     )
 
 
@@ -102,7 +103,7 @@ def _none(wanted: Wanted, why: str) -> Drawing:
 
 
 def _note(wanted: Wanted, row: Mapping[Hashable, Any], number: int, of: int) -> str:
-    """A note that says what the figure shows and how it was found."""
+    """Describe what the figure shows and how it was found."""
     fault = fault_label(f"{row['kind']}/{row['variant']}", row["value"], row["unit"])
     return (
         f"{fault} in {row['scenario']}, {row['method']}, trigger "

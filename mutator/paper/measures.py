@@ -1,8 +1,8 @@
 """Measures that evaluate published observations on a frame of results, each with an interval.
 
 `runs` comes from `mutator.statistics.frame.load`. `of`, `part` and `against` are pandas queries on it; an
-empty query selects all runs. For each claim, a report shows the call that was evaluated. You can repeat it in
-a Python session:
+empty query selects all runs. Reports show the evaluated call of each claim. You can repeat it
+in Python:
 
     from mutator.paper.measures import *
     from mutator.statistics.frame import load
@@ -38,14 +38,13 @@ _BOUNDS_A_MEDIAN = 6  # fewer runs all lie on one side of the true median in mor
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Estimate:
-    """An estimate with its 95 % interval (NaN: none) from `n` runs or pairs. `count` is the number of those
-    with the property, if they can be counted. `text` shows everything."""
+    """An estimate with its 95 % interval (NaN: none). `text` shows everything."""
 
     estimate: float
     low: float
     high: float
-    n: int
-    count: int | None = None
+    n: int  # runs or pairs
+    count: int | None = None  # those with the property, if they can be counted
     text: str
 
     def __str__(self) -> str:
@@ -53,19 +52,20 @@ class Estimate:
 
 
 def share(runs: pd.DataFrame, *, of: str, part: str) -> Estimate:
-    """The share of runs in `of` that are also in `part`, with Wilson's interval."""
+    """Return the share of runs in `of` that are also in `part`, with Wilson's interval."""
     return of_share(_share(runs, of, part))
 
 
 def difference(runs: pd.DataFrame, *, of: str, against: str, part: str) -> Estimate:
-    """The share of `part` among the runs in `of`, minus that among the runs in `against`, with Newcombe's
-    interval."""
+    """Return the share of `part` in `of` minus that in `against`, with Newcombe's interval."""
     return of_difference(_share(runs, of, part), _share(runs, against, part))
 
 
 def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """The hazard rate of guided runs minus that of random runs. The interval resamples whole faults (location
-    and value)."""
+    """Return the hazard rate of guided runs minus that of random runs.
+
+    The interval resamples whole faults (location and value).
+    """
     chosen = _query(runs, of)
     one, other = (
         _share(chosen, f'method == "{how}"', "is_hazard") for how in (contrasts.GUIDED, contrasts.RANDOM)
@@ -81,7 +81,7 @@ def clustered_difference(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """The common odds ratio of a hazard over fault types, guided against random (Mantel-Haenszel)."""
+    """Return the common odds ratio of a hazard over fault types, guided against random (Mantel-Haenszel)."""
     parts = contrasts.strata(by_kind(_query(runs, of)), "injected")
     found = contrasts.mantel_haenszel(parts)
     said = f"- ({found.strata} fault types)"
@@ -100,9 +100,11 @@ def stratified(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """Among guided-random pairs in which only one run has a hazard, the share in which it is the guided run.
+    """Return the share of guided-random pairs, among those with one hazard, in which the guided run has it.
+
     The Clopper-Pearson interval agrees with McNemar's exact test. `of` is a query on pairs, with column names
-    that end in `_guided` and `_random`."""
+    that end in `_guided` and `_random`.
+    """
     from statsmodels.stats.proportion import proportion_confint  # type: ignore[import-untyped]
 
     matched = contrasts.mcnemar(_query(contrasts.pairs(runs), of))
@@ -123,7 +125,7 @@ def paired(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
-    """The mean of `end - start` in s over the runs in `of` that have both, with Student's t interval."""
+    """Return the mean of `end - start` in s over the runs in `of` that have both (Student's t interval)."""
     from scipy.stats import ttest_1samp  # type: ignore[import-untyped]
 
     chosen = _query(runs, of)
@@ -137,18 +139,19 @@ def mean_time(runs: pd.DataFrame, *, of: str, start: str, end: str) -> Estimate:
 
 
 def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
-    """The Kaplan-Meier median of the time (s) from the first alert to a hazard, censored at the end of the
-    run (column `t_end`, simulated seconds). It is infinite if no hazard follows most alerts."""
+    """Return the Kaplan-Meier median of the time (s) from the first alert to a hazard.
+
+    It is censored at the end of the run (column `t_end`, simulated seconds), and infinite if no hazard
+    follows most alerts.
+    """
     chosen = _query(runs, of)
     if chosen["t_end"].isna().any():
         nan = math.nan
-        return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (when a run ends is not known here)")
+        return Estimate(estimate=nan, low=nan, high=nan, n=0, text="- (the ends of the runs are not known)")
     ends = {str(scenario): float(group["t_end"].iloc[0]) for scenario, group in chosen.groupby("scenario")}
     found = times.reaction(chosen, ends, 0.0)
     median, low, high = found.median, found.median_low, found.median_high
-    if found.at_risk and math.isnan(
-        low
-    ):  # the curve does not touch one half: always above, or past it in one step
+    if found.at_risk and math.isnan(low):  # the curve stays above one half or skips it in one step
         median = math.inf if math.isnan(median) else median
         if found.at_risk >= _BOUNDS_A_MEDIAN:
             low = high = median
@@ -156,12 +159,11 @@ def median_time(runs: pd.DataFrame, *, of: str) -> Estimate:
 
 
 def of_share(one: Share) -> Estimate:
-    """A share as an estimate."""
     return Estimate(estimate=one.rate, low=one.low, high=one.high, n=one.of, count=one.count, text=str(one))
 
 
 def of_difference(one: Share, other: Share) -> Estimate:
-    """The difference of the shares of different runs, first minus second (Newcombe, statsmodels)."""
+    """Return the difference of the shares of different runs, first minus second (Newcombe, statsmodels)."""
     from statsmodels.stats.proportion import confint_proportions_2indep
 
     low = high = math.nan

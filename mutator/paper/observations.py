@@ -1,7 +1,6 @@
 """Tests published observations. Each claim is a query on the results, and a rule decides the verdict.
 
-Claims, queries and rules are data in the fault library (`references/paper_observations.yaml`). Reports show
-the evaluated calls; see `mutator.paper.measures`.
+Claims, queries and rules are data in the fault library (`references/paper_observations.yaml`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,12 +30,11 @@ class Verdict(StrEnum):
 
 
 class Rule(StrictModel):
-    """The condition under which a claim holds. Exactly one field is set. Shares and differences are
-    fractions; times are in s.
+    """The condition under which a claim holds. Exactly one field is set.
 
-    `above`, `below` and `within` (plus or minus) are bounds for the whole interval. With `some`, at least one
-    run must have the property; with `never`, none may. If no run has it, a verdict needs an interval that
-    ends at or below this share.
+    Shares and differences are fractions; times are in s. `above`, `below` and `within` (plus or minus) are
+    bounds for the whole interval. With `some`, at least one run must have the property; with `never`, none
+    may. If no run has it, a verdict needs an interval that ends at or below this share.
     """
 
     above: float | None = None
@@ -52,7 +50,6 @@ class Rule(StrictModel):
         return self
 
     def verdict(self, found: Estimate) -> Verdict:
-        """The verdict on an estimate."""
         if self.some is not None or self.never is not None:
             return self._seen(found)
         if found.n < FEWEST:
@@ -86,8 +83,10 @@ class _Each(StrictModel):
 
 
 class Claim(StrictModel):
-    """One claim; the head of the file of observations explains the fields. Without a measure, results cannot
-    decide the claim, and `see` names what might."""
+    """One claim. The comment at the top of the file of observations explains the fields.
+
+    Without a measure, results cannot decide the claim, and `see` names what might.
+    """
 
     says: str
     measure: str | None = None
@@ -115,8 +114,7 @@ class Claim(StrictModel):
         return self
 
     def calls(self) -> Iterator[tuple[str, dict[str, str]]]:
-        """Yield each group with the arguments of the measure. Without groups, there is one group with an
-        empty name."""
+        """Yield each group with the arguments of the measure. A claim without groups has one group, ''."""
         named = {name: getattr(self, name) for name in ("of", "against", "part", "start", "end")}
         # an empty `of` means all runs
         arguments = {name: text for name, text in named.items() if text is not None}
@@ -128,7 +126,7 @@ class Claim(StrictModel):
             yield value, arguments | {"of": chosen}
 
     def published(self) -> Estimate | None:
-        """The paper's counts as an estimate."""
+        """Return the paper's counts as an estimate."""
         shares = [share(count, of) for count, of in self.paper]
         if len(shares) == 2:
             return of_difference(*shares)
@@ -184,11 +182,10 @@ class JudgedObservation:
 def judge(
     path: Path, runs: pd.DataFrame, lacks: Sequence[str], *, only_needed: bool = False
 ) -> tuple[JudgedObservation, ...]:
-    """Judge the observations in a file on a frame of results. With `only_needed`, judge only the claims on
-    which observations depend.
+    """Judge the observations in a file on a frame of results.
 
-    `lacks` says how the runs differ from the paper's mixture of faults. Raise MutatorError with file and line
-    if the file or a query is invalid.
+    With `only_needed`, judge only the claims on which observations depend. `lacks` says how the runs differ
+    from the paper's mixture of faults. MutatorError with file and line if the file or a query is invalid.
     """
     model, source = read(path, Observations, SCHEMA)
     made = []
@@ -206,8 +203,7 @@ def judge(
 
 
 def together(verdicts: Sequence[Verdict]) -> Verdict:
-    """The verdict of several verdicts together. If one fails, all fail. Otherwise, if one lacks data, all
-    lack data."""
+    """Combine verdicts: one that fails decides, otherwise one that lacks data."""
     for verdict in (Verdict.FAILS, Verdict.UNDECIDED):
         if verdict in verdicts:
             return verdict
@@ -265,8 +261,8 @@ def _answer(
     except (NameError, SyntaxError, TypeError, ValueError, KeyError, AttributeError) as err:
         raise source.error(
             keys,
-            f"a query that cannot be answered: {err}",
-            expected=f"what {measure} takes, with columns of the results",
+            f"a query that fails: {err}",
+            expected=f"arguments of {measure}, with columns of the results",
             remedy="see mutator/paper/measures.py",
         ) from err
     return Answer(group=group, query=query, found=found, verdict=rule.verdict(found))

@@ -26,7 +26,7 @@ HEADS = ("claim", "", "the paper", "rule on its counts", "here", "rule", "verdic
 
 
 def table(observation: JudgedObservation) -> Table:
-    """The table of an observation: a row for each claim, and a row for each of its groups."""
+    """Return the table of an observation: a row for each claim, and a row for each of its groups."""
     made = []
     for one in observation.claims:
         rule = str(one.claim.holds or "")
@@ -42,13 +42,12 @@ def table(observation: JudgedObservation) -> Table:
 
 
 def published(one: JudgedClaim) -> str:
-    """What the paper says on a claim, counts first."""
+    """Return what the paper says on a claim, counts first."""
     found = one.claim.published()
     return "; ".join(text for text in (found.text if found else "", one.claim.told) if text) or "-"
 
 
 def session(ends: Sequence[tuple[str, float]]) -> str:
-    """The Python lines to run before the queries."""
     if not ends:
         return SESSION
     times = ", ".join(f'"{scenario}": {end:g}' for scenario, end in ends)
@@ -58,7 +57,6 @@ def session(ends: Sequence[tuple[str, float]]) -> str:
 def markdown(
     observations: Sequence[JudgedObservation], ends: Sequence[tuple[str, float]], coverage: str
 ) -> str:
-    """The complete page: verdicts, claims, rules, and the evaluated queries."""
     parts = ["# The paper's observations", coverage, verdicts(observations), rules()]
     for one in observations:
         parts += [f"## {heading(one)}", table(one).as_markdown()]
@@ -71,7 +69,6 @@ def markdown(
 
 
 def verdicts(observations: Sequence[JudgedObservation]) -> str:
-    """The observations with their verdicts as a table."""
     rows = [[str(one.number), one.title, one.verdict.value] for one in observations]
     return Table(heads=("observation", "", "verdict"), rows=rows).as_markdown()
 
@@ -85,7 +82,6 @@ def rules() -> str:
 
 
 def sheet(observations: Sequence[JudgedObservation]) -> Sheet:
-    """The sheet with a line for each query and a column for each number."""
     return Sheet(
         name="observations",
         title="The paper's observations",

@@ -50,9 +50,7 @@ _HTML = """\
 
 
 def observations_panel(run: ReportedRun) -> Panel | None:
-    """The panel of the observations that the library cites. Writes observations.md and
-    tables/observations.csv. With several seeds, it also shows counts by seed and writes
-    tables/observations_by_seed.csv.
+    """Write observations.md and tables of the observations that the library cites; return their panel.
 
     None if the library cites no observations, if the run has none of the published fault types, or if its
     experiments decide no observation. Decided observations come first.
@@ -106,7 +104,6 @@ def observations_panel(run: ReportedRun) -> Panel | None:
 
 
 def _missing(kinds: Sequence[str], runs: "pd.DataFrame") -> list[str]:
-    """The paper's fault types that are missing from these runs."""
     return sorted(set(kinds) - set(runs["kind"].unique()))
 
 

@@ -14,17 +14,15 @@ FILES = ("paper_summary.yaml", "paper_coverage.yaml", "paper_times.yaml")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Paper:
-    """The published counts. `summary` is by (method, scenario). `coverage` is by (method, module/fault type)
-    and has only injected, activated and hazards."""
+    """The published counts. `coverage` has only injected, activated and hazards."""
 
-    summary: dict[tuple[str, str], Tally]
-    coverage: dict[tuple[str, str], Tally]
+    summary: dict[tuple[str, str], Tally]  # by method and scenario
+    coverage: dict[tuple[str, str], Tally]  # by method and module/fault type
     driver_reaction_s: float
-    least_alert_to_hazard_s: float  # means in the scenarios with the shortest and the longest time
+    least_alert_to_hazard_s: float  # least and most: the smallest and largest mean of a scenario
     most_alert_to_hazard_s: float
 
     def published(self) -> Published:
-        """The counts in the form that tables show next to those of a run."""
         least, most = self.least_alert_to_hazard_s, self.most_alert_to_hazard_s
         return Published(
             source="paper",
@@ -83,7 +81,7 @@ class _Times(StrictModel):
 
 
 def load_paper(references: Path) -> Paper:
-    """Load the cited numbers of a folder. Raise MutatorError with file and line if counts are impossible."""
+    """Load the cited numbers of a folder. MutatorError with file and line if counts are impossible."""
     summary, summary_source = read(references / FILES[0], _Summary, "paper_summary/1")
     coverage, coverage_source = read(references / FILES[1], _Coverage, "paper_coverage/1")
     times, _ = read(references / FILES[2], _Times, "paper_times/1")
@@ -112,13 +110,11 @@ def load_paper(references: Path) -> Paper:
 
 
 def has_paper(references: Path) -> bool:
-    """Whether the folder cites published numbers."""
     return all((references / name).is_file() for name in FILES)
 
 
 def _check(tally: Tally, source: Source, row: int) -> None:
-    """Raise MutatorError if a part is larger than its whole, or if the counts of hazards with alert
-    contradict those of alerts with hazard."""
+    """Raise MutatorError if a part exceeds its whole, or if counts of hazards and alerts disagree."""
     parts = (tally.manifested or 0, tally.hazards, tally.alerts or 0)
     fits = tally.activated <= tally.injected and max(parts) <= tally.activated
     if tally.alerts is not None:

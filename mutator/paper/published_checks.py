@@ -1,4 +1,4 @@
-"""Checks that the published numbers in the library are consistent with each other and with the library."""
+"""Checks that the published numbers in the library are consistent."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -17,7 +17,7 @@ _REMEDY = "compare with the published table"
 
 
 def check_paper(workspace: Workspace) -> Iterator[MutatorError]:
-    """Yield every problem of `references/paper_*.yaml` in a library with campaigns that ask for the study.
+    """Yield every problem of `references/paper_*.yaml` in a library whose campaigns name the study.
 
     Problems are missing files, impossible numbers (`load_paper`), duplicate rows, unknown methods, scenarios
     and fault types, and sums over scenarios that differ from those over fault types.
@@ -77,8 +77,7 @@ def _unknown(
 
 
 def _sums(paper: Paper, coverage: Source, summary: Path) -> Iterator[MutatorError]:
-    """Yield differences between the sums of both tables, which count the same experiments, by fault type and
-    by scenario."""
+    """Yield differences between the sums of both tables, which count the same experiments."""
 
     def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
         return total(tally for (how, _), tally in counts.items() if how == method)

@@ -1,5 +1,4 @@
-"""Draws a fault-free run (dashed) and a faulty run (solid) on one time axis, with marked events and a shaded
-period."""
+"""Draws a golden run (dashed) and a faulty run (solid) on one time axis, with marked events."""
 
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -32,8 +31,7 @@ LABEL_SHARE = 0.12  # width of a mark's label as a share of the time axis
 def draw(
     pair: Pair, steps: Steps, wanted: Wanted, marks: Iterable[Mark], manifest: TargetManifest
 ) -> "Figure":
-    """Draw a panel for each of `wanted.panels` that both runs have. In the panels of `wanted.actions`, shade
-    `steps`."""
+    """Draw the `wanted.panels` that both runs have. In those of `wanted.actions`, shade `steps`."""
     units = {channel.name: channel.unit for channel in (*manifest.compared, *manifest.plotted)}
     panels = [(c, what) for c, what in wanted.panels if c in pair.golden and c in pair.faulty]
     first = max(float(pair.t[0]), pair.start - BEFORE_S)
@@ -58,7 +56,6 @@ def draw(
 
 
 def first_ones(marks: Iterable[Mark]) -> list[Mark]:
-    """Yield the marks in order, with only the first alert."""
     kept: list[Mark] = []
     for mark in marks:
         if mark.kind is not MarkKind.ALERT or all(m.kind is not MarkKind.ALERT for m in kept):
@@ -78,15 +75,13 @@ def _lines(axis: "Axes", pair: Pair, channel: str, shown: np.ndarray) -> None:
 
 
 def _shade(axis: "Axes", t: np.ndarray, steps: Steps) -> None:
-    """Draw a grey band over each series of consecutive `steps`."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], steps.astype(int), [0]))))
     for begin, end in edges.reshape(-1, 2):
         axis.axvspan(t[begin], t[end - 1], color=SHADE, alpha=0.45, linewidth=0)
 
 
 def _mark(axes: Sequence["Axes"], marks: Sequence[Mark], width: float) -> None:
-    """Draw a line through all panels for each mark. The names are above the first panel, each as low as
-    possible."""
+    """Draw a line through all panels for each mark, and its name above, as low as possible."""
     free: list[float] = []  # the end of the last name on each level
     end, room = axes[0].get_xlim()[1], LABEL_SHARE * width
     for mark in marks:

@@ -19,7 +19,7 @@ ABOUT = (
 
 
 def judge_by_seed(path: Path, runs: pd.DataFrame, lacks: Callable[[pd.DataFrame], Sequence[str]]) -> BySeed:
-    """Judge the observations in a file on the runs of each seed separately. Empty if there is only one seed.
+    """Judge the observations on the runs of each seed separately. Empty if there is only one seed.
 
     `lacks` returns how a seed's runs differ from the paper's mixture of faults.
     """
@@ -31,7 +31,6 @@ def judge_by_seed(path: Path, runs: pd.DataFrame, lacks: Callable[[pd.DataFrame]
 
 
 def table(together: Sequence[JudgedObservation], by_seed: BySeed) -> Table:
-    """The table of how many seeds show each observation, and of the verdict of all seeds together."""
     heads = ("observation", "", "all seeds together", *(verdict.value for verdict in Verdict), "seeds")
     rows = [
         (
@@ -45,12 +44,10 @@ def table(together: Sequence[JudgedObservation], by_seed: BySeed) -> Table:
 
 
 def _seeds_of(number: int, verdict: Verdict, by_seed: BySeed) -> list[str]:
-    """The seeds that have this verdict on an observation."""
     return [seed for seed, judged in by_seed.items() if judged[number - 1].verdict is verdict]
 
 
 def sheet(by_seed: BySeed) -> Sheet:
-    """The sheet with a line for each seed and each query of a claim on which an observation depends."""
     return Sheet(
         name="observations_by_seed",
         title="The paper's observations by seed",

@@ -10,8 +10,7 @@ from mutator.statistics.published import Published
 
 
 def published(run: ReportedRun) -> Published | None:
-    """The counts of the paper. None if the library cites none, or if the run has none of the paper's fault
-    types."""
+    """Return the counts of the paper, if the library cites them and the run has the paper's fault types."""
     references = run.workspace.library / "references" if run.workspace else None
     if references is None or not has_paper(references):
         return None
@@ -21,8 +20,7 @@ def published(run: ReportedRun) -> Published | None:
 
 
 def drawings(run: ReportedRun) -> tuple[Drawing, ...]:
-    """The figures of unsafe control actions in single experiments, only for finished runs with published
-    fault types."""
+    """Return the figures of unsafe control actions, only for finished runs with published fault types."""
     if published(run) is None or len(run.texts) != run.folder.planned:
         return ()
     return example_drawings(run.folder, run.frame, run.workspace)

@@ -124,7 +124,7 @@ def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
         ("sample: 12", "sample: 0", "greater than or equal to 1"),
         ("arithmetic, branch", "arithmetics", "'arithmetic', 'comparison'"),
         ("sample: 12", "when: [sometimes]", "'permanent' or 'transient'"),
-        ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "a `sample` of their own"),
+        ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "use their own `sample`"),
     ],
 )
 def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: str) -> None:

@@ -52,7 +52,7 @@ def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> Non
     Naming the library's own file is allowed."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
-    with pytest.raises(MutatorError, match="has the name sensor/lane of a spec in the library"):
+    with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):
         make_plan(toycar, mine)
     own = toycar.library / "faults" / "sensor" / "lane.yaml"
     text = mine.read_text().replace("specs/drifting.yaml", str(own)).replace("drifting/", "lane/")

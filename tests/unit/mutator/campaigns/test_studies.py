@@ -81,7 +81,7 @@ STRANGERS = {
         "is not a study: json:dumps is a function without about, panels, check, published, drawings",
     ),
     "module": ("json", "is not a study: json is a module without"),
-    "unmade": ("mutator.report.studies:Study", "is not a study: mutator.* is a class, not an object of it"),
+    "unmade": ("mutator.report.studies:Study", "is not a study: mutator.* is a class, not an instance"),
     "idle": ("strange_studies.idle:STUDY", "is not a study: .*:STUDY has no function check;"),
     "paneless": ("strange_studies.idle:PANELESS", "is not a study: .* has panels that are not functions;"),
 }

@@ -165,7 +165,7 @@ def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)
-    with pytest.raises(BadOutput, match="an array alone"):
+    with pytest.raises(BadOutput, match="a single array"):
         load_trace(MANIFEST, tmp_path)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("t.npy", b"\x93NUMPY\x01\0\x08\0{'a': (\n")
