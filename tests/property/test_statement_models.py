@@ -20,7 +20,7 @@ FEW = [TARGET / "selfdrive/controls/lib/longcontrol.py"]
 ALL = sorted(p for part in ("car", "controls") for p in (TARGET / "selfdrive" / part).rglob("*.py"))
 EXCUSES = (
     "the next statement is missing",
-    "no statement that is alone on its lines",
+    "the anchor is not at a statement that is alone",
     "the anchored statement",
     "the template yields",
     "ends its block",

@@ -42,7 +42,7 @@ def test_a_spec_file_is_found_from_the_campaign(
 def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
     (mine.parent / "specs" / "drifting.yaml").unlink()
     with pytest.raises(
-        MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected a spec file"
+        MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected the path of a spec file"
     ):
         make_plan(toycar, mine)
 

@@ -88,7 +88,7 @@ def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
     path = toy.manifest("toy").root / name
     path.parent.mkdir(exist_ok=True)
     path.write_text("x = 1\n")
-    with pytest.raises(MutatorError, match=rf"the target has a file {name}; expected that name free"):
+    with pytest.raises(MutatorError, match=rf"the target has a file {name}; expected no file of this name"):
         build(toy, None)
 
 
@@ -198,7 +198,7 @@ def test_triggers_are_checked_again(toy: Workspace) -> None:
     """A probe is not built with an invalid condition, or with a hold for a time that has no length."""
     with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
-    with pytest.raises(MutatorError, match="expected hold_s with it"):
+    with pytest.raises(MutatorError, match="without a time; expected hold_s"):
         build(toy, None, Trigger(name="x", condition="True", hold=Hold.FOR))
 
 

@@ -191,7 +191,7 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
     a constant belongs to no function."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
-        with pytest.raises(MutatorError, match=r"changes no value|expected no variable"):
+        with pytest.raises(MutatorError, match=r"cannot change the value|expected no variable"):
             injection_edit(
                 file, clone.fault_models(), Injection(location=at("LIMIT"), model=model, params=params), "a"
             )

@@ -191,7 +191,7 @@ def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) 
 
 def test_no_statement_to_repeat(toy: Make) -> None:
     """The entry of a function is refused, because it has no statement to repeat."""
-    with pytest.raises(MutatorError, match="no statement that is alone on its lines"):
+    with pytest.raises(MutatorError, match="not at a statement that is alone on its lines"):
         toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
 
 

@@ -88,7 +88,7 @@ def test_a_path_that_both_have(pole: Workspace, name: str) -> None:
 
 def test_the_probes_name_in_an_overlay(pole: Workspace) -> None:
     (pole.library / "overlays" / "pole" / "_fi.py").write_text("x = 1\n")
-    with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected that name free"):
+    with pytest.raises(MutatorError, match=r"the target has a file _fi.py; expected no file of this name"):
         build(pole.manifest("pole"), pole.fault_models(), None, always())
 
 
