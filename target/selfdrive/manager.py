@@ -8,13 +8,13 @@ from selfdrive.controls.radard import Radard
 from selfdrive.messages import CameraView, CanFrame, RadarState
 from selfdrive.visiond.visiond import Visiond
 
-# First step of the control loop: the original's process starts 0.1 s after the car. Its first cycle has no
+# First step of the control loop: the original's process starts 0.1 s after the car, so its first cycle has no
 # CAN frames.
 START_STEP = 11
 
 
 class Manager:
-    """The whole controller. One `step` per 10 ms of the car's time."""
+    """The whole controller."""
 
     def __init__(self, car: CarInterface, radar: RadarInterface, visiond: Visiond) -> None:
         self._radar = radar
@@ -26,7 +26,8 @@ class Manager:
         self._step = 0
 
     def step(self, t: float, frames: list[CanFrame], view: CameraView | None) -> list[CanFrame]:
-        """One step at time `t` (s) with all frames received since the last one; returns those to send.
+        """Advance 10 ms to time `t` (s) with all frames received since the last step; return the frames to
+        send.
 
         `view` is None when the camera has no new picture.
         """

@@ -1,9 +1,8 @@
 """The messages between the parts of the controller.
 
-Every message is a plain slotted record in SI units and radians. Left is positive for lateral
-positions, angles and steering torque. Publishers create new messages, and receivers never change them.
-They are not frozen because creating a frozen record takes four times as long, and a run creates
-thousands.
+Units are SI and radians. Left is positive for lateral positions, angles and steering torque. Receivers must
+not change messages; these are not frozen because creating a frozen one takes four times as long, and a run
+creates thousands.
 """
 
 from dataclasses import dataclass, field
@@ -11,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-VIEW_LENGTH = 50  # points of a line ahead, a metre apart
+VIEW_LENGTH = 50  # points of a line ahead, 1 m apart
 
 
 class CanFrame(NamedTuple):
-    """One CAN frame. Bus 0 is the car (and takes the commands), bus 1 the radar."""
+    """One CAN frame. Bus 0 is the car, bus 1 the radar."""
 
     address: int
     data: bytes
@@ -32,7 +31,7 @@ class ButtonEvent:
 
 @dataclass(slots=True)
 class CarState:
-    """The car as its CAN frames describe it, once per control cycle."""
+    """The car's state from its CAN frames, once per control cycle."""
 
     t: float = 0.0  # s, when the frames were read
     can_valid: bool = False
@@ -62,7 +61,7 @@ class CarState:
     brake_hold: bool = False
     park_brake: bool = False
     buttons: tuple[ButtonEvent, ...] = ()
-    events: tuple = ()  # of controls.lib.events.Event, raised by the car interface
+    events: tuple = ()  # of controls.lib.events.Event
 
 
 @dataclass(slots=True)
@@ -85,16 +84,16 @@ class RadarData:
 
 
 class CameraView(NamedTuple):
-    """What the camera sees at one moment, as geometry in the car's frame (m, left positive).
+    """What the camera sees, as geometry in the car's frame (m, left positive).
 
     `picture` is the detector's input, 8 bit grey, rows x columns; None if the run has no pictures. Detectors
-    that use it use nothing else of the view.
+    of pictures use no other field.
     """
 
     left_lane_y: float  # at the car
     right_lane_y: float  # at the car
     path_y: float  # middle of the lane, at the car
-    bend: tuple[float, ...]  # sideways shift of the lines at 0, 1, ... 49 m ahead
+    bend: tuple[float, ...]  # lateral shift of the lines at 0, 1, ... 49 m ahead
     lead_d_rel: float  # from the front bumper
     picture: np.ndarray | None = None
 
@@ -103,7 +102,7 @@ class CameraView(NamedTuple):
 class PathData:
     """A line ahead of the car: lateral positions (m, left positive) at 0, 1, ... 49 m.
 
-    If it was not seen, `valid` is False, `prob` is 0, and the points are the expected ones.
+    If the line was not seen, `valid` is False, `prob` is 0, and the points are the expected ones.
     """
 
     points: tuple[float, ...]
@@ -114,7 +113,7 @@ class PathData:
 
 @dataclass(slots=True)
 class LeadVision:
-    """The lead vehicle seen by the camera; `d_rel` in m from the front bumper, `std` in m."""
+    """The lead vehicle as the camera sees it; `d_rel` in m from the front bumper, `std` in m."""
 
     d_rel: float
     prob: float
@@ -134,7 +133,7 @@ class ModelData:
 
 @dataclass(slots=True)
 class LeadData:
-    """A lead vehicle published by radard; all zero if `status` is False."""
+    """A lead vehicle from radard; all zero if `status` is False."""
 
     status: bool = False
     d_rel: float = 0.0  # m
@@ -146,7 +145,7 @@ class LeadData:
     v_lat: float = 0.0  # m/s
     v_lead_k: float = 0.0  # m/s, filtered
     a_lead_k: float = 0.0  # m/s^2, filtered
-    fcw: bool = False  # fused with the camera often enough for a warning
+    fcw: bool = False  # fused with the camera often enough for a collision warning
 
 
 @dataclass(slots=True)
@@ -170,7 +169,7 @@ class Actuators:
 
 @dataclass(slots=True)
 class CarControl:
-    """The controller's demand, passed to the car interface every cycle."""
+    """The controller's demand in one cycle."""
 
     enabled: bool = False
     actuators: Actuators = field(default_factory=Actuators)
@@ -185,12 +184,12 @@ class CarControl:
 
 @dataclass(slots=True)
 class Plan:
-    """The planner's output, refreshed every control cycle."""
+    """The planner's output in one control cycle."""
 
     t: float = 0.0
     v_target: float = 0.0  # m/s
     a_target: float = 0.0  # m/s^2
-    v_target_future: float = 0.0  # m/s, the plan's end, decides stopping and starting
+    v_target_future: float = 0.0  # m/s at the plan's end; decides stopping and starting
     source: str = "cruise"  # cruise, mpc1 or mpc2
     has_lead: bool = False
     fcw: bool = False
@@ -201,7 +200,7 @@ class Plan:
 
 @dataclass(slots=True)
 class ControlsState:
-    """The controller's state for other parts and the log, every cycle."""
+    """The controller's state in one cycle, for other parts and the log."""
 
     t: float = 0.0
     state: str = "disabled"  # disabled, pre_enabled, enabled, soft_disabling
@@ -211,7 +210,7 @@ class ControlsState:
     a_ego: float = 0.0  # m/s^2
     steering_angle: float = 0.0  # rad, as measured
     angle_desired: float = 0.0  # rad at the steering wheel
-    v_cruise: float = 0.0  # m/s, the set speed; 255 km/h before the first engagement
+    v_cruise: float = 0.0  # m/s; 255 km/h before the first engagement
     v_pid: float = 0.0  # m/s
     long_state: str = "off"  # off, pid, stopping, starting
     steer_saturated: bool = False

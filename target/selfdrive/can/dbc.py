@@ -1,8 +1,8 @@
-"""Reads a DBC file into bit layouts for packing and parsing without lookups.
+"""Reads a DBC file into bit layouts.
 
 A message is one big-endian integer of its whole payload, so a signal is a shift and a mask. This works only
-for Motorola signals, which the car uses; others are refused. Only messages and signals are read, in 1 ms;
-importing cantools, the tests' reference, takes 100 ms.
+for Motorola signals; others are refused. Only messages and signals are read, in 1 ms; importing cantools, the
+tests' reference, takes 100 ms.
 """
 
 import re
@@ -30,7 +30,7 @@ class Field(NamedTuple):
     shift: int
     mask: int
     sign_bit: int  # 0 for unsigned
-    factor: float  # int if the file has an integer, to keep counts whole
+    factor: float  # int if the file has an integer, so that counters stay integers
     offset: float
 
 
@@ -43,14 +43,14 @@ class Message:
     size: int  # bytes
     fields: Mapping[str, Field]
     has_checksum: bool
-    counter_shift: int | None  # of the two-bit counter, None without one
+    counter_shift: int | None  # of the two-bit counter; None if there is none
 
 
 @cache
 def load(path: Path) -> Mapping[str, Message]:
-    """All messages of a DBC file by name. Cached per process; the result is immutable.
+    """Return all messages of a DBC file by name. Cached per process; the result is immutable.
 
-    ValueError, with the line, for a message or signal with a layout that the car does not use.
+    Raises ValueError, with the line, for an unsupported message or signal.
     """
     layouts: list[tuple[re.Match[str], dict[str, Field]]] = []
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):

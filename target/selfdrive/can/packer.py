@@ -1,4 +1,4 @@
-"""Physical values to CAN frames, with the car maker's counter and checksum."""
+"""Packs physical values into CAN frames, with counter and checksum."""
 
 from collections.abc import Sequence
 
@@ -10,18 +10,19 @@ _HALF_BYTE_SUMS = bytes((value >> 4) + (value & 0xF) for value in range(256))
 
 
 def half_byte_sum(data: bytes) -> int:
-    """Sum of the sixteen-valued halves of all bytes."""
+    """Sum of the high and low four bits of all bytes."""
     return sum(data.translate(_HALF_BYTE_SUMS))
 
 
 def checksum_base(address: int) -> int:
-    """The address's contribution: address, payload and checksum add up to 8 modulo 16, by half bytes."""
+    """The address's part of the checksum: the half bytes of address, payload and checksum add up to 8 modulo
+    16."""
     return 8 - half_byte_sum(address.to_bytes(4, "big"))
 
 
 def encode(fields: Sequence[Field], values: Sequence[float]) -> int:
-    """A payload as one big-endian number, from the nearest raw values of the fields, clipped to their range;
-    not-a-number becomes raw 0."""
+    """Return the payload as one big-endian integer. Values are rounded to raw values and clipped to each
+    field's range; NaN becomes raw 0."""
     word = 0
     for (_, shift, mask, sign_bit, factor, offset), value in zip(fields, values, strict=True):
         scaled = (value - offset) / factor
@@ -49,10 +50,10 @@ class Packer:
         self._checksum_base = checksum_base(message.address)
         self._values: tuple[float, ...] | None = None
         self._word = -1
-        self._frames: dict[int, CanFrame] = {}  # by counter, of one word: values often stay
+        self._frames: dict[int, CanFrame] = {}  # by counter, for the current word; values often stay the same
 
     def pack(self, values: tuple[float, ...], counter: int = 0) -> CanFrame:
-        """The frame for physical `values`; `counter` counts the frames sent of this message."""
+        """Return the frame for physical `values`; `counter` counts the frames sent of this message."""
         if values != self._values:
             word = encode(self._fields, values)
             self._values = values

@@ -1,4 +1,4 @@
-"""CAN frames to physical values, accepted only with valid counter and checksum."""
+"""Reads physical values from CAN frames with valid counter and checksum."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from selfdrive.can.dbc import Field, Message
 from selfdrive.can.packer import checksum_base, half_byte_sum
 from selfdrive.messages import CanFrame
 
-MISSED_PERIODS = 10  # a message this much overdue is invalid
+MISSED_PERIODS = 10  # periods without a frame until a message is invalid
 MAX_BAD_COUNTERS = 5  # frames with a wrong counter before the message is rejected
 
 
@@ -20,10 +20,7 @@ class Expected(NamedTuple):
 
 
 class _State:
-    """One message's layout, newest values, and reception state.
-
-    A message without a counter always has counter 0.
-    """
+    """A message's layout, newest values and reception state."""
 
     __slots__ = (
         "bad_counters",
@@ -50,15 +47,15 @@ class _State:
         self.checksum_mask = 0xF if message.has_checksum else 0
         self.checksum_base = checksum_base(message.address)
         self.body_mask = sum(field.mask << field.shift for field in self.fields)
-        self.body = -1  # the relevant bits of the last valid payload
-        self.read: dict[bytes, int] = {}  # counters of valid payloads with that body, which often repeats
-        self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # the excess absorbs rounding of t
+        self.body = -1  # the bits of `fields` in the last valid payload
+        self.read: dict[bytes, int] = {}  # valid payloads with these bits, and their counters
+        self.timeout = MISSED_PERIODS / expected.rate + 1e-6  # 1e-6 s for the rounding of t
         self.newest = float("-inf")  # s, time of the last valid frame
-        self.counter: int | None = None  # of the next frame
+        self.counter: int | None = None  # expected in the next frame
         self.bad_counters = 0
 
     def accepts(self, data: bytes, word: int) -> bool:
-        """Whether size, checksum and counter are valid; counts wrong counters."""
+        """Check size, checksum and counter. Wrong counters are counted."""
         if len(data) != self.size or (half_byte_sum(data) - self.checksum_base) & self.checksum_mask:
             return False
         counter = word >> self.counter_shift & self.counter_mask
@@ -71,7 +68,7 @@ class _State:
         return self.bad_counters < MAX_BAD_COUNTERS
 
     def takes(self, data: bytes, word: int) -> bool:
-        """Store an accepted payload; returns whether its values are new."""
+        """Store an accepted payload; return whether its values are new."""
         body = word & self.body_mask
         new = body != self.body
         if new:
@@ -85,9 +82,8 @@ class _State:
 class CanParser:
     """Reads the `expected` messages of one bus.
 
-    `values[name]` has a message's newest valid physical values in signal order. `valid` is False
-    while any message is overdue or has not arrived. `updated` names the messages of the last
-    update.
+    `values[name]` has a message's newest valid physical values in signal order. `valid` is False while any
+    message is missing or overdue. `updated` names the messages of the last update.
     """
 
     def __init__(self, messages: Mapping[str, Message], expected: Mapping[str, Expected], bus: int) -> None:
@@ -98,10 +94,9 @@ class CanParser:
         self.valid = False
         self._bus = bus
         self._states = {messages[name].address: _State(messages[name], e) for name, e in expected.items()}
-        self._valid_until = float("-inf")  # a lower bound, recomputed when it has passed
+        self._valid_until = float("-inf")  # lower bound, recomputed when it has passed
 
     def update(self, frames: Sequence[CanFrame], t: float) -> None:
-        """Take the frames received until time `t` (s)."""
         states, bus = self._states, self._bus
         updated = []
         for address, data, frame_bus in frames:
@@ -125,7 +120,7 @@ class CanParser:
 
 
 def decode(fields: Sequence[Field], word: int) -> tuple[float, ...]:
-    """Physical values of a payload read as one big-endian number."""
+    """Return the physical values of a payload, given as one big-endian integer."""
     return tuple(
         [
             ((word >> shift & mask ^ sign_bit) - sign_bit) * factor + offset

@@ -1,11 +1,11 @@
-"""What a controller needs to know about its car."""
+"""Physical data and tuning of a car."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarParams:
-    """Physical data and tuning of one car model. Tables are (breakpoints, values).
+    """Tables are (breakpoints, values). Tables are (breakpoints, values).
 
     Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the lateral PI
     loop are per radian of steering-wheel angle, `steer_kf` also per (m/s)^2, because the self-aligning torque
@@ -30,7 +30,7 @@ class CarParams:
     long_ki: tuple[tuple[float, ...], tuple[float, ...]]
     gas_max: tuple[tuple[float, ...], tuple[float, ...]]
     brake_max: tuple[tuple[float, ...], tuple[float, ...]]
-    acceleration_per_output: float  # m/s^2 for an output of 1, divides the feedforward
+    acceleration_per_output: float  # m/s^2 for an output of 1; divides the feedforward
     radar_offset: float  # m from the radar to the bumper reference
     steer_limit_alert: bool
-    start_acceleration: float = 0.5  # m/s^2, target while the brake is released to move off
+    start_acceleration: float = 0.5  # m/s^2, target while the brake is released to start moving

@@ -1,7 +1,7 @@
-"""The camera's geometry: a pinhole over a flat road, from which all metres of the picture follow.
+"""The camera's geometry: a pinhole over a flat road.
 
 Car frame: x forward from the camera, y to the left, both in m on the road. Picture: column u to the right,
-row v down, in pixels. The camera looks along x and is pitched down; it has no roll and no lens distortion.
+row v down, in pixels. The camera looks along x, pitched down, without roll and lens distortion.
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from math import atan, cos, sin, tan
 class CameraModel:
     """A calibrated camera. Focal lengths and principal point in pixels, `height` in m, `pitch` in rad (down).
 
-    The defaults are the published calibration of the Caltech lanes set (M. Aly, 2008), at 640 x 480.
+    The defaults are the published calibration of the Caltech lanes data set (M. Aly, 2008), at 640 x 480.
     """
 
     width: int = 640
@@ -26,19 +26,19 @@ class CameraModel:
 
     @property
     def horizon(self) -> float:
-        """Row at which a flat road ends."""
+        """Row of the horizon of a flat road."""
         return self.cy - self.fy * tan(self.pitch)
 
     def depth(self, row: float) -> float:
-        """Distance (m) along the optical axis of the road seen in `row`, which must be below the horizon."""
+        """Distance (m) along the optical axis to the road in `row`, which must be below the horizon."""
         return self.height / (self._fall(row))
 
     def distance(self, row: float) -> float:
-        """x (m) of the road seen in `row`, which must be below the horizon."""
+        """x (m) of the road in `row`, which must be below the horizon."""
         return (self.depth(row) - self.height * sin(self.pitch)) / cos(self.pitch)
 
     def row(self, x: float) -> float:
-        """Row in which the road at `x` m ahead is seen."""
+        """Row of the road `x` m ahead."""
         depth = x * cos(self.pitch) + self.height * sin(self.pitch)
         return self.horizon + self.fy * self.height / (depth * cos(self.pitch))
 
@@ -47,15 +47,15 @@ class CameraModel:
         return self.depth(row) / self.fx
 
     def spread(self, width: float = 3.7) -> float:
-        """How many pixels further apart two lines of the road `width` m apart are in each row down."""
+        """Pixels per row by which two lines of the road, `width` m apart, diverge."""
         return self.fx * width * cos(self.pitch) / (self.fy * self.height)
 
     def column(self, x: float, y: float) -> float:
-        """Column in which the point (x, y) of the road is seen."""
+        """Column of the road's point (x, y)."""
         return self.cx - self.fx * y / (x * cos(self.pitch) + self.height * sin(self.pitch))
 
     def project(self, x: float, y: float, z: float) -> tuple[float, float]:
-        """(column, row) in which the point `z` m above the road's (x, y) is seen; it must be ahead."""
+        """(column, row) of the point `z` m above the road's (x, y), which must be ahead."""
         down = self.height - z
         depth = x * cos(self.pitch) + down * sin(self.pitch)
         fall = down * cos(self.pitch) - x * sin(self.pitch)
@@ -67,7 +67,7 @@ class CameraModel:
         return a, self.cx - self.fx * slope / cos(self.pitch) - a * self.horizon
 
     def line_on_road(self, a: float, b: float) -> tuple[float, float]:
-        """(y, slope) of the road's line that is seen as u = a * v + b: at x = 0 in m, and in m a metre."""
+        """(y, slope) of the road's line seen as u = a * v + b: `y` in m at x = 0, `slope` in m/m."""
         slope = (self.cx - a * self.horizon - b) * cos(self.pitch) / self.fx
         y = -a * self.fy * self.height / (self.fx * cos(self.pitch)) + slope * self.height * tan(self.pitch)
         return y, slope
@@ -76,7 +76,8 @@ class CameraModel:
     def from_view(
         cls, *, width: int, rows: int, horizon: float, focal: float, height: float
     ) -> "CameraModel":
-        """The camera with square pixels, looking from the picture's middle, whose horizon is at that row."""
+        """The camera with square pixels and its principal point in the picture's centre, for a horizon in
+        that row."""
         pitch = atan((0.5 * (rows - 1) - horizon) / focal)
         middle = 0.5 * (width - 1), 0.5 * (rows - 1)
         return cls(
@@ -84,5 +85,4 @@ class CameraModel:
         )
 
     def _fall(self, row: float) -> float:
-        """How far the ray through `row` falls for each metre along the optical axis."""
         return (row - self.horizon) * cos(self.pitch) / self.fy

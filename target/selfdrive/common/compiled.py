@@ -1,8 +1,8 @@
-"""C libraries that do a part of a run's arithmetic: the same numbers, sooner. Nothing needs them.
+"""Compiled C libraries that replace some Python calculations: same numbers, but faster; all are optional.
 
-A C file names the Python files beside it that it stands for: `Stands for: hog.py, mark_edges.py.` The name of
-its library has a digest of all of these, so where one of them is edited there is no library, and the Python
-calculates. `selfdrive.sim.compile_helpers` makes libraries; runs only look for them.
+A C file lists the Python files that it replaces: `Stands for: hog.py, mark_edges.py.` The library's name
+contains a digest of all of these, so an edited file has no library and runs in Python.
+`selfdrive.sim.compile_helpers` builds the libraries; runs only look for them.
 """
 
 import ctypes
@@ -14,35 +14,32 @@ from pathlib import Path
 from typing import NamedTuple
 
 SUFFIX = f".{sysconfig.get_platform()}.so"
-CHECK = 32  # bytes at a library's end: the digest of those before
+CHECK = 32  # bytes of the digest at a library's end
 _STANDS_FOR = re.compile(rb"Stands for: ([\w./, ]+)\.$", re.MULTILINE)
 
 _folder: Path | None = None
 
 
 class Library(NamedTuple):
-    """A library that was found: its functions, and the digest of its bytes."""
+    """A loaded library and the digest of its bytes."""
 
     code: ctypes.CDLL
     digest: bytes
 
 
 def use(folder: Path | None) -> None:
-    """From now on look for libraries in this folder; None: do without."""
+    """Look for libraries in this folder from now on; None: use none."""
     global _folder
     _folder = None
     if folder is not None:
         try:
             _folder = folder if any(folder.glob(f"*{SUFFIX}")) else None
-        except OSError:  # a folder that nobody may look into
+        except OSError:  # unreadable folder
             return
 
 
 def library(source: Path) -> Library | None:
-    """The library of the C file `source`; None if there is none, or none is to be used.
-
-    One that is damaged, or cannot be loaded here as it was made with another C library, is none.
-    """
+    """Return the library of the C file `source`; None if it is missing, damaged, disabled or not loadable."""
     if _folder is None:
         return None
     try:
@@ -52,7 +49,7 @@ def library(source: Path) -> Library | None:
 
 
 def file_name(source: Path) -> str:
-    """What the library of the C file `source` is called. Raises OSError for a file that cannot be read."""
+    """Return the name of the library of the C file `source`. Raises OSError for an unreadable file."""
     text = source.read_bytes()
     digest = sha256(text)
     for name in stands_for(text):
@@ -61,14 +58,14 @@ def file_name(source: Path) -> str:
 
 
 def stands_for(text: bytes) -> list[str]:
-    """Paths, from the C file's folder, of the Python files that its text says it stands for."""
+    """Return the paths, relative to the C file, of the Python files that it replaces."""
     found = _STANDS_FOR.search(text)
     return found[1].decode().split(", ") if found else []
 
 
 @cache
 def _loaded(path: Path) -> Library | None:
-    if path.is_fifo():  # nobody waits for what a pipe may say
+    if path.is_fifo():  # reading a pipe would block
         return None
     data = path.read_bytes()
     digest = sha256(data[:-CHECK]).digest()

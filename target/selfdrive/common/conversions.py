@@ -1,4 +1,4 @@
-"""Factors between SI and what is shown to people. Multiply: `speed_mps * MS_TO_KPH`."""
+"""Factors between SI and display units. Multiply: `speed_mps * MS_TO_KPH`."""
 
 from math import pi
 

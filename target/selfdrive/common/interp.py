@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 
 def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
-    """Value at `x` of the line through (xp, fp), constant outside. `xp` ascends.
+    """Interpolate (xp, fp) linearly at `x`, constant outside. `xp` ascends.
 
-    If `x` is NaN, the result is the first value; for equal `xp`, the last value counts.
+    If `x` is NaN, the result is the first value; for equal `xp`, the last value is used.
     """
     if not x >= xp[0]:
         return fp[0]
@@ -19,7 +19,7 @@ def interp(x: float, xp: Sequence[float], fp: Sequence[float]) -> float:
 
 
 def clip(x: float, lo: float, hi: float) -> float:
-    """`x` limited to lo..hi. NaN becomes `hi`, as in the original."""
+    """Limit `x` to lo..hi. As in the original, NaN becomes `hi`."""
     if not x < hi:
         return hi
     return x if x > lo else lo

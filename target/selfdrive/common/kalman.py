@@ -2,9 +2,9 @@
 
 
 class SteadyKalman:
-    """Two states, value and rate, with measured value and fixed gains.
+    """Two states, value and rate, with fixed gains; the value is measured.
 
-    The innovation uses the last estimate, not its prediction, as in the original: x <- (A - K C) x + K z with
+    As in the original, the innovation uses the last estimate, not its prediction: x <- (A - K C) x + K z with
     A = [[1, dt], [0, 1]] and C = [1, 0].
     """
 
@@ -17,7 +17,6 @@ class SteadyKalman:
         self.gain_value, self.gain_rate = gains
 
     def update(self, measured: float) -> None:
-        """Advance by one step of `dt` seconds with a new measurement of the value."""
         innovation = measured - self.value
         self.value += self.dt * self.rate + self.gain_value * innovation
         self.rate += self.gain_rate * innovation
@@ -26,7 +25,7 @@ class SteadyKalman:
 class DistanceFilter:
     """Distance and its rate from a distance measurement of known variance (covariance form).
 
-    Each prediction adds the same process noise, whatever the step, as in the original.
+    As in the original, each prediction adds the same process noise, whatever the step.
     """
 
     __slots__ = ("p00", "p01", "p11", "q_distance", "q_rate", "rate", "value")
@@ -41,7 +40,6 @@ class DistanceFilter:
         self.q_rate = q_rate
 
     def restart(self, value: float, variance: float, rate_variance: float) -> None:
-        """Start from `value`, with unknown rate."""
         self.value = value
         self.rate = 0.0
         self.p00 = variance
@@ -49,7 +47,6 @@ class DistanceFilter:
         self.p11 = rate_variance
 
     def update(self, measured: float, variance: float) -> None:
-        """Correct by a measurement."""
         innovation = measured - self.value
         total = self.p00 + variance
         k0 = self.p00 / total
@@ -61,7 +58,6 @@ class DistanceFilter:
         self.p00 -= k0 * self.p00
 
     def predict(self, dt: float) -> None:
-        """Advance by `dt` seconds."""
         self.value += dt * self.rate
         self.p00 += dt * (2.0 * self.p01 + dt * self.p11) + self.q_distance
         self.p01 += dt * self.p11

@@ -1,4 +1,4 @@
-"""Sums in a written order: the same bytes on any Python, which compensates its own sums since 3.12."""
+"""Sums in a fixed order, for the same bytes on every Python (`sum` compensates rounding since 3.12)."""
 
 from collections.abc import Iterable
 from functools import reduce
@@ -6,5 +6,5 @@ from operator import add
 
 
 def total(values: Iterable[float]) -> float:
-    """The sum, added from left to right; 0 if there are no values."""
+    """Return the sum, added from left to right; 0 if there are no values."""
     return reduce(add, values, 0)

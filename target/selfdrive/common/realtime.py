@@ -1,4 +1,4 @@
-"""The controller's clock: time is a frame number times one of these."""
+"""The controller's time steps."""
 
 DT_CTRL = 0.01  # s, plant and control loop
 DT_MDL = 0.05  # s, vision model, radar, planners

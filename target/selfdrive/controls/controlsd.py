@@ -1,4 +1,4 @@
-"""controlsd: sample, plan, decide, control, send - once every 10 ms."""
+"""controlsd: the control loop, every 10 ms."""
 
 from selfdrive.car.honda.interface import CarInterface
 from selfdrive.car.params import CarParams
@@ -36,7 +36,7 @@ LEARN_EVERY, LEARN_AT = 5, 2  # cycles, angle offset learning at 20 Hz
 
 
 class Controlsd:
-    """The control loop. After each update, `state` and `plan` have the newest ControlsState and Plan."""
+    """The control loop. `state` and `plan` are those of the last update."""
 
     def __init__(self, params: CarParams, car: CarInterface, fit: ModelFit) -> None:
         self._params = params
@@ -58,7 +58,7 @@ class Controlsd:
     ) -> list[CanFrame]:
         """Run one cycle at time `t` (s) and return the frames to send.
 
-        `radar_state` and `model` are the newest messages of any age; None before the first.
+        `radar_state` and `model` are the newest messages of any age, None before the first.
         """
         if self._frame == 0:
             self._alerts.add("startup", t)
@@ -76,7 +76,7 @@ class Controlsd:
     def _make_plan(
         self, t: float, car: CarState, radar_state: RadarState | None, model: ModelData | None
     ) -> Plan:
-        """Plans are made in every state; so a lead is known before the driver engages."""
+        """Plans are made in every state, so that a lead is known before the driver engages."""
         if self._planner.take_model(car.v_ego, model):
             self._lateral.plan(car, self._planner.path.lanes, self._angle_offset.value)
         state, absent = self._longitudinal.state, self._awareness.absent
@@ -84,7 +84,7 @@ class Controlsd:
 
     def _collect_events(self, car: CarState) -> tuple[Event, ...]:
         events = car.events + self.plan.events
-        # foot on the brake with nothing to stop for: releasing the pedal would start the car
+        # brake pressed with nothing to stop for: releasing the pedal would start the car
         if car.brake_pressed and self.plan.v_target_future >= STARTING_TARGET_SPEED:
             events += (NO_TARGET,)
         return events
@@ -133,8 +133,8 @@ class Controlsd:
             actuators,
             not enabled,  # cancels the car's own cruise control
             self._v_cruise * KPH_TO_MS,
-            enabled,  # shows the speed
-            enabled,  # and lanes
+            enabled,  # shows the set speed
+            enabled,  # shows the lanes
             self.plan.has_lead,
             self._alerts.visual,
             self._alerts.audible,
@@ -142,7 +142,7 @@ class Controlsd:
 
     def _publish(self, t: float, car: CarState, events: tuple[Event, ...]) -> ControlsState:
         machine, alerts = self._machine, self._alerts
-        return ControlsState(  # positional arguments take half the time
+        return ControlsState(  # positional arguments take half as long
             t,
             machine.state,
             machine.enabled,

@@ -1,4 +1,4 @@
-"""plannerd: target speed and path, from the leads, the set speed and the road."""
+"""plannerd: plans speed and path from leads, set speed and road."""
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.conversions import KPH_TO_MS
@@ -12,9 +12,9 @@ from selfdrive.controls.lib.pathplanner import ModelFit, PathPlanner
 from selfdrive.controls.lib.speed_smoother import smooth_speed
 from selfdrive.messages import CarState, ModelData, Plan, RadarState
 
-DT_PLAN = 0.2  # s, how far ahead the candidates are compared
+DT_PLAN = 0.2  # s, plan time at which the candidates are compared
 MAX_AGE = 0.5  # s, older messages are ignored
-AGE_ROUNDING = 1e-6  # s, so that sums of 0.01 do not decide
+AGE_ROUNDING = 1e-6  # s, for rounding in sums of 0.01
 
 MODEL_ERROR = Event("model_error", (NO_ENTRY, IMMEDIATE_DISABLE))
 RADAR_ERROR = Event("radar_error", (NO_ENTRY, IMMEDIATE_DISABLE))
@@ -42,7 +42,7 @@ class Planner:
         self._v_future = 0.0
 
     def take_model(self, v_ego: float, model: ModelData | None) -> bool:
-        """Update the path if the model message is new; returns whether it was."""
+        """Update the path if the model message is new; return whether it was."""
         if model is None or model is self._model:
             return False
         self._model = model
@@ -58,9 +58,9 @@ class Planner:
         v_cruise: float,
         slow_down: bool,
     ) -> Plan:
-        """The plan for this cycle at time `t` (s).
+        """Return the plan for this cycle at time `t` (s).
 
-        `long_state` is the longitudinal control's state, `v_cruise` the set speed in km/h; `slow_down`
+        `long_state` is the state of the longitudinal control, `v_cruise` the set speed in km/h; `slow_down`
         requests a gentle deceleration because the driver is absent.
         """
         if radar is not None and radar is not self._radar:
@@ -109,7 +109,7 @@ class Planner:
         self._v_cruise = max(v, 0.0)
 
     def _follow_car(self, car: CarState, long_state: str) -> None:
-        """Not in closed loop: the plan starts at the car's state."""
+        """Start the plan at the car's state, because the loop is not closed."""
         if long_state == STARTING:
             v, a = MIN_CAN_SPEED, self._params.start_acceleration
         else:
@@ -118,14 +118,13 @@ class Planner:
         self._a_start = self._a_goal = self._a_now = self._a_cruise = a
 
     def _choose(self) -> None:
-        """The slowest of cruise and leads."""
         self._source, self._v_goal, self._a_goal = "cruise", self._v_cruise, self._a_cruise
         for name, mpc in (("mpc1", self.mpc1), ("mpc2", self.mpc2)):
             if mpc.prev_lead_status and mpc.v_mpc < self._v_goal:
                 self._source, self._v_goal, self._a_goal = name, mpc.v_mpc, mpc.a_mpc
 
     def _interpolate(self, t: float) -> None:
-        """Where the plan is one cycle from now; a plan that is not renewed is left to end."""
+        """Set the plan's speed and acceleration one cycle from now. A plan that is not renewed ends."""
         dt = min(t - self._planned_at, DT_PLAN + DT_CTRL) + DT_CTRL
         self._a_now = self._a_start + dt / DT_PLAN * (self._a_goal - self._a_start)
         self._v_now = self._v_start + dt * (self._a_now + self._a_start) / 2.0

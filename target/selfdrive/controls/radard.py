@@ -1,4 +1,4 @@
-"""radard: selects the leads from radar tracks and the camera's lead, 20 times a second."""
+"""radard: selects the leads from radar tracks and the camera's lead, at 20 Hz."""
 
 from collections import deque
 
@@ -17,7 +17,7 @@ SPEED_HISTORY = 20  # cycles
 
 
 class Radard:
-    """Converts each complete radar cycle to a RadarState. All track state is here."""
+    """Converts each radar cycle to a RadarState."""
 
     def __init__(self, params: CarParams, fit: ModelFit) -> None:
         self._radar_offset = params.radar_offset
@@ -27,12 +27,12 @@ class Radard:
         self._tracks: dict[int, Track] = {}
         self._model: ModelData | None = None
         self._cycle = 0
-        # as in the original, the history starts with zeros, as if the car had been at rest
+        # as in the original, the history starts with zeros, as if the car were at rest
         self._speeds: deque[float] = deque([0.0] * SPEED_HISTORY, maxlen=SPEED_HISTORY)
         self._times: deque[float] = deque([0.0] * SPEED_HISTORY, maxlen=SPEED_HISTORY)
 
     def update(self, radar: RadarData, model: ModelData | None, controls: ControlsState) -> RadarState:
-        """One radar cycle with the newest model and controls state."""
+        """Process one radar cycle with the newest model and controls state."""
         now = self._cycle * DT_MDL
         self._speeds.append(controls.v_ego)
         self._times.append(now)
@@ -54,13 +54,12 @@ class Radard:
         self._vision.update(model.lead)
 
     def _likely_path(self, controls: ControlsState) -> Curve:
-        """The path to follow while in control, else the steering wheel's."""
+        """The planned path while in control, else the path that the steering wheel describes."""
         if controls.active and not controls.steer_override:
             return model_curve(self._path.d_poly)
         return steering_curve(self._vehicle.curvature(controls.steering_angle, controls.v_ego))
 
     def _track(self, points: tuple[RadarPoint, ...], path: Curve, v_ego: float, driver_steers: bool) -> None:
-        """Continue tracks, start new ones, drop those that the radar no longer reports."""
         tracks = {}
         for point in points:
             d_rel = point.d_rel + self._radar_offset
@@ -74,7 +73,6 @@ class Radard:
         self._tracks = tracks
 
     def _leads(self, clusters: list[Cluster], v_ego: float) -> tuple[LeadData, LeadData]:
-        """The closest vehicle ahead, and the closest other one."""
         ahead = sorted((c for c in clusters if c.is_lead(v_ego)), key=lambda c: c.d_rel)
         if not ahead:
             return LeadData(), LeadData()

@@ -1,4 +1,4 @@
-"""The car's actuators: decode the controller's frames."""
+"""The car's actuators decode the controller's frames."""
 
 from collections.abc import Sequence
 
@@ -7,14 +7,14 @@ from selfdrive.can.parser import CanParser
 from selfdrive.car.honda.values import CAR_BUS, CAR_DBC, COMMAND_MESSAGES, STEER_FULL_COUNTS
 from selfdrive.messages import Actuators, CanFrame
 
-# The pedal interceptor's conversion of counts; 256 is the gas pedal's full travel.
+# The pedal interceptor's conversion of counts; 256 is full gas.
 _PEDAL_SLOPE = 0.253984064
 _PEDAL_OFFSET = -83.3
 _PEDAL_FULL = 256.0
 
 
 class ActuatorReceiver:
-    """Decodes commands. Each actuator holds its last valid command until the next."""
+    """Decodes commands. Each actuator holds its last valid command."""
 
     def __init__(self) -> None:
         self._parser = CanParser(load(CAR_DBC), COMMAND_MESSAGES, CAR_BUS)

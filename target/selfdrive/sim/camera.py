@@ -1,4 +1,4 @@
-"""The camera: positions of lane and lead seen from the car, 20 times a second."""
+"""The camera: positions of lane and lead seen from the car, at 20 Hz."""
 
 from math import tan
 
@@ -13,13 +13,12 @@ _AHEAD = tuple(float(x) for x in range(VIEW_LENGTH))
 
 
 class Camera:
-    """Looks along the car: the lane moves in view as the car drifts or turns, or as the road bends."""
+    """Looks along the car: the view of the lane moves as the car drifts or turns, or the road bends."""
 
     def __init__(self, road: Road) -> None:
         self._road = road
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """The view at this moment."""
         middle = -truth.lateral_offset
         return CameraView(
             left_lane_y=middle + 0.5 * LANE_WIDTH,

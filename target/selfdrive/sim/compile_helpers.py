@@ -1,6 +1,6 @@
-"""Compiles the slowest steps of a run's arithmetic: `python -m selfdrive.sim.compile_helpers`.
+"""Compiles the slowest calculations: `python -m selfdrive.sim.compile_helpers`.
 
-Installing the harness does the same. Runs that use the folder give the same bytes in less time. Exit code 2
+Installing the harness does the same. Runs with these libraries give the same bytes in less time. Exit code 2
 without a C compiler. Needs only Python.
 """
 
@@ -21,8 +21,8 @@ from selfdrive.common.errors import ConfigError, writing
 
 PACKAGE = Path(__file__).resolve().parents[1]
 FOLDER = PACKAGE.with_name("compiled")
-# IEEE arithmetic as written: no fused multiply-add, no reordering. Without symbols, a library has the same
-# bytes wherever it is compiled.
+# Strict IEEE arithmetic: no fused multiply-add, no reordering. Without symbols, a library has the same bytes
+# wherever it is compiled.
 OPTIONS = (
     "-O3",
     "-ffp-contract=off",
@@ -39,7 +39,7 @@ EXIT_INPUT = 2
 
 
 def compiler() -> list[str]:
-    """The C compiler and its first options: CC, else cc, else the package ziglang's; [] if there is none."""
+    """The C compiler and its first options: CC, else cc, else the package ziglang's; [] if none is found."""
     if os.environ.get("CC"):
         return shlex.split(os.environ["CC"])
     if shutil.which("cc"):
@@ -89,7 +89,6 @@ def _compile(source: Path, made: Path, scratch: str) -> None:
 
 
 def main() -> int:
-    """The command line; returns the exit code."""
     parser = argparse.ArgumentParser(
         prog="selfdrive.sim.compile_helpers", description="Compile the slowest steps of a run's arithmetic."
     )

@@ -1,4 +1,4 @@
-"""Warps a region in compiled C, if available and equal to OpenCV to the bit."""
+"""Warps a region in compiled C, if available and identical to OpenCV."""
 
 import ctypes
 from collections.abc import Callable
@@ -18,7 +18,7 @@ Warp = Callable[[np.ndarray, np.ndarray, Region], np.ndarray]
 
 
 def build_warp() -> tuple[Warp, str]:
-    """A function like `warp`, in C if possible, and the compiled code that it uses, if any."""
+    """Return a function like `warp`, in C if possible, and the compiled code that it uses, if any."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library):
         return warp, ""
@@ -26,7 +26,7 @@ def build_warp() -> tuple[Warp, str]:
 
 
 class CompiledWarp:
-    """Same as `warp`, with `library`, compiled `warp.c`."""
+    """Same as `warp`, with compiled `warp.c` as `library`."""
 
     def __init__(self, library: compiled.Library) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -35,9 +35,8 @@ class CompiledWarp:
         self._warp.restype = None
 
     def __call__(self, source: np.ndarray, matrix: np.ndarray, region: Region) -> np.ndarray:
-        """The region of `source`, warped by `matrix`."""
         rows, width = source.shape
-        # OpenCV computes the rest of a row after whole vectors differently.
+        # OpenCV calculates the rest of a row, after whole vectors, differently.
         if source.dtype != np.uint8 or matrix.dtype != float or region.right > width // VECTOR * VECTOR:
             return warp(source, matrix, region)
         source, matrix = np.ascontiguousarray(source), np.ascontiguousarray(matrix)
@@ -48,9 +47,9 @@ class CompiledWarp:
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code has OpenCV's bits: older versions, or those without fused sums, differ.
+    """Check that the compiled code gives OpenCV's bits: versions that are older or without fused sums differ.
 
-    A noisy picture, large enough for coarse positions, reveals any other rounding.
+    A noisy picture, large enough for coarse positions, reveals different rounding.
     """
     noise = (np.arange(48 * 8192) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 8192)
     matrix = np.array([(1.7, 31.3, 3007.3), (1.3e-3, 0.93, 0.4), (3.1e-5, 1.7e-4, 1.1)])

@@ -1,9 +1,9 @@
-"""Results of detectors by picture, in a file that all runs share.
+"""Detection results by picture, in a file that all runs share.
 
 The file is a table of fixed size. An entry has the digest of all inputs of a detection, a checksum, and
-numbers. Processes read and write it concurrently without a lock: a process that finds an entry damaged,
-incomplete or overwritten repeats the work and writes the same entry. If the file cannot be created, for
-example on a full disk, nothing is remembered.
+numbers. Processes use it concurrently without a lock: if an entry is damaged, incomplete or overwritten, the
+reader repeats the work and writes the same entry. If the file cannot be created, for example on a full disk,
+nothing is stored.
 """
 
 import os
@@ -13,23 +13,23 @@ from hashlib import blake2b
 from pathlib import Path
 
 FILE = "detections-1.table"
-MOST = 20  # numbers in an entry
+MOST = 20  # most numbers in an entry
 KEY, CHECK = 16, 8  # bytes
 _VALUE = struct.Struct(f"<q{MOST}d")
 ENTRY = KEY + CHECK + _VALUE.size  # 192 bytes
-WAYS = 8  # entries of a bucket; a key may be in any of them
+WAYS = 8  # entries in a bucket; a key may be in any of them
 BUCKETS = 1 << 19  # 2^22 entries, enough for two large campaigns: 805 MB when all are used
 _BUCKET = WAYS * ENTRY
 
 
 class DetectionMemory:
-    """The table in the folder `cache`. `recall` and `keep` never fail."""
+    """The table in the folder `cache`. `recall` and `keep` never raise."""
 
     def __init__(self, cache: Path) -> None:
         self._file = _opened(cache / FILE)
 
     def recall(self, key: bytes) -> tuple[float, ...] | None:
-        """The numbers stored under a key of KEY bytes; None if there are none."""
+        """Return the numbers stored under a key of KEY bytes; None if there are none."""
         bucket = self._bucket(key)
         at = _place(bucket, key)
         if at is None:
@@ -57,7 +57,6 @@ class DetectionMemory:
             self._file = None
 
     def _bucket(self, key: bytes) -> bytes:
-        """The bytes of a key's bucket; empty entries if there are none."""
         bucket = b""
         if self._file is not None:
             try:
@@ -70,7 +69,7 @@ class DetectionMemory:
 def _opened(path: Path):
     """The table's file, created if missing; None if that fails.
 
-    It is read and written by position, not mapped, so a full disk is an error, not a signal, and processes
+    It is read and written by position, not mapped: a full disk is then an error, not a signal, and processes
     that share the open file after a fork do not move each other's position.
     """
     if not hasattr(os, "pwrite"):
@@ -90,7 +89,6 @@ def _start(key: bytes) -> int:
 
 
 def _place(bucket: bytes, key: bytes) -> int | None:
-    """The position of this key's entry in the bucket."""
     for at in range(0, _BUCKET, ENTRY):
         if bucket[at : at + KEY] == key:
             return at

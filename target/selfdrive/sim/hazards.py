@@ -1,4 +1,4 @@
-"""The three hazards, checked on ground truth at every step; each is recorded once."""
+"""The three hazards, checked on ground truth at every step."""
 
 from selfdrive.sim.camera import LANE_WIDTH
 from selfdrive.sim.sensors import STANDSTILL_SPEED
@@ -7,14 +7,14 @@ from selfdrive.sim.truth import GroundTruth
 CAR_WIDTH = 1.8  # m
 OVERLAP_OFFSET = 0.5 * (LANE_WIDTH + CAR_WIDTH)  # m, half a lane and half a car
 FREE_DISTANCE = 100.0  # m
-LANE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m, beyond this a side of the car leaves the lane
+LANE_OFFSET = 0.5 * (LANE_WIDTH - CAR_WIDTH)  # m; beyond this, a side of the car leaves the lane
 
 
 class HazardMonitor:
     """`first` maps H1, H2, H3 to the time (s) of their first occurrence, or None.
 
-    H1: the host touches the lead. H2: the host stands, having moved before, though the road is free
-    for 100 m. H3: a side of the host leaves the lane.
+    H1: the car touches the lead. H2: the car has stopped although the road is free for 100 m. H3: a side of
+    the car leaves the lane.
     """
 
     def __init__(self) -> None:
@@ -22,7 +22,6 @@ class HazardMonitor:
         self._has_moved = False
 
     def update(self, truth: GroundTruth) -> None:
-        """Check one step."""
         offset = abs(truth.lateral_offset)
         if truth.d_rel <= 0.0 and offset <= OVERLAP_OFFSET:
             self._note("H1", truth.t)

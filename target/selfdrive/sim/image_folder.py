@@ -1,4 +1,4 @@
-"""A folder of user frames, with a `camera.yaml` on their camera and spacing."""
+"""A folder of user frames, with a `camera.yaml` that describes camera and spacing."""
 
 import re
 from collections.abc import Iterator
@@ -39,9 +39,9 @@ _NUMBER = re.compile(r"(\d+)(?!.*\d)")  # the last number in a file name
 
 
 class ImageFolder:
-    """Has the calibration and every frame's bytes; `read` decodes them.
+    """The calibration and every frame's bytes; `read` decodes them.
 
-    `model` is the camera of the decoded frames. One of `spacing` (m) and `fps` (1/s) is None.
+    `model` is the camera of the decoded frames. Either `spacing` (m) or `fps` (1/s) is None.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -59,7 +59,7 @@ class ImageFolder:
         self.digest = sha256(b"".join(sha256(part).digest() for part in parts)).hexdigest()
 
     def read(self) -> Iterator[np.ndarray]:
-        """The frames (uint8, rows x width). ConfigError at the first invalid one."""
+        """Yield the frames (uint8, rows x width). Raises ConfigError at the first invalid one."""
         for path in self.files:
             frame = _decoded(_bytes(path, "a frame", "put it there"))
             if frame is None:
@@ -84,12 +84,11 @@ class ImageFolder:
 
 
 def camera_of(folder: Path) -> CameraModel:
-    """The camera of the calibration in `folder`, whatever frames it has."""
+    """The camera from the calibration in `folder`; no frames are needed."""
     return _camera(_calibration(folder)[1])
 
 
 def _calibration(folder: Path) -> tuple[bytes, Section]:
-    """The calibration's bytes and content."""
     path = folder / CALIBRATION
     remedy = "write it as docs/how-to/use-your-own-frames.md says"
     text = _bytes(path, "the calibration of the frames in this folder", remedy)
@@ -99,7 +98,7 @@ def _calibration(folder: Path) -> tuple[bytes, Section]:
 
 
 def _size(root: Section) -> tuple[int, int]:
-    """Width and height of the frames in the folder."""
+    """Width and height of the frames as stored."""
     return _pixels(root, "width", _LARGEST), _pixels(root, "rows", _LARGEST)
 
 
@@ -110,14 +109,13 @@ def _pixels(root: Section, key: str, most: int) -> int:
 
 
 def _camera(root: Section) -> CameraModel:
-    """The camera of the decoded frames."""
     width, rows = _size(root)
     model = _model(root, width, rows)
     return _resized(model, _pixels(root, "resize_width", width)) if "resize_width" in root else model
 
 
 def _model(root: Section, width: int, rows: int) -> CameraModel:
-    """The camera of the original frames."""
+    """The camera of the frames as stored."""
     height = root.number("height_m", 0.2, 10.0)
     whole = ("fx_px", "fy_px", "cx_px", "cy_px", "pitch_deg")
     if "horizon_row" in root or "focal_px" in root:
@@ -138,7 +136,6 @@ def _model(root: Section, width: int, rows: int) -> CameraModel:
 
 
 def _resized(model: CameraModel, width: int) -> CameraModel:
-    """The camera for frames of this width; square pixels stay square."""
     rows = round(model.rows * width / model.width)
     across, down = width / model.width, rows / model.rows
     return CameraModel(
@@ -154,7 +151,7 @@ def _resized(model: CameraModel, width: int) -> CameraModel:
 
 
 def _listed(folder: Path, root: Section) -> list[Path]:
-    """The frames in order of the numbers in their names. ConfigError if one is missing."""
+    """The frames in order of the numbers in their names. Raises ConfigError if one is missing."""
     pattern = root.text("files")
     root.check(
         "files",
@@ -163,7 +160,7 @@ def _listed(folder: Path, root: Section) -> list[Path]:
         "put them there",
     )
     *folders, name = pattern.split("/")
-    # Other uses of `**` depend on the version of Python.
+    # Other uses of `**` differ between Python versions.
     root.check(
         "files",
         bool(name) and "**" not in name and all(part == "**" or "**" not in part for part in folders),
@@ -183,13 +180,11 @@ def _listed(folder: Path, root: Section) -> list[Path]:
 
 
 def _order(path: Path) -> list[tuple[int, str]]:
-    """Sorts 2 before 10."""
     parts = re.split(r"(\d+)", str(path))
     return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
 
 
 def _gaps(files: list[Path]) -> Iterator[Path]:
-    """Frames missing from a numbered sequence."""
     numbered: list[tuple[Path, re.Match[str], int]] = []
     for path in files:
         match = _NUMBER.search(path.name)
@@ -199,7 +194,7 @@ def _gaps(files: list[Path]) -> Iterator[Path]:
     pairs = [
         (before, after)
         for before, after in pairwise(numbered)
-        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # of one sequence: only the number differs
+        if _frame(*before[:2], 0) == _frame(*after[:2], 0)  # same sequence: only the number differs
     ]
     step = min((after[2] - before[2] for before, after in pairs), default=1)
     for (path, match, number), after in pairs:
@@ -208,14 +203,13 @@ def _gaps(files: list[Path]) -> Iterator[Path]:
 
 
 def _frame(path: Path, match: re.Match[str], number: int) -> Path:
-    """The path of the frame with a different number."""
     name, digits = path.name, len(match[1])
     return path.with_name(f"{name[: match.start()]}{number:0{digits}}{name[match.end() :]}")
 
 
 def _decoded(data: bytes) -> np.ndarray | None:
-    """The grey picture (uint8) in a file's bytes; None if it is missing or incomplete."""
-    # OpenCV fills in the rest of a truncated JPEG file; its last scan must be complete.
+    """Decode a file's bytes to a grey picture (uint8); None if they are incomplete."""
+    # OpenCV fills in the rest of a truncated JPEG file, so check that the last scan is complete.
     if data[:2] == b"\xff\xd8" and data.rfind(b"\xff\xda") > data.rfind(b"\xff\xd9"):
         return None
     try:

@@ -1,9 +1,8 @@
-"""The frames of a run: a rendered road, or a folder of user frames. Grey and
-read-only.
+"""The frames of a run, grey and read-only: a rendered road, or a folder of user frames.
 
-Frames are made or decoded once and cached in a file named by the digest of all inputs.
-Processes map that file and share its memory. Files appear atomically, and each frame
-is checked on first use. Without a writable cache, each process makes its own frames.
+Frames are rendered or decoded once and cached in a file named by the digest of all inputs, which processes
+map and share. Files appear atomically, and each frame is checked on first use. Without a writable cache, each
+process makes its own frames.
 """
 
 from collections.abc import Callable, Iterator
@@ -25,9 +24,9 @@ from selfdrive.sim.road_look import DASH_PERIOD
 from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.sim.vision import Pictures
 
-FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, which repeats seamlessly
-SPACING = PERIODS * DASH_PERIOD / FRAMES  # m between frames: 1.342, which is 20 per second at 60 mph
-CHECK = 8  # bytes; the file ends with one per frame, then a digest of these and of the header
+FRAMES, PERIODS = 600, 66  # of the rendered road: 805.2 m, then it repeats seamlessly
+SPACING = PERIODS * DASH_PERIOD / FRAMES  # m between frames: 1.342, for 20 frames per second at 60 mph
+CHECK = 8  # bytes; the file ends with a check per frame, then a digest of these and the header
 DIGEST = sha256().digest_size
 
 Made = Iterator[np.ndarray]
@@ -35,8 +34,8 @@ Made = Iterator[np.ndarray]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ImageLibrary:
-    """Frames in order, taken by `model`, each `spacing` m (or, if None, 1 / `fps` s) after the previous; the
-    first follows the last.
+    """Frames in order, taken by the camera `model`, each `spacing` m (or, if None, 1 / `fps` s) after the
+    previous; after the last comes the first.
 
     `digest` covers all inputs of the frames.
     """
@@ -49,7 +48,7 @@ class ImageLibrary:
     fps: float | None
 
     def frame(self, t: float, position: float) -> Picture:
-        """The picture at time `t` (s), after `position` m."""
+        """Return the picture at time `t` (s), after `position` m."""
         passed = t * self.fps if self.spacing is None else position / self.spacing
         number = int(passed + 1e-6) % len(self.frames)
         return Picture(
@@ -60,8 +59,8 @@ class ImageLibrary:
 class Frames:
     """Frames (rows x width, uint8) by number, read-only; those from a file are verified on first use.
 
-    `checks` are joined, one per frame; frames in memory have none. `mend` recreates all frames if one is
-    damaged.
+    `checks` has one check per frame, joined; it is empty for frames in memory. If a frame is damaged, `mend`
+    recreates all.
     """
 
     def __init__(
@@ -85,7 +84,6 @@ class Frames:
         return self._frames[number]
 
     def _verify(self, number: int) -> None:
-        """Verify a frame; if it is damaged, recreate all frames."""
         expected = self._checks[number * CHECK : (number + 1) * CHECK]
         if _check(self._frames[number], self._weights) == expected:
             self._sound[number] = True
@@ -97,7 +95,7 @@ class Frames:
 
 
 def open_library(pictures: Pictures, seed: int) -> ImageLibrary:
-    """The frames that a run requests, cached if possible. ConfigError for unusable frames."""
+    """Open the frames of a run, cached if possible. Raises ConfigError for unusable frames."""
     cv2.setNumThreads(1)
     if pictures.frames is not None:
         return _own(ImageFolder(pictures.frames), pictures.cache)
@@ -134,10 +132,10 @@ def _own(folder: ImageFolder, cache: Path | None) -> ImageLibrary:
 
 
 def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: Callable[[], Made]) -> Frames:
-    """The frames from `make`, of this shape (number, rows, width).
+    """Return the frames from `make`, of this shape (number, rows, width).
 
-    They are mapped from a cache file, which is created if missing or damaged, by any number of processes at
-    once. Without a writable cache, the frames are made in memory.
+    They are mapped from a cache file, which is created if missing or damaged; processes may do this
+    concurrently. Without a writable cache, the frames are made in memory.
     """
 
     def in_memory() -> Frames:
@@ -148,7 +146,7 @@ def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: C
         return Frames(frames)
 
     def anew() -> Frames:
-        """In a newly written file, or in memory if that file is not reliable."""
+        """Write a new file; fall back to memory if that file is unreliable."""
         try:
             cache.mkdir(parents=True, exist_ok=True)
             _write(path, shape, make())
@@ -168,7 +166,6 @@ def cached(cache: Path | None, digest: str, shape: tuple[int, int, int], make: C
 
 
 def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
-    """Write all frames under a temporary name, then rename the file."""
     with NamedTemporaryFile(dir=path.parent, prefix=path.stem, suffix=".part", delete=False) as file:
         part = Path(file.name)
         try:
@@ -186,8 +183,8 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
 
 
 def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes] | None:
-    """The frames in that file and their checks; None if it is missing or incomplete."""
-    if path.is_fifo():  # do not wait for a pipe
+    """Map the frames of a file and read their checks; None if it is missing or incomplete."""
+    if path.is_fifo():  # reading a pipe would block
         return None
     header = _header(shape)
     end = len(header) + _size(shape)
@@ -204,28 +201,25 @@ def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes]
 
 
 def _header(shape: tuple[int, int, int]) -> bytes:
-    """The header of NumPy's files for such an array."""
     header = BytesIO()
     np.lib.format.write_array_header_1_0(header, {"descr": "|u1", "fortran_order": False, "shape": shape})
     return header.getvalue()
 
 
 def _seal(shape: tuple[int, int, int], checks: bytes) -> bytes:
-    """The end of a file whose frames have these checks."""
     return sha256(_header(shape) + checks).digest()
 
 
 def _weights(shape: tuple[int, int, int]) -> np.ndarray:
-    """An odd weight for each eight bytes of a frame."""
     words = -(-shape[1] * shape[2] // CHECK)
     return np.random.default_rng(0).integers(0, 2**64, words, np.uint64) | np.uint64(1)
 
 
 def _check(frame: np.ndarray, weights: np.ndarray) -> bytes:
-    """A weighted sum of a frame's words, which detects damage in a fifth of the time of SHA-256.
+    """Weighted sum of a frame's words, five times as fast as SHA-256.
 
-    One changed word is always detected; several are missed once in 2^32 times, because high halves count in
-    low ones."""
+    It always detects one changed word, and misses several with a probability of 2^-32.
+    """
     data = frame.reshape(-1)
     if data.size % CHECK:
         data = np.concatenate((data, np.zeros(-data.size % CHECK, np.uint8)))

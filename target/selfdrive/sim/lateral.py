@@ -1,11 +1,10 @@
 """Lateral motion: torque turns the steering wheel, tyres turn the car.
 
-Steering: `J w' = T u - c w - trail * F_front / ratio`. `u` is the commanded torque (1 is the EPS's maximum),
-`F_front` the lateral force of the front tyres, which straightens the wheel. Damping dominates the column
-(motor friction, gearing, the EPS's own return damping), as in LKAS actuators: from straight ahead full torque
-turns the wheel by half a radian per second, and at speed it holds 2.8 m/s^2 of lateral acceleration. With the
-controller's loop around it, the wheel follows a demand in about 0.1 s, the actuation delay that the path
-planner assumes.
+Steering: `J w' = T u - c w - trail * F_front / ratio`, with the commanded torque `u` (1 is the EPS's maximum)
+and the lateral force of the front tyres `F_front`, which straightens the wheel. Damping (motor friction,
+gearing, the EPS's return damping) dominates, as in LKAS actuators: full torque turns the wheel by 0.5 rad/s
+from straight ahead, and at speed holds 2.8 m/s^2 of lateral acceleration. In the controller's loop, the wheel
+follows a demand in about 0.1 s, the delay that the path planner assumes.
 
 Car: linear bicycle model in lateral speed and yaw rate, advanced by implicit Euler because its poles diverge
 as 1/speed; at walking pace it becomes the kinematic model.
@@ -24,11 +23,11 @@ COLUMN_DAMPING = 20.0  # N m s/rad
 TRAIL = 0.053  # m, caster and pneumatic trail
 LARGEST_ANGLE = 8.7  # rad, mechanical stop
 CREEP = 0.1  # m/s; tyres take no side force below this
-NEAREST_TO_CENTRE = 0.1  # of a bend's radius; a stray car may reach its centre, where `along` is undefined
+NEAREST_TO_CENTRE = 0.1  # of a bend's radius; at its centre, `along` is undefined
 
 
 class Lateral(Protocol):
-    """Lateral motion: position in the lane (m, rad), and steering wheel state (rad, rad/s)."""
+    """Position in the lane (m, rad) and state of the steering wheel (rad, rad/s)."""
 
     offset: float
     heading: float
@@ -36,7 +35,7 @@ class Lateral(Protocol):
     steer_rate: float
 
     def step(self, torque: float, speed: float, curvature: float) -> float:
-        """Advance 10 ms; returns the speed along the road (m/s)."""
+        """Advance 10 ms; return the speed along the road (m/s)."""
 
 
 class LateralDynamics:
@@ -97,7 +96,7 @@ class LateralDynamics:
         return car.tire_stiffness_front * slip
 
     def _move(self, v: float) -> None:
-        """Implicit Euler step of the bicycle model, both equations multiplied by the speed."""
+        """Implicit Euler step of the bicycle model, with both equations multiplied by the speed."""
         car = self._car
         wheel = self.steer_angle / car.steer_ratio
         a11 = v + self._sum

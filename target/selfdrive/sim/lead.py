@@ -7,14 +7,13 @@ from selfdrive.common.realtime import DT_CTRL
 
 
 class LeadVehicle:
-    """Drives in the middle of the lane; its speed follows a profile over time."""
+    """Drives in the middle of the lane; its speed is a table over time."""
 
     def __init__(self, gap: float, times: Sequence[float], speeds: Sequence[float]) -> None:
-        self.position = gap  # m, of its rear bumper
+        self.position = gap  # m, rear bumper
         self.speed = speeds[0]
         self._times, self._speeds = times, speeds
 
     def step(self, t: float) -> None:
-        """Advance 10 ms from time `t` (s) with the speed of that moment."""
         self.speed = interp(t, self._times, self._speeds)
         self.position += DT_CTRL * self.speed

@@ -1,4 +1,4 @@
-"""Objects on the road in a picture, and its colours: for display, and to confuse detectors."""
+"""Draws vehicles into pictures, and tints pictures: for display, and to test detectors."""
 
 from math import cos, floor, sin, tan
 
@@ -9,16 +9,16 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.road_look import Look, OtherCar
 
 LENGTH = 4.4  # m of a car
-CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, where the lead's distance starts
-NEAREST, FURTHEST = 4.0, 400.0  # m ahead at which a car can be drawn
-SHIFT = 4  # fractional bits of the coordinates OpenCV draws at
+CAMERA_TO_BUMPER = 1.5  # m from the camera to the front bumper, where the lead's distance is measured from
+NEAREST, FURTHEST = 4.0, 400.0  # m ahead; a car can be drawn between them
+SHIFT = 4  # fractional bits of OpenCV's coordinates
 
 LEAD_PAINT = (70.0, 45.0, 130.0)  # BGR, a dark red
 SKY_TINT, ROAD_TINT, VERGE_TINT = (
     (1.10, 1.0, 0.97),
     (1.02, 1.0, 0.99),
     (0.66, 1.10, 0.93),
-)  # BGR, equally grey
+)  # BGR, same grey level
 YELLOW_TINT = (0.40, 1.04, 1.15)
 
 Tone = float | tuple[float, float, float]
@@ -31,7 +31,7 @@ def draw_car(picture: np.ndarray, model: CameraModel, car: OtherCar) -> None:
 
 
 def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: float, heading: float) -> None:
-    """Draw a car in the lane centre, its rear `lead` m before the own front bumper, into a BGR picture."""
+    """Draw a car into a BGR picture, in the lane centre, with its rear `lead` m before the front bumper."""
     ahead = lead + CAMERA_TO_BUMPER
     if not NEAREST <= ahead <= FURTHEST:
         return
@@ -47,11 +47,11 @@ def draw_lead(picture: np.ndarray, model: CameraModel, lead: float, offset: floa
 def tinted(
     grey: np.ndarray, model: CameraModel, look: Look, offset: float = 0.0, heading: float = 0.0
 ) -> np.ndarray:
-    """A grey picture in BGR: equally grey, in the colours of sky, verge and paint."""
+    """Tint a grey picture in the colours of sky, verge and paint; grey levels stay the same."""
     tints = [SKY_TINT, VERGE_TINT, ROAD_TINT, YELLOW_TINT]
     levels = np.arange(256, dtype=np.float32)
     colours = np.clip(levels[:, None] * np.array(tints, np.float32)[:, None], 0.0, 255.0).astype(np.uint8)
-    worn = levels <= look.exposure * (0.6 * look.asphalt + 0.4 * 182.0)  # where the road shows through
+    worn = levels <= look.exposure * (0.6 * look.asphalt + 0.4 * 182.0)  # where paint is worn off
     colours[3, worn] = colours[2, worn]
     parts = np.zeros(grey.shape, np.uint8)  # the tint of each pixel
     parts[max(0, floor(model.horizon) + 1) :] = 1
@@ -67,7 +67,7 @@ def tinted(
 def _mark_strip(
     parts: np.ndarray, model: CameraModel, sides: tuple[float, float], heading: float, part: int
 ) -> None:
-    """Assign the road between two lines that pass the car at `sides` (m) to that part of the picture."""
+    """Mark the strip of road between two lines that pass the car at `sides` (m) as that part."""
     rows = (max(0, floor(model.horizon) + 1), model.rows - 1)
     ends = []
     for y in sides:
@@ -77,7 +77,7 @@ def _mark_strip(
 
 
 def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[Tone, ...]) -> None:
-    """A box with a rear window, lights and wheels; `tones` are of body, side, glass, lights, dark parts."""
+    """Draw a box with window, lights and wheels; `tones` are of body, side, glass, lights, dark parts."""
     body, flank, glass, lamps, dark = tones
     left, right, near, far = car.y + 0.5 * car.width, car.y - 0.5 * car.width, car.x, car.x + LENGTH
     waist, floor_z = 0.62 * car.height, 0.17 * car.height
@@ -89,7 +89,7 @@ def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[T
         fill([(near, y1, z2), (near, y2, z2), (near, y2, z1), (near, y1, z1)], tone)
 
     fill([(near, left, 0.0), (near, right, 0.0), (far, right, 0.0), (far, left, 0.0)], dark)
-    if right > 0.0 or left < 0.0:  # beside us: its side is visible
+    if right > 0.0 or left < 0.0:  # beside the camera: its side is visible
         y, roof = (right, right + 0.2) if right > 0.0 else (left, left - 0.2)
         fill([(near, y, waist), (far, y, waist), (far, y, floor_z), (near, y, floor_z)], flank)
         top = [(near + 0.5, roof, car.height), (far - 1.5, roof, car.height)]
@@ -106,7 +106,6 @@ def _draw(picture: np.ndarray, model: CameraModel, car: OtherCar, tones: tuple[T
 
 
 def _fill(picture: np.ndarray, points: list[tuple[float, float]], tone: Tone) -> None:
-    """Fill a convex polygon with smooth edges."""
     cv2.fillConvexPoly(picture, _fixed(points), tone, cv2.LINE_AA, SHIFT)
 
 

@@ -1,7 +1,7 @@
 """Runs all maneuvers and plots them on one page: `python -m selfdrive.sim.maneuvers --out DIR [NAME...]`.
 
 Writes DIR/index.html, which is self-contained. With --references, traces of the same name from that folder
-are drawn below the runs, and the page lists which are within tolerance. Exit code 2 for invalid input.
+are drawn below the runs, and the page says which are within tolerance. Exit code 2 for invalid input.
 """
 
 import argparse
@@ -21,7 +21,6 @@ from selfdrive.sim.scenario import PLANTS, STANDARD, Scenario, on_plant
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     try:
         tolerances = load_tolerances(options.tolerances)
@@ -50,7 +49,7 @@ def _maneuver(run: runs.Run, reference: Reference | None, tolerances: Tolerances
 
 
 def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scenario]:
-    """The scenarios to run, by name. By default all whose road the plant supports."""
+    """The scenarios to run, by name; by default all with a road that the plant supports."""
     names = options.names or _all_names(options.scenarios, known)
     scenarios = {}
     for name in names:
@@ -65,7 +64,7 @@ def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scena
 
 
 def _all_names(scenarios: Path, known: list[str]) -> list[str]:
-    """Every scenario, S1 before O01, and the references that are variants of one."""
+    """Names of all scenarios, S1 before O01, and of the references that are variants of one."""
     found = {path.stem for path in scenarios.glob("*.yaml")}
     if not found:
         raise ConfigError(

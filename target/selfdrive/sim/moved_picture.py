@@ -1,8 +1,8 @@
-"""The camera's frame as seen from elsewhere on the road.
+"""The camera's frame as seen from a different place on the road.
 
-A frame was taken in the lane centre, along the road. Seen from `offset` m further left and turned by
-`heading`, the ground moves by a homography from the camera's geometry, which is exact for everything on the
-road. Parts above the horizon only pan. Outside the frame, its last pixel is repeated.
+Frames are taken in the lane centre, along the road. Seen from `offset` m further left and turned by
+`heading`, the ground moves by a homography, which is exact for everything on the road. Parts above the
+horizon only pan. Outside the frame, its last pixel is repeated.
 """
 
 from math import tan
@@ -15,12 +15,12 @@ from selfdrive.sim.compiled_warp import build_warp
 from selfdrive.sim.picture import Picture, Region
 from selfdrive.sim.road_renderer import car_to_road, first_road_row, pan, picture_to_car
 
-# Poses are rounded to these, below a detector's resolution: equal poses give equal bytes.
+# Steps to which poses are rounded, below a detector's resolution: equal poses give equal bytes.
 OFFSET_STEP = 0.004  # m
 HEADING_STEP = 0.00025  # rad
-SHIFT_DISTANCE = 10.0  # m ahead where shifting the whole frame is exact
+SHIFT_DISTANCE = 10.0  # m ahead, where shifting the whole frame is exact
 CODED_METRES_PER_PIXEL = 0.03895
-CODED_REACH = 1.0  # m: the largest shift of the picture
+CODED_REACH = 1.0  # m; largest shift of the picture
 
 
 class GroundView:
@@ -37,7 +37,7 @@ class GroundView:
         self._warp, self.calculated_by = build_warp()
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
-        """The frame as seen `offset` m further left (m), turned left by `heading` (rad)."""
+        """Return the frame as seen `offset` m further left, turned left by `heading` (rad)."""
         left, turn = round(offset / OFFSET_STEP), round(heading / HEADING_STEP)
         if left == 0 and turn == 0:
             return frame
@@ -47,7 +47,6 @@ class GroundView:
         )
 
     def _moved(self, frame: Picture, offset: float, heading: float, region: Region) -> np.ndarray:
-        """Pixels of the moved frame."""
         first = self._first
         parts = []
         if region.top < first:
@@ -69,36 +68,33 @@ class ShiftedView:
         self._pixels_per_metre = 1.0 / model.metres_per_pixel(model.row(SHIFT_DISTANCE))
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
-        """The frame as seen `offset` m further left (m), turned left by `heading` (rad)."""
+        """Return the frame as seen `offset` m further left, turned left by `heading` (rad)."""
         away = offset + SHIFT_DISTANCE * tan(heading)
         return _shifted(frame, round(away * self._pixels_per_metre))
 
 
 class CodedView:
-    """Moves whole frames sideways, as the paper's authors coded it: scaled at a different row than the one
-    where their detector reads lines, so it sees 64 % of the way. Heading is ignored."""
+    """Moves whole frames sideways as the paper's authors coded it: the scale is that of a different row than
+    the one where their detector reads lines, so the detector sees 64 % of the offset."""
 
     calculated_by = ""
 
     def seen(self, frame: Picture, offset: float, heading: float) -> Picture:
-        """The frame as seen `offset` m further left (m); `heading` is ignored."""
         return _shifted(frame, round(min(max(offset, -CODED_REACH), CODED_REACH) / CODED_METRES_PER_PIXEL))
 
 
 def _shifted(frame: Picture, columns: int) -> Picture:
-    """The frame moved that far to the right."""
     return frame.changed(("shift", columns), lambda region: moved(frame, columns, region))
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """The inverse of a matrix with three rows."""
     a, b, c = matrix
     columns = np.cross(b, c), np.cross(c, a), np.cross(a, b)
     return np.array(columns).T / dot(a, columns[0])
 
 
 def moved(frame: Picture, columns: int, region: Region) -> np.ndarray:
-    """The region of `frame` moved that far to the right. Outside it, its last column is repeated."""
+    """Return the region of `frame` moved that far to the right; outside it, its last column is repeated."""
     last = frame.shape[1] - 1
     left, right = (min(max(end - columns, 0), last) for end in (region.left, region.right - 1))
     there = frame[region.top : region.bottom, left : right + 1]

@@ -1,7 +1,6 @@
-"""A picture of the camera that is not made before its pixels are asked for.
+"""A camera picture whose pixels are calculated only when needed.
 
-It knows all that its pixels follow from, its `key`: whoever remembers what was seen in a picture of that key
-can do without the pixels.
+Its `key` identifies everything that determines the pixels, so results stored by key need no pixels.
 """
 
 from collections.abc import Callable, Hashable
@@ -26,11 +25,11 @@ class Region(NamedTuple):
 
     @property
     def part(self) -> tuple[slice, slice]:
-        """The region as it is cut out of a picture."""
+        """Slices of the region in a picture."""
         return slice(self.top, self.bottom), slice(self.left, self.right)
 
     def around(self, margin: int, shape: tuple[int, int]) -> "Region":
-        """The region and what lies around it, as far as a picture of that shape goes."""
+        """The region enlarged by `margin` on each side, within a picture of that shape."""
         return Region(
             max(self.top - margin, 0),
             min(self.bottom + margin, shape[0]),
@@ -39,14 +38,13 @@ class Region(NamedTuple):
         )
 
     def inside(self, other: "Region") -> tuple[slice, slice]:
-        """The region as it is cut out of the pixels of another one that holds it."""
+        """Slices of the region in the pixels of a region that contains it."""
         down, right = self.top - other.top, self.left - other.left
         rows, columns = self.shape
         return slice(down, down + rows), slice(right, right + columns)
 
 
 def whole(shape: tuple[int, int]) -> Region:
-    """All of a picture of that shape."""
     return Region(0, shape[0], 0, shape[1])
 
 
@@ -54,10 +52,10 @@ Make = Callable[[Region], np.ndarray]
 
 
 class Picture(NDArrayOperatorsMixin):
-    """A grey picture (rows x width, uint8), which may not be written to.
+    """A grey picture (rows x width, uint8), read-only.
 
-    It may be cut, calculated with and asked as an array may; OpenCV takes `np.asarray` of it. `make` gives
-    the pixels of a region, the same as are there in the whole picture. Equal keys mean equal pixels.
+    It supports slicing, arithmetic and attributes like an array; for OpenCV use `np.asarray`. `make` returns
+    the pixels of a region. Equal keys mean equal pixels.
     """
 
     dtype = np.dtype(np.uint8)
@@ -68,17 +66,16 @@ class Picture(NDArrayOperatorsMixin):
         self._whole: np.ndarray | None = None
 
     def changed(self, by: tuple[Hashable, ...], make: Make) -> "Picture":
-        """The picture, of the same size, that follows from this one and `by`."""
+        """Return a picture of the same size, determined by this one and `by`."""
         return Picture((*self.key, by), self.shape, make)
 
     def pixels(self) -> np.ndarray:
-        """All of it, read-only."""
         if self._whole is None:
             self._whole = _read_only(self._make(whole(self.shape)))
         return self._whole
 
     def __getitem__(self, where):
-        """As an array; for two slices no more than they need is made. The cut is read-only."""
+        """Index as an array; for two slices, only the pixels that they need are calculated. Read-only."""
         if self._whole is None and isinstance(where, tuple) and len(where) == 2:
             rows, columns = map(_ends, where, self.shape)
             if rows and columns:
@@ -86,7 +83,7 @@ class Picture(NDArrayOperatorsMixin):
         return self.pixels()[where]
 
     def __setitem__(self, where, value) -> None:
-        self.pixels()[where] = value  # which is read-only
+        self.pixels()[where] = value  # raises: read-only
 
     def __len__(self) -> int:
         return self.shape[0]
@@ -95,19 +92,18 @@ class Picture(NDArrayOperatorsMixin):
         return np.array(self.pixels(), dtype=dtype, copy=copy)
 
     def __array_ufunc__(self, ufunc, method, *inputs, **keywords):
-        if "out" in keywords:  # to be refused there, as any read-only array is
+        if "out" in keywords:  # raises like any read-only array
             keywords["out"] = tuple(map(_pixels, keywords["out"]))
         return getattr(ufunc, method)(*map(_pixels, inputs), **keywords)
 
     def __getattr__(self, name: str):
-        """Whatever else an array can do."""
         if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self.pixels(), name)
 
 
 def _ends(part: object, size: int) -> tuple[int, int] | None:
-    """First and end of the rows or columns, of `size`, in a slice that goes forwards; None for others."""
+    """Start and end of a forward slice of `size` rows or columns; None for other slices."""
     if not isinstance(part, slice) or part.step is not None:
         return None
     first, end, _ = part.indices(size)

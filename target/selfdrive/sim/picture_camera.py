@@ -1,4 +1,4 @@
-"""The camera of a run with pictures: the library's frame as seen from the car's position."""
+"""The camera of a run with pictures."""
 
 from selfdrive.common.camera_model import CameraModel
 from selfdrive.messages import CameraView
@@ -10,7 +10,7 @@ from selfdrive.sim.vision import GROUND, SHIFT
 
 
 class PictureCamera:
-    """Takes the view's geometry from `geometry` and its picture from `library`.
+    """Takes the view's geometry from `geometry` and its picture from `library`, moved to the car's position.
 
     `calculated_by` identifies the compiled code that moves frames, if any. `translation` is how frames follow
     the car: "ground" by the road's homography, "shift" and "as_coded" by shifting sideways.
@@ -23,7 +23,7 @@ class PictureCamera:
         self.calculated_by = self._move.calculated_by
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """The view at this moment. Its picture must not be written to."""
+        """Return the view at this moment."""
         view = self._geometry.look(truth)
         frame = self._library.frame(truth.t, truth.position)
         picture = self._move.seen(frame, truth.lateral_offset, truth.heading)

@@ -1,4 +1,4 @@
-"""The standard plant: openpilot's longitudinal PC simulation, with realistic steering."""
+"""The standard plant: openpilot's longitudinal PC simulation with realistic steering."""
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.interp import interp
@@ -16,13 +16,13 @@ PEAK_POWER = 100_000.0  # W
 GAS_SLOPE = 3.33  # of the pedal's full travel
 BRAKE_FORCE = 10.0 * MASS
 BRAKE_SLOPE = 0.3
-BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power is the limit, not force
+BASE_SPEED = PEAK_POWER / PEAK_FORCE  # m/s; above this, power limits acceleration, not force
 CREEP_BP = (0.0, 1.5)  # m/s
-CREEP_V = (1.0, 0.0)  # m/s^2 that an idling automatic gearbox gives
+CREEP_V = (1.0, 0.0)  # m/s^2 from an idling automatic gearbox
 
 
 def acceleration(speed: float, gas: float, brake: float, grade: float) -> float:
-    """Longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
+    """Return the longitudinal acceleration (m/s^2); pedals in 0..1, `grade` in m/s^2, uphill positive."""
     force = gas * GAS_SLOPE * (PEAK_FORCE if speed < BASE_SPEED else PEAK_POWER / speed)
     force -= brake * BRAKE_FORCE * BRAKE_SLOPE
     force -= ROLLING_RESISTANCE * MASS * GRAVITY + DRAG * speed * speed
@@ -38,7 +38,7 @@ class Plant:
     """
 
     gearbox_scale = 1.0
-    mirrors = False  # whether left in the camera's picture is right for the plant's messages
+    mirrors = False  # whether messages mirror left and right
 
     def __init__(self, car: CarParams, *, speed: float, offset: float = 0.0) -> None:
         self.speed = speed
@@ -47,7 +47,7 @@ class Plant:
         self.lateral: Lateral = LateralDynamics(car, offset)
 
     def step(self, actuators: Actuators, grade: float, curvature: float) -> None:
-        """Advance 10 ms by Euler's method: position with the old speed, then the new speed."""
+        """Advance 10 ms by Euler's method: the position with the old speed, then the speed."""
         old = self.speed
         self.position += DT_CTRL * self.lateral.step(actuators.steer, old, curvature)
         self.acceleration = acceleration(old, actuators.gas, actuators.brake, grade)
@@ -60,11 +60,11 @@ class Plant:
         return position - self.position
 
     def headway(self, d_rel: float) -> float:
-        """Headway time (s) to what is `d_rel` m ahead; infinite at standstill."""
+        """Headway time (s) to an object `d_rel` m ahead; infinite at standstill."""
         return d_rel / self.speed if self.speed > 0.0 else float("inf")
 
     def shown(self, truth: GroundTruth) -> GroundTruth:
-        """What camera and radar can see: everything."""
+        """What camera and radar can detect: everything."""
         return truth
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:

@@ -1,4 +1,4 @@
-"""The forward radar: one track, 20 times a second, in the resolution and range of its CAN frames."""
+"""The forward radar: one track at 20 Hz, in the resolution and range of its CAN frames."""
 
 from math import isfinite, sin
 
@@ -13,11 +13,11 @@ from selfdrive.sim.truth import GroundTruth
 DISTANCE_COUNTS = 16.0  # per m
 SPEED_COUNTS = 32.0  # per m/s
 LATERAL_COUNTS = 16.0  # per m
-WIDEST = 31.0  # m to a side, what the lateral field holds
+WIDEST = 31.0  # m to a side, the range of the lateral field
 
 
 class RadarSensor:
-    """Measures the vehicle ahead and reports it on the radar bus."""
+    """Measures the lead and reports it on the radar bus."""
 
     def __init__(self, road: Road) -> None:
         self._road = road
@@ -26,10 +26,10 @@ class RadarSensor:
         self._track = messages["TRACK_15"]
 
     def measure(self, truth: GroundTruth) -> list[CanFrame]:
-        """State and track frame of one cycle.
+        """Return the state and track frames of one cycle.
 
-        The counts are cut off towards zero and wrap around: a distance of 256 m reads 0. That is
-        the original's arithmetic, kept because an error of measurement can reach it.
+        Counts are truncated towards zero and wrap around: 256 m reads 0. The original does this too, and
+        measurement errors can reach it.
         """
         d_rel = truth.d_rel
         v_rel = truth.v_lead - truth.v_ego
@@ -54,5 +54,5 @@ class RadarSensor:
 
 
 def _counts(value: float, per_unit: float) -> int:
-    """Cut off towards zero; what is not finite reads 0."""
+    """Truncate towards zero; non-finite values read 0."""
     return int(value * per_unit) if isfinite(value) else 0

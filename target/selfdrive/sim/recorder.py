@@ -8,8 +8,8 @@ from selfdrive.manager import Manager
 from selfdrive.messages import Actuators, LeadData
 from selfdrive.sim.truth import GroundTruth
 
-# Alerts that count as warning the driver, in the order of their bits in channel `alert`. The last is a
-# refusal to engage, which the original shows and its users also counted.
+# Alerts treated as warnings, in the order of their bits in channel `alert`. The last is a refusal to engage,
+# which the original also shows.
 COUNTED_ALERTS = (
     *("steer_saturated", "fcw", "can_error", "radar_error", "model_error"),
     "model_error_no_entry",
@@ -30,25 +30,25 @@ CHANNELS = (
 INTEGER_CHANNELS = ("lead_status", "plan_source", "long_state", "engaged", "alert")
 
 _NO_LEAD = LeadData()
-_FOLD = 64 * len(CHANNELS)  # numbers buffered by row before they are moved to channels
+_FOLD = 64 * len(CHANNELS)  # numbers buffered by row before they move to channels
 _ROOM = 4096  # initial capacity in rows
 
 
 class Recorder:
-    """Rows of `CHANNELS` and the alerts raised. Row k is the state after step k."""
+    """The rows of `CHANNELS` and the alerts. Row k is the state after step k."""
 
     def __init__(self) -> None:
-        self.alerts: list[tuple[str, float]] = []  # every time one is raised
+        self.alerts: list[tuple[str, float]] = []  # each time that one is raised
         self.engaged_from: float | None = None
         self.engaged_to: float | None = None
         self._rows = array("d")  # the newest rows, at least one
-        self._table = np.empty((len(CHANNELS), _ROOM))  # earlier rows, by channel, as written
+        self._table = np.empty((len(CHANNELS), _ROOM))  # earlier rows, by channel
         self._folded = 0  # rows in the table
         self._shown: tuple[str, ...] = ()
         self._alert_bits = 0
 
     def append(self, truth: GroundTruth, actuators: Actuators, manager: Manager) -> None:
-        """Add one row: the world, the commands that it received, and the controller's newest messages."""
+        """Append the world, the commands that it received, and the controller's newest messages."""
         state, plan, radar_state = manager.controlsd.state, manager.controlsd.plan, manager.radar_state
         lead = radar_state.lead_one if radar_state else _NO_LEAD
         t, d_rel, v_ego, v_lead = truth.t, truth.d_rel, truth.v_ego, truth.v_lead
@@ -74,11 +74,10 @@ class Recorder:
         )
 
     def newest(self) -> dict[str, float]:
-        """Every channel's number in the last row."""
         return dict(zip(CHANNELS, self._rows[-len(CHANNELS) :], strict=True))
 
     def trace(self) -> dict[str, np.ndarray]:
-        """Every channel's array. Later rows do not change it."""
+        """The arrays by channel. Later rows do not change them."""
         count = self._folded + len(self._rows) // len(CHANNELS)
         table = self._with_newest()[:, :count]
         return {
@@ -87,13 +86,11 @@ class Recorder:
         }
 
     def _fold(self) -> None:
-        """Move the newest rows into the table."""
         self._table = self._with_newest()
         self._folded += len(self._rows) // len(CHANNELS)
         del self._rows[:]
 
     def _with_newest(self) -> np.ndarray:
-        """The table with the newest rows, enlarged if necessary."""
         newest = np.array(self._rows).reshape(-1, len(CHANNELS)).T
         table, end = self._table, self._folded + newest.shape[1]
         if end > table.shape[1]:

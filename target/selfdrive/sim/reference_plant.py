@@ -1,7 +1,7 @@
 """The reference plant: openpilot v0.4.2's own PC simulation with its errors, for comparison with recordings.
 
-Longitudinally it moves like the standard plant. Laterally, and in its messages to the controller, it is the
-original's crude model. Do not draw conclusions about driving from it.
+It moves longitudinally like the standard plant. Its lateral motion and its messages are the original's crude
+model: do not draw conclusions about driving from it.
 """
 
 from selfdrive.car.params import CarParams
@@ -11,13 +11,13 @@ from selfdrive.sim.plant import Plant
 from selfdrive.sim.truth import GroundTruth
 
 FULL_TORQUE_RATE = 0.1  # deg/s of the steering wheel, for a torque of 1
-ANGLE_PER_OFFSET = 0.1067  # deg of the steering wheel for a metre to the side
-OFFSET_CYCLE = 5  # steps; only the first moves the car sideways
+ANGLE_PER_OFFSET = 0.1067  # deg of the steering wheel per m of lateral motion
+OFFSET_CYCLE = 5  # steps; only the first moves the car laterally
 FIRST_HEADWAY = 30.0  # s
 
 
 class CrudeLateral:
-    """Torque turns the steering wheel slowly; the car moves sideways only while it turns, at any speed.
+    """Torque turns the steering wheel slowly; the car moves laterally only while it turns, at any speed.
 
     There is no heading, no bend, and no self-aligning force.
     """
@@ -32,7 +32,7 @@ class CrudeLateral:
         self._step = 0
 
     def step(self, torque: float, speed: float, curvature: float) -> float:
-        """Advance 10 ms with `torque` (left positive, 1 is full); returns the speed along the road (m/s)."""
+        """Advance 10 ms with `torque` (left positive, 1 is full); return the speed along the road (m/s)."""
         change = DT_CTRL * FULL_TORQUE_RATE * torque
         self._angle += change
         self.steer_angle = self._angle * DEG_TO_RAD
@@ -46,10 +46,10 @@ class CrudeLateral:
 class ReferencePlant(Plant):
     """The standard plant's longitudinal motion with the original's errors.
 
-    The gearbox sends km/h instead of m/s. Lanes count right positive, where the controller counts left
-    positive: so the left lane is sent as the right one, and pictures move to the other side. Without
-    pictures, camera and radar always see a car in mid-lane.
-    A distance ends at 0; headway time starts at 30 s and keeps its value while the car stands.
+    The gearbox sends km/h instead of m/s. Lateral positions are right positive although the controller
+    expects left positive, so the left lane is sent as the right one and pictures are mirrored. Without
+    pictures, camera and radar always see a car in mid-lane. Distances end at 0; headway time starts at 30 s
+    and keeps its value at standstill.
     """
 
     gearbox_scale = MS_TO_KPH
@@ -61,11 +61,10 @@ class ReferencePlant(Plant):
         self._headway = FIRST_HEADWAY
 
     def distance_to(self, position: float) -> float:
-        """Like the standard plant's, but at least 0."""
         return max(super().distance_to(position), 0.0)
 
     def headway(self, d_rel: float) -> float:
-        """Headway time (s); at standstill the last value in motion."""
+        """Headway time (s); at standstill, the last value in motion."""
         if self.speed > 0.0:
             self._headway = d_rel / self.speed
         return self._headway
@@ -75,5 +74,5 @@ class ReferencePlant(Plant):
         return truth._replace(lateral_offset=0.0)
 
     def pictured(self, truth: GroundTruth) -> GroundTruth:
-        """The car is as far to the other side."""
+        """The picture mirrors the car's offset."""
         return truth._replace(lateral_offset=-truth.lateral_offset)

@@ -1,4 +1,4 @@
-"""A lane detector that looks up earlier results."""
+"""A lane detector that stores and reuses results."""
 
 import platform
 import sys
@@ -17,7 +17,7 @@ from selfdrive.sim.picture import Picture
 from selfdrive.visiond.detector import LaneDetector, LaneLines, RoadLine
 
 # All files that determine what is seen in a picture with a given key. visiond.py only uses the result, and
-# picture_camera.py's choice of picture is in the key, so both are left out.
+# picture_camera.py's choice of picture is in the key.
 SEEING = (
     "common/array_math.py",
     "common/camera_model.py",
@@ -41,20 +41,20 @@ SEEING = (
     "visiond/*.[ch]",
     "visiond/lane_net.npz",
 )
-_NUMBERS = 9  # of three lines
+_NUMBERS = 9  # for three lines
 
 
 class StatedDetector(LaneDetector, Protocol):
-    """A detector whose lines depend only on the picture and its `state`: all its memory, as numbers."""
+    """A detector whose lines depend only on the picture and its `state`, as numbers."""
 
     state: tuple[float, ...]
 
 
 class RememberingDetector:
-    """Sees what `detector` sees, without needing pixels if `memory` has the result.
+    """Returns the results of `detector`, without pixels if `memory` has them.
 
-    The detector must be deterministic in picture and state. `made_of` distinguishes detectors that the same
-    files describe: its name, its camera.
+    The detector must be deterministic in picture and state. `made_of` distinguishes detectors of the same
+    code: name, camera.
     """
 
     def __init__(self, detector: StatedDetector, made_of: object, memory: DetectionMemory) -> None:
@@ -62,11 +62,11 @@ class RememberingDetector:
         self._seeing = seeing_digest(Path(selfdrive.__path__[0])) + repr(made_of).encode()
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in the view's picture. Plain arrays, which have no key, are always examined."""
+        """Return the lines in the view's picture. Plain arrays, which have no key, are always examined."""
         picture, detector = view.picture, self._detector
         if not isinstance(picture, Picture):
             return detector.detect(view)
-        text = repr((picture.key, detector.state)).encode()  # a float's repr is unique
+        text = repr((picture.key, detector.state)).encode()  # repr is unique per float
         key = blake2b(self._seeing + text, digest_size=KEY).digest()
         kept = self._memory.recall(key)
         if kept is not None:
@@ -78,7 +78,7 @@ class RememberingDetector:
 
 
 def seeing_digest(root: Path) -> bytes:
-    """Digest of the detection code in the package at `root`, and of what it calculates with."""
+    """Digest of the detection code in the package at `root` and of the libraries that it uses."""
     digest = sha256()
     calculator = sys.version, platform.machine(), cv2.__version__, cv2.getCPUFeaturesLine(), np.__version__
     digest.update(repr(calculator).encode())
@@ -89,7 +89,6 @@ def seeing_digest(root: Path) -> bytes:
 
 
 def _seeing(root: Path) -> Iterator[tuple[str, bytes]]:
-    """Names below `root` and contents of the detection code, in a fixed order."""
     for pattern in SEEING:
         for file in sorted(root.glob(pattern)):
             yield file.relative_to(root).as_posix(), file.read_bytes()

@@ -1,8 +1,8 @@
 """Compares runs with reference traces: `python -m selfdrive.sim.replay --references DIR [NAME...]`.
 
-Each CSV in the folder of references (or each named one) is compared with a run of its scenario on the
-reference plant, by channel, using a tolerance table. Exit code 0 within tolerance, 1 otherwise, 2 for invalid
-input. References are written only with --update-references.
+Each CSV in the folder (or each named one) is compared by channel with a run of its scenario on the reference
+plant, using a tolerance table. Exit code 0 within tolerance, 1 otherwise, 2 for invalid input. References are
+written only with --update-references.
 """
 
 import argparse
@@ -24,7 +24,6 @@ TOLERANCES = runs.SCENARIOS.parent / "references" / "tolerances.yaml"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     try:
         if options.update_references:
@@ -36,7 +35,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def reference_names(folder: Path) -> list[str]:
-    """The names of the references in a folder. ConfigError if there are none."""
+    """The names of the references in a folder. Raises ConfigError if there are none."""
     names = sorted(path.stem for path in folder.glob("*.csv"))
     if not names:
         raise ConfigError(
@@ -73,7 +72,6 @@ def _update(options: argparse.Namespace) -> int:
 
 
 def _runs(names: list[str], options: argparse.Namespace) -> Iterator[runs.Run]:
-    """The runs one by one; invalid scenario files are reported before the first."""
     if options.runs is not None:
         yield from (runs.load(options.runs / name, options.plant) for name in names)
         return

@@ -1,4 +1,4 @@
-"""The road: its grade over time, its curvature over distance."""
+"""The road: grade over time, curvature over distance."""
 
 from collections.abc import Sequence
 
@@ -14,15 +14,14 @@ class Road:
         self._grade, self._curvature = grade, curvature
 
     def grade(self, t: float) -> float:
-        """The slope's effect on the car's acceleration at time `t` (s)."""
+        """Acceleration by the slope at time `t` (s)."""
         return interp(t, *self._grade) if self._grade else 0.0
 
     def curvature(self, position: float) -> float:
-        """Curvature at `position` (m)."""
         return interp(position, *self._curvature) if self._curvature else 0.0
 
     def bend(self, position: float, length: int) -> tuple[float, ...] | None:
-        """The road's distance from its tangent at 0, 1, ... `length` - 1 m ahead; None on a straight road."""
+        """Lateral distance from the tangent at 0, 1, ... `length` - 1 m ahead; None if straight."""
         if self._curvature is None:
             return None
         sideways, direction, points = 0.0, 0.0, []
@@ -34,6 +33,6 @@ class Road:
         return tuple(points)
 
     def sideways(self, position: float, distance: float) -> float:
-        """The road's distance (m) from its tangent `distance` m ahead, to the nearest metre."""
+        """Lateral distance (m) from the tangent `distance` m ahead, to the nearest metre."""
         points = self.bend(position, max(round(distance), 0) + 1)
         return points[-1] if points else 0.0

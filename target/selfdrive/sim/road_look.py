@@ -1,4 +1,4 @@
-"""The appearance of a rendered road: paint, asphalt, shadows, other cars. Data only.
+"""The appearance of a rendered road: paint, asphalt, shadows, other cars.
 
 Tones are grey levels (0..255) as the camera sees them; lengths in m; lateral positions are relative to the
 centre of the ego lane, left positive.
@@ -6,7 +6,7 @@ centre of the ego lane, left positive.
 
 from dataclasses import dataclass, replace
 
-DASH, DASH_PERIOD = 3.05, 12.2  # m: 10 ft painted in every 40 ft (MUTCD, section 3A.06)
+DASH, DASH_PERIOD = 3.05, 12.2  # m: 10 ft painted every 40 ft (MUTCD, section 3A.06)
 SOLID, DASHED = "solid", "dashed"
 
 
@@ -14,7 +14,7 @@ SOLID, DASHED = "solid", "dashed"
 class Paint:
     """One line of paint. `wear` is the share that has flaked off, `fade` its loss of contrast.
 
-    A `double` line is two strips with a gap of the same width, centred on the line.
+    A `double` line is two strips with a gap of the same width.
     """
 
     tone: float = 218.0
@@ -34,7 +34,7 @@ YELLOW_PAINT = Paint(tone=182.0, yellow=True)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class OtherCar:
-    """A vehicle at a fixed place before the camera: its rear at `x`, its centre at `y`."""
+    """A vehicle at a fixed place ahead of the camera: its rear at `x`, its centre at `y`."""
 
     x: float
     y: float
@@ -58,8 +58,8 @@ class Look:
     far_right: Paint | None = Paint()
     # the ground
     asphalt: float = 97.0
-    grain: float = 4.0  # standard deviation of its fine texture (grey levels)
-    mottle: float = 3.0  # of its slow changes, over metres
+    grain: float = 4.0  # standard deviation of the fine texture (grey levels)
+    mottle: float = 3.0  # standard deviation of slow changes, over metres
     tracks: float = 5.0  # darkening in the wheel tracks
     shoulder: float = 88.0
     shoulder_width: float = 2.6
@@ -70,7 +70,7 @@ class Look:
     cracks: float = 2.0
     seams: float = 0.0  # tar seams that run along the road
     joints: float | None = None  # m between the joints across a concrete road
-    joint_tone: float = -30.0  # of patches, cracks, seams and joints against the ground
+    joint_tone: float = -30.0  # of patches, cracks, seams and joints, relative to the ground
     # light
     shadows: float = 0.04  # share of the road in tree shadows
     shadow_depth: float = 0.3  # share of light lost in shadows

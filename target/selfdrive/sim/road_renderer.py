@@ -1,6 +1,6 @@
-"""Renders a straight road from any position: the camera's picture, and the true positions of the lines.
+"""Renders a straight road from any position, with the true positions of its lines.
 
-The road is painted once, from above (`road_texture`). A picture is that strip seen through the camera: each
+The road is painted once, from above (`road_texture`). A picture shows that strip through the camera. Each
 band of rows uses a copy of suitable coarseness, so that the far road does not flicker.
 """
 
@@ -18,14 +18,14 @@ from selfdrive.sim.road_look import Look, standard_look
 from selfdrive.sim.road_texture import Strip, paint_strip
 
 BAND_RATIO = 1.4  # ratio of a band's end to its start, below the horizon
-TREE_HEIGHT = 0.05  # of the focal length: height of trees above the horizon
-LEAST_ROWS = 3  # of a band
-MARGIN = 2  # extra texels that interpolation reads
+TREE_HEIGHT = 0.05  # of the focal length, above the horizon
+LEAST_ROWS = 3  # of the picture in a band
+MARGIN = 2  # extra texels for interpolation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Band:
-    """Rows `first`..`last` - 1 of the picture, and the copy of the road they are taken from.
+    """Rows `first`..`last` - 1 of the picture, and the copy of the road that they show.
 
     Homographies: `to_car` from the band's pixels to the car's frame, `to_texels` from the road to the strip.
     """
@@ -38,15 +38,15 @@ class Band:
 
 
 def first_road_row(model: CameraModel) -> int:
-    """The highest row of the picture that shows only road."""
+    """The highest row that shows only road."""
     return max(0, ceil(model.horizon + 0.5))
 
 
 class RoadRenderer:
     """Draws one road with one camera. Equal arguments give equal pictures.
 
-    `look` is the road's appearance, or the marks of the standard look, "solid" or "dashed". The strip of road
-    repeats after `periods` dash periods of 12.2 m.
+    `look` is the road's appearance, or the marks of the standard look, "solid" or "dashed". The road repeats
+    after `periods` dash periods of 12.2 m.
     """
 
     def __init__(self, model: CameraModel, look: Look | str, seed: int, *, periods: int = 8) -> None:
@@ -57,9 +57,8 @@ class RoadRenderer:
         self._far = _background(model, self.look, rng)
 
     def grey(self, position: float, offset: float = 0.0, heading: float = 0.0) -> np.ndarray:
-        """The picture (uint8, rows x width) at `position` m along the road, `offset` m left of the lane's
-        middle, turned left by `heading` rad.
-        """
+        """Draw the picture (uint8, rows x width) at `position` m along the road, `offset` m left of the lane
+        centre, turned left by `heading` rad."""
         model = self.model
         picture = np.empty((model.rows, model.width), np.uint8)
         self._draw_far(picture, heading)
@@ -73,7 +72,7 @@ class RoadRenderer:
     def colour(
         self, position: float, offset: float = 0.0, heading: float = 0.0, lead: float | None = None
     ) -> np.ndarray:
-        """The same in colour (uint8, rows x width x BGR), for display; with a car `lead` m ahead."""
+        """Draw the picture in colour (uint8, rows x width x BGR) for display, with a car `lead` m ahead."""
         picture = tinted(self.grey(position, offset, heading), self.model, self.look, offset, heading)
         if lead is not None:
             draw_lead(picture, self.model, lead, offset, heading)
@@ -82,12 +81,12 @@ class RoadRenderer:
     def truth(
         self, offset: float = 0.0, heading: float = 0.0
     ) -> tuple[tuple[float, float], tuple[float, float]]:
-        """((y, slope), (y, slope)) of the lane's left and right line in the car's frame: y at the car."""
+        """((y, slope), (y, slope)) of the lane's left and right line in the car's frame, at the car."""
         half, slope = 0.5 * self.look.lane_width, -tan(heading)
         return ((half - offset) / cos(heading), slope), ((-half - offset) / cos(heading), slope)
 
     def _draw_far(self, picture: np.ndarray, heading: float) -> None:
-        """Everything above the horizon, which only pans as the car turns."""
+        """Draw sky and trees, which only pan as the car turns."""
         rows, width = len(self._far), picture.shape[1]
         spare = self._far.shape[1] - width
         first = min(max(spare // 2 - pan(self.model, heading), 0), spare)
@@ -111,12 +110,12 @@ def car_to_road(position: float, offset: float, heading: float) -> np.ndarray:
 
 
 def pan(model: CameraModel, heading: float) -> int:
-    """The shift to the right, in pixels, of distant objects as the car turns left by `heading` (rad)."""
+    """Shift of distant objects to the right, in pixels, when the car is turned left by `heading` (rad)."""
     return round(model.fx * tan(heading) / cos(model.pitch))
 
 
 def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
-    """The rows below the horizon, from the bottom up, each band with a strip as coarse as its middle row."""
+    """The bands below the horizon, from the bottom up, each with a strip as coarse as its middle row."""
     bands = []
     last, top = model.rows, first_road_row(model)
     while last > top:
@@ -140,7 +139,6 @@ def _bands(model: CameraModel, strip: Strip) -> tuple[Band, ...]:
 
 
 def _draw_band(picture: np.ndarray, band: Band, to_road: np.ndarray) -> None:
-    """Draw the band's rows from the position `to_road`."""
     rows, width = band.last - band.first, picture.shape[1]
     matrix = product(product(band.to_texels, to_road), band.to_car)
     (columns, lines, scales) = product(matrix, _corners(width, rows)).tolist()
@@ -168,12 +166,10 @@ def _draw_band(picture: np.ndarray, band: Band, to_road: np.ndarray) -> None:
 
 
 def _corners(width: int, rows: int) -> np.ndarray:
-    """(u, v, 1) of a band's four corner pixels, as columns."""
     return np.array([(0, width - 1, 0, width - 1), (0, 0, rows - 1, rows - 1), (1, 1, 1, 1)], float)
 
 
 def _background(model: CameraModel, look: Look, rng: np.random.Generator) -> np.ndarray:
-    """Sky and trees down to the horizon, wider than the picture by half on either side."""
     rows, width = first_road_row(model), 2 * model.width
     if rows == 0:
         return np.empty((0, width), np.uint8)

@@ -1,7 +1,6 @@
-"""The road from above: a strip painted once per look, and coarser copies for the distance.
+"""The road from above: a strip painted once per look, with coarser copies for the distance.
 
-A strip is an array (rows along the road, columns from left to right) of grey levels. It is cyclic: its last
-row is followed by its first.
+A strip is a cyclic array (rows along the road, columns from left to right) of grey levels.
 """
 
 from dataclasses import dataclass
@@ -21,19 +20,19 @@ TILE_PERIODS = 3  # the finest texture repeats, which cameras cannot resolve
 TRACK_OFFSET, TRACK_WIDTH = 0.8, 0.35  # m: wheel tracks in a lane
 KERB_WIDTH = 0.25  # m
 FLAKE_ROWS, FLAKE_COLUMNS = 3, 3  # typical size of a flake
-VERGE_GRAIN = 3.0  # coarseness of the verge relative to the road
+VERGE_GRAIN = 3.0  # coarseness relative to the road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Strip:
-    """Grey levels of the road from above; `row_length` and `column_width` (m) are those of one texel."""
+    """Grey levels of the road from above; `row_length` and `column_width` (m) are the size of a texel."""
 
     texels: np.ndarray
     row_length: float
     column_width: float
 
     def shrunk(self, row_length: float, column_width: float) -> "Strip":
-        """A copy with texels of about this size, each the mean of its area."""
+        """Return a copy with texels of about this size, each the mean of its area."""
         rows, columns = self.texels.shape
         length, width = rows * self.row_length, columns * self.column_width
         fewer_rows = max(1, min(rows, round(length / row_length)))
@@ -44,7 +43,7 @@ class Strip:
         return Strip(texels=texels, row_length=length / fewer_rows, column_width=width / fewer_columns)
 
     def from_road(self) -> np.ndarray:
-        """Homography (3 x 3) from (along, left, 1) on the road in m to (column, row, 1) of the texels."""
+        """Homography (3 x 3) from (along, left, 1) on the road in m to (column, row, 1) in texels."""
         return np.array(
             [
                 (0.0, -1.0 / self.column_width, HALF_WIDTH / self.column_width - 0.5),
@@ -55,7 +54,6 @@ class Strip:
 
 
 def paint_strip(look: Look, periods: int, rng: np.random.Generator) -> Strip:
-    """The road of this look, `periods` dash periods long."""
     texels = _ground(look, periods, rng)
     _flaws(texels, look, rng)
     for line_y, paint in lines(look):
@@ -80,12 +78,10 @@ def _edge(look: Look) -> float:
 
 
 def _lateral() -> np.ndarray:
-    """y (m) of the column centres."""
     return HALF_WIDTH - (np.arange(COLUMNS) + 0.5) * COLUMN_WIDTH
 
 
 def _profile(look: Look) -> np.ndarray:
-    """Tone of the bare ground across the road."""
     y = _lateral()
     paved, edge = 1.5 * look.lane_width, _edge(look)
     tone = np.where(np.abs(y) < paved + 0.15, look.asphalt, look.shoulder)
@@ -99,7 +95,6 @@ def _profile(look: Look) -> np.ndarray:
 
 
 def _ground(look: Look, periods: int, rng: np.random.Generator) -> np.ndarray:
-    """Verge, shoulder and asphalt with their texture."""
     tile_periods = min(TILE_PERIODS, periods)
     fine = rng.standard_normal((tile_periods * ROWS_PER_PERIOD, COLUMNS), dtype=np.float32)
     coarser = np.where(np.abs(_lateral()) > _edge(look), VERGE_GRAIN, 1.0).astype(np.float32)
@@ -114,7 +109,6 @@ def _ground(look: Look, periods: int, rng: np.random.Generator) -> np.ndarray:
 
 
 def _flaws(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
-    """Patches, cracks, seams and joints at random places."""
     rows, length = len(texels), len(texels) * ROW_LENGTH
     paved = 1.5 * look.lane_width
     for _ in range(rng.poisson(look.patches * length / 100.0)):
@@ -137,7 +131,6 @@ def _flaws(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
 def _polyline(
     texels: np.ndarray, rng: np.random.Generator, tone: float, *, length: float, heading: float
 ) -> None:
-    """A crooked dark line from a random place on the road."""
     steps = max(3, int(length / 0.4))
     turns = heading + np.cumsum(rng.normal(0.0, 0.25 if length < 10.0 else 0.004, steps))
     x = rng.uniform(0.0, len(texels) * ROW_LENGTH) + np.cumsum(0.4 * each(cos, turns))
@@ -148,7 +141,6 @@ def _polyline(
 
 
 def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random.Generator) -> None:
-    """Paint a line at `y` with subtexel accuracy."""
     centres = (y - paint.width, y + paint.width) if paint.double else (y,)
     first, last = _column(max(centres) + paint.width), _column(min(centres) - paint.width) + 1
     across = total(
@@ -164,7 +156,6 @@ def _line(texels: np.ndarray, y: float, paint: Paint, look: Look, rng: np.random
 
 
 def _dashes(rows: int, paint: Paint) -> np.ndarray:
-    """The share of each row that lies in a dash."""
     if not paint.dashed:
         return np.ones(rows, np.float32)
     edges = np.arange(rows + 1) * ROW_LENGTH - paint.phase
@@ -174,7 +165,7 @@ def _dashes(rows: int, paint: Paint) -> np.ndarray:
 
 
 def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> np.ndarray:
-    """1 where paint has come off (this share of the area), 0 elsewhere, with soft edges."""
+    """1 where paint has come off (`share` of the area), 0 elsewhere, with soft edges."""
     rows, columns = shape
     spots = rng.standard_normal((rows // FLAKE_ROWS + 2, columns // FLAKE_COLUMNS + 2), dtype=np.float32)
     spots = cv2.resize(cv2.GaussianBlur(spots, (0, 0), 0.8), (columns, rows))
@@ -183,7 +174,6 @@ def _flakes(shape: tuple[int, int], share: float, rng: np.random.Generator) -> n
 
 
 def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
-    """Soft-edged shadows of trees."""
     rows = len(texels)
     small = (max(8, int(rows * ROW_LENGTH / 0.6)), int(2.0 * HALF_WIDTH / 0.6))
     noise = rng.standard_normal(small, dtype=np.float32)
@@ -191,7 +181,7 @@ def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
     noise += 0.25 * cv2.GaussianBlur(rng.standard_normal(noise.shape, dtype=np.float32), (0, 0), 0.7)
     noise = noise[small[0] : 2 * small[0]]
     limit = np.quantile(noise, 1.0 - look.shadows)
-    # Beyond the strip its edge is repeated: no shadow may reach that far.
+    # Beyond the strip its edge is repeated, so shadows must not reach it.
     depth = look.shadow_depth * np.clip(HALF_WIDTH - 0.5 - np.abs(_lateral()), 0.0, 1.0).astype(np.float32)
     for k in range(rows // ROWS_PER_PERIOD):
         part = texels[k * ROWS_PER_PERIOD : (k + 1) * ROWS_PER_PERIOD]
@@ -200,7 +190,6 @@ def _shade(texels: np.ndarray, look: Look, rng: np.random.Generator) -> None:
 
 
 def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
-    """The `k`-th period of a coarse map of the strip, at the strip's resolution."""
     down, across = len(coarse) / (periods * ROWS_PER_PERIOD), coarse.shape[1] / COLUMNS
     matrix = np.array(
         [[across, 0.0, 0.5 * across - 0.5], [0.0, down, down * (k * ROWS_PER_PERIOD + 0.5) - 0.5]]
@@ -211,5 +200,4 @@ def _enlarged(coarse: np.ndarray, k: int, periods: int) -> np.ndarray:
 
 
 def _column(y: float) -> int:
-    """The column that contains y (m), within the strip."""
     return min(max(int((HALF_WIDTH - y) / COLUMN_WIDTH), 0), COLUMNS - 1)

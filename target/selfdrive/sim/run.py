@@ -2,7 +2,7 @@
 
 Writes DIR/trace.npz (100 Hz channels) and DIR/record.json (hazards, alerts, engagement, digests). Equal
 scenario and seed give equal bytes. Exit code 2 for invalid input. The record is written last and atomically:
-if it exists, the run finished and the trace belongs to it.
+if it exists, the trace is complete.
 """
 
 import argparse
@@ -24,7 +24,6 @@ EXIT_INPUT = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     try:
         run = _open(options)
@@ -38,33 +37,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 class Run:
-    """A run in progress. Stepping it manually does the same as the command line, in the same order."""
+    """A run in progress, to step manually. It does the same as the command line, in the same order."""
 
     def __init__(self, simulator: Simulator) -> None:
         self._simulator = simulator
 
     @property
     def done(self) -> bool:
-        """Whether all steps are done."""
         return self._simulator.done
 
     def step(self) -> None:
-        """Make the next step."""
         self._simulator.step()
 
     def recorded(self) -> dict[str, float]:
-        """The channels after the last step."""
         return self._simulator.recorder.newest()
 
     def write(self, folder: Path) -> None:
-        """Write trace and record of the steps so far into `folder`."""
+        """Write trace and record of all steps so far into `folder`."""
         write(self._simulator.result(), folder)
 
 
 def open_run(arguments: Sequence[str]) -> Run:
-    """The run that these command line arguments describe, before its first step.
+    """Prepare the run that these command line arguments describe.
 
-    `--out` is ignored: `write` takes the folder. ConfigError for invalid input.
+    `--out` is ignored: `write` takes the folder. Raises ConfigError for invalid input.
     """
     return _open(_parse(arguments))
 
@@ -84,7 +80,6 @@ def _open(options: argparse.Namespace) -> Run:
 
 
 def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) -> SimulationResult:
-    """Run a scenario to its end."""
     simulator = Simulator()
     simulator.reset(scenario, seed, pictures)
     while not simulator.done:
@@ -93,7 +88,6 @@ def simulate(scenario: Scenario, seed: int, pictures: Pictures | None = None) ->
 
 
 def write(result: SimulationResult, folder: Path) -> None:
-    """Write trace.npz and record.json into `folder`, which is created if needed."""
     trace, digest = pieces(result.trace), sha256()
     for piece in trace:
         digest.update(piece)

@@ -62,7 +62,7 @@ CURVATURE_KEYS = {"at_m": "distances along the road in m", "per_m": "curvature i
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Lead:
-    """The lead's gap (m) at the start, and its speeds (m/s) at times (s), interpolated linearly."""
+    """The lead's initial gap (m), and its speeds (m/s) at times (s), interpolated linearly."""
 
     gap: float
     times: tuple[float, ...]
@@ -71,7 +71,7 @@ class Lead:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ButtonPress:
-    """A cruise button held down from step `press` until step `release`."""
+    """A cruise button held from step `press` until step `release`."""
 
     code: int
     press: int
@@ -86,7 +86,7 @@ class Scenario:
     title: str
     digest: str
     steps: int
-    speed: float  # m/s, of the host
+    speed: float  # m/s
     lateral_offset: float  # m
     lead: Lead | None
     buttons: tuple[ButtonPress, ...]
@@ -95,7 +95,7 @@ class Scenario:
     plant: str = STANDARD
 
     def button(self, frame: int) -> int:
-        """The cruise button held down in step `frame`."""
+        """The cruise button held in step `frame`."""
         for press in self.buttons:
             if press.press <= frame < press.release:
                 return press.code
@@ -103,7 +103,7 @@ class Scenario:
 
 
 def load_scenario(path: Path) -> Scenario:
-    """Read a scenario file. ConfigError for anything a user can fix."""
+    """Read a scenario file. Raises ConfigError if it is invalid."""
     try:
         data = path.read_bytes()
         text = data.decode()
@@ -116,7 +116,7 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def parse_scenario(text: str, where: str, digest: str) -> Scenario:
-    """The scenario in `text`; `where` is its source in error messages."""
+    """Parse a scenario; `where` is its source in error messages."""
     root = read_yaml(text, where, KEYS)
     root.text("schema", (SCHEMA,))
     host = root.section("host", HOST_KEYS)
@@ -141,7 +141,8 @@ def parse_scenario(text: str, where: str, digest: str) -> Scenario:
 
 
 def on_plant(scenario: Scenario, plant: str) -> Scenario:
-    """The same scenario on the plant of that name. ConfigError if the plant does not support its road."""
+    """Return the scenario on the plant of that name. Raises ConfigError if the plant does not support its
+    road."""
     if not _possible(scenario, plant):
         expected, remedy = _ONLY_STRAIGHT
         raise ConfigError(f"{scenario.name} on the plant {plant!r}", expected=expected, remedy=remedy)
@@ -209,7 +210,6 @@ def _table(section: Section, key: str, at: tuple[float, ...], values: tuple[floa
 
 
 def _step(section: Section, key: str, earliest: float = 0.0) -> int:
-    """A time in s, a whole number of steps."""
     steps = section.number(key, earliest, LONGEST) / DT_CTRL
     section.check(key, abs(steps - round(steps)) < 1e-6, "a multiple of 0.01", "a step is 10 ms")
     return round(steps)

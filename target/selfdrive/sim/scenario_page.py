@@ -44,7 +44,7 @@ _SPEED = dict.fromkeys((f"speed_{unit}" for unit in s.SPEED_UNITS), _number(0.0,
 _SPEEDS = {key: {"anyOf": [speed, _numbers(0.0, s.FASTEST)]} for key, speed in _SPEED.items()}
 _TIME = _number(0.0, s.LONGEST)
 
-# Heading of each section, its keys with meanings, their types, and the required ones.
+# By section heading: the keys with their meanings, their types, and the required keys.
 SECTIONS: dict[str, tuple[dict[str, str], dict[str, dict[str, Any]], tuple[str, ...]]] = {
     "scenario": (
         s.KEYS,
@@ -88,11 +88,10 @@ SECTIONS: dict[str, tuple[dict[str, str], dict[str, dict[str, Any]], tuple[str, 
         ("at_m", "per_m"),
     ),
 }
-ONE_SPEED = ("host", "lead")  # exactly one of the speed keys, in any unit
+ONE_SPEED = ("host", "lead")  # exactly one speed key, in any unit
 
 
 def schema() -> dict[str, Any]:
-    """The JSON Schema of a scenario file."""
     parts = {name: _object(name) for name in SECTIONS}
     whole = parts.pop("scenario")
     return {
@@ -118,7 +117,6 @@ def _object(name: str) -> dict[str, Any]:
 
 
 def page() -> str:
-    """The page."""
     lines = [TEXT]
     for name, (meanings, types, needed) in SECTIONS.items():
         lines += [f"## {'The file' if name == 'scenario' else name.capitalize()}\n"]

@@ -1,4 +1,4 @@
-"""The car's own sensors and switches, as its control units report them on the car bus."""
+"""The car's own sensors and switches, as reported on the car bus."""
 
 from selfdrive.can.dbc import load
 from selfdrive.can.packer import Packer
@@ -7,9 +7,9 @@ from selfdrive.common.conversions import MS_TO_KPH, RAD_TO_DEG
 from selfdrive.messages import CanFrame
 from selfdrive.sim.truth import GroundTruth
 
-STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0, though the wheels turn
+STANDSTILL_SPEED = 0.3  # m/s; below this the speed reads 0 although the wheels turn
 
-# Signals with a constant value, by period in steps: a closed, belted car in drive, main switch on.
+# Constant signals, by period in steps: a closed, belted car in drive, main switch on.
 _CONSTANT = {
     1: {
         "STEER_STATUS": {"STEER_TORQUE_SENSOR": 0, "STEER_STATUS": 0},
@@ -27,11 +27,11 @@ _CONSTANT = {
         "DOORS_STATUS": {"DOOR_OPEN_FL": 0, "DOOR_OPEN_FR": 0, "DOOR_OPEN_RL": 0, "DOOR_OPEN_RR": 0},
     },
 }
-_COUNTERS = 4  # with a two-bit counter, a constant message has four frames
+_COUNTERS = 4  # values of the two-bit counter, so a constant message has four frames
 
 
 class CarSensors:
-    """Makes the car's frames of each 10 ms step, with counters.
+    """Returns the car's frames of each 10 ms step.
 
     The gearbox reports `gearbox_scale` times the speed.
     """
@@ -48,7 +48,7 @@ class CarSensors:
         self._constant = [(period, _constant_frames(names)) for period, names in _CONSTANT.items()]
 
     def measure(self, truth: GroundTruth, button: int, frame: int) -> list[CanFrame]:
-        """All frames of step `frame`; `button` is the cruise button held down (CruiseButton)."""
+        """Return all frames of step `frame`; `button` is the cruise button held (CruiseButton)."""
         speed = truth.v_ego if truth.v_ego >= STANDSTILL_SPEED else 0.0
         speed_kph = speed * MS_TO_KPH
         steer_angle = truth.steer_angle
@@ -68,7 +68,6 @@ class CarSensors:
 
 
 def _constant_frames(values: dict[str, dict[str, int]]) -> list[list[CanFrame]]:
-    """The frames of constant messages for each value of the counter."""
     messages = load(CAR_DBC)
     packers = [(Packer(messages[name], tuple(v), CAR_BUS), tuple(v.values())) for name, v in values.items()]
     return [[packer.pack(v, counter) for packer, v in packers] for counter in range(_COUNTERS)]

@@ -1,4 +1,4 @@
-"""The closed loop: plant, sensors, camera and the controller, 10 ms a step."""
+"""The closed loop of plant, sensors, camera and controller, in steps of 10 ms."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,14 +27,14 @@ from selfdrive.visiond.visiond import Visiond
 
 RECORD_SCHEMA = "sim-record/1"
 STEPS_PER_SECOND = 100
-CYCLE = 5  # steps between radar cycles, and between pictures
+CYCLE = 5  # steps between radar cycles and between pictures
 PLANTS: dict[str, type[Plant]] = {STANDARD: Plant, REFERENCE: ReferencePlant}
-FREE_ROAD_DISTANCE = 200.0  # m; radar and camera see an object at this constant distance
+FREE_ROAD_DISTANCE = 200.0  # m; constant distance that radar and camera report on a free road
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SimulationResult:
-    """The result of a run: `record` (plain data for record.json) and `trace` (channel to array)."""
+    """The result of a run: `record` (data of record.json) and `trace` (arrays by channel)."""
 
     record: dict
     trace: dict[str, np.ndarray]
@@ -52,8 +52,8 @@ class Simulator:
     ) -> None:
         """Rebuild car, controller and recorder. `seed` is that of the pictures, if any.
 
-        A folder `film` receives a film of the run. ConfigError if it cannot be written, or if the pictures
-        are not available or do not fit the scenario's road.
+        A film is recorded in the folder `film`. Raises ConfigError if that fails, or if pictures are
+        unavailable or do not fit the scenario's road.
         """
         self.frame = 0
         self._scenario, self._seed = scenario, seed
@@ -79,7 +79,6 @@ class Simulator:
 
     @property
     def done(self) -> bool:
-        """Whether the scenario's duration has been simulated."""
         return self.frame >= self._scenario.steps
 
     def step(self) -> None:
@@ -104,7 +103,6 @@ class Simulator:
         self.frame += 1
 
     def result(self) -> SimulationResult:
-        """Record and trace of the steps so far."""
         recorder = self.recorder
         first_alerts: dict[str, float] = {}
         for name, t in recorder.alerts:
@@ -127,7 +125,7 @@ class Simulator:
         return SimulationResult(record=record, trace=recorder.trace())
 
     def _advance(self, t: float) -> None:
-        """The world's step that begins at `t`, with the previous step's commands."""
+        """Advance the world from time `t`, with the previous step's commands."""
         road, plant = self._road, self._plant
         plant.step(self._actuators, road.grade(t), road.curvature(plant.position))
         if self._lead:

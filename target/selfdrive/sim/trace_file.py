@@ -1,8 +1,8 @@
 """The bytes of trace.npz, as `numpy.savez` writes them, but faster.
 
-`savez` takes as long for a run's file as some dozen steps of the run: each channel passes through `zipfile`
-and its buffers. Here channels are taken directly from memory. Format: PKWARE's APPNOTE 6.3 (stored entries
-with a ZIP64 extra field each, dated 1980-01-01), and NumPy's .npy 1.0.
+`savez` takes as long as a few dozen steps of the run, because channels pass through `zipfile` and its
+buffers; here they are taken directly from memory. Format: PKWARE's APPNOTE 6.3 (stored entries with a ZIP64
+extra field each, dated 1980-01-01), and NumPy's .npy 1.0.
 """
 
 from collections.abc import Mapping
@@ -21,7 +21,6 @@ _IN_EXTRA = 0xFFFFFFFF  # the size is in the ZIP64 field
 
 
 def pieces(trace: Mapping[str, np.ndarray]) -> list[bytes | memoryview]:
-    """The file of a trace (channel to one value per step), in pieces."""
     parts: list[bytes | memoryview] = []
     headers: dict[tuple, bytes] = {}
     directory, offset = b"", 0
@@ -43,8 +42,8 @@ def pieces(trace: Mapping[str, np.ndarray]) -> list[bytes | memoryview]:
 
 
 def _header(values: np.ndarray) -> bytes:
-    """The header of a .npy file for such values: type and shape, padded to a multiple of 64 bytes with room
-    for a row count of 21 digits."""
+    """The header of a .npy file: type and shape, padded to a multiple of 64 bytes with room for a row count
+    of 21 digits."""
     said = f"{{'descr': {values.dtype.str!r}, 'fortran_order': False, 'shape': {values.shape}, }}"
     said += " " * (_DIGITS - len(str(values.shape[0])))
     blanks = -(len(_NPY) + 2 + len(said) + 1) % 64

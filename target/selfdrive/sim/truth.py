@@ -9,7 +9,7 @@ class GroundTruth(NamedTuple):
     t: float  # s
     d_rel: float  # m, bumper to bumper; 200 on a free road
     v_ego: float  # m/s
-    v_lead: float  # m/s; the host's own on a free road
+    v_lead: float  # m/s; the car's speed on a free road
     a_ego: float  # m/s^2
     lateral_offset: float  # m from the middle of the lane
     heading: float  # rad relative to the road

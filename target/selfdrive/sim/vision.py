@@ -1,6 +1,6 @@
 """How the controller sees in a run: ideal geometry, or pictures with a detector.
 
-Picture libraries load slowly, so they are imported only in runs with pictures.
+Picture libraries load slowly, so only runs with pictures import them.
 """
 
 from dataclasses import dataclass
@@ -25,13 +25,11 @@ TRANSLATIONS = GROUND, SHIFT, CODED = "ground", "shift", "as_coded"
 class Pictures:
     """The pictures of a run, and their detector.
 
-    `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid,
-    or the right one dashed). `translation` is how a frame is moved to the car's offset and
-    heading: by the ground's homography, or by shifting it, as in the paper's text or in its
-    authors' code. The folder `cache` keeps frames and detections; None: nothing is kept. With
-    `forget`, every picture is examined even if `cache` has its result. Results are the same
-    unless the detection code depends on time: such code must run with `forget` or without a
-    cache.
+    `frames` is a folder of user frames; None: a rendered road with these `marks` (both solid, or the right
+    one dashed). `translation` is how frames follow the car's offset and heading: by the ground's homography,
+    or by shifting, as in the paper's text or in its authors' code. The folder `cache` stores frames and
+    detections; None: nothing is stored. With `forget`, stored results are not used. Detection code that
+    depends on time needs `forget` or no cache; otherwise results are the same.
     """
 
     detector: str = PAPER
@@ -46,13 +44,13 @@ class RoadCamera(Protocol):
     """A camera of the simulator."""
 
     def look(self, truth: GroundTruth) -> CameraView:
-        """The view at this moment."""
+        """Return the view at this moment."""
         ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Vision:
-    """Camera and detector of one run; `description` goes into its record.
+    """Camera and detector of one run; `description` is for its record.
 
     `model` is the camera's geometry, for drawing the view if there are no pictures.
     """
@@ -64,9 +62,9 @@ class Vision:
 
 
 def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
-    """Camera and detector for a run on `road`.
+    """Return camera and detector for a run on `road`.
 
-    ConfigError for unusable frames, and for pictures of a road that is not straight.
+    Raises ConfigError for unusable frames, and for pictures of a road that is not straight.
     """
     if pictures is None:
         return Vision(camera=Camera(road), detector=IdealDetector(), description=None, model=CameraModel())
@@ -98,7 +96,7 @@ def build_vision(pictures: Pictures | None, road: Road, seed: int) -> Vision:
 
 
 def build_detector(name: str, model: CameraModel):
-    """The detector of this name in DETECTORS, for one run's pictures."""
+    """Return the named detector of DETECTORS for one run's pictures."""
     if name == PAPER:
         from selfdrive.visiond.compiled_paper import build_paper_detector
 

@@ -1,7 +1,7 @@
 /* Stands for: warp.py.
- * A region of a picture as OpenCV's warpPerspective (bilinear, border repeated, since 4.11) makes it as part of
- * the whole: matrix and places in single precision, products and sums fused. Where OpenCV calculates otherwise,
- * on a processor without such instructions for instance, the two differ, and this is not to be used. */
+ * Warps a region to the same bytes as OpenCV's warpPerspective (bilinear, border repeated, since 4.11) gives for
+ * the whole: matrix and positions in single precision, products and sums fused. This must not be used where OpenCV
+ * calculates differently, for example on a processor without such instructions. */
 
 #include <math.h>
 #include <stdint.h>
@@ -18,7 +18,7 @@ INLINE int32_t within(int32_t place, int32_t size)
     return place < 0 ? 0 : place < size ? place : size - 1;
 }
 
-/* The whole number at or below, as processors convert it: what no int holds is the least one. */
+/* Floor as processors convert it: a value that no int can hold becomes the smallest int. */
 INLINE int32_t floor_of(float value)
 {
     float whole = floorf(value);
@@ -32,7 +32,7 @@ INLINE uint8_t rounded(float level)
     return level >= 255.0f ? 255 : (uint8_t)rintf(level);
 }
 
-/* The level at a place in the picture, between four pixels. */
+/* Interpolate the level between four pixels of the picture. */
 INLINE uint8_t between(const Picture *picture, float across, float down)
 {
     int32_t column = floor_of(across), row = floor_of(down);
@@ -45,7 +45,8 @@ INLINE uint8_t between(const Picture *picture, float across, float down)
     return rounded(fmaf(low, bottom - top, top));
 }
 
-/* Columns `from` to `to` - 1 of a row; `m` leads from (column, row) to the picture, `start` is its part of row. */
+/* Warp columns `from` to `to` - 1 of a row; `m` maps (column, row) to the picture, and `start` is the row's part of
+ * the result. */
 INLINE void one_by_one(const Picture *picture, const float *m, const float *start, long from, long to, uint8_t *out)
 {
     for (long x = from; x < to; x++) {
@@ -63,7 +64,7 @@ static void plain(const Picture *picture, const float *m, const float *start, lo
 #if defined(__x86_64__)
 #include <immintrin.h>
 #define FAST __attribute__((target("avx2,fma")))
-#ifndef IS_FAST /* a test may ask for either */
+#ifndef IS_FAST /* a test may ask for either version */
 #define IS_FAST (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
 #endif
 
@@ -77,7 +78,7 @@ FAST static inline __m256i eight_within(__m256i places, int32_t size)
     return _mm256_max_epi32(_mm256_min_epi32(places, _mm256_set1_epi32(size - 1)), _mm256_setzero_si256());
 }
 
-/* Levels of eight pixels, wherever they are. Each is read with the three after it, or before it at the end. */
+/* Levels of eight pixels at any positions. Each is read with the three after it, or before it at the end. */
 FAST static inline __m256 eight_of(const Picture *picture, __m256i row, __m256i column)
 {
     __m256i place = _mm256_add_epi32(_mm256_mullo_epi32(row, _mm256_set1_epi32(picture->width)), column);
@@ -110,7 +111,7 @@ FAST static void fast(const Picture *picture, const float *m, const float *start
         __m256i inside = _mm256_and_si256(
             _mm256_and_si256(_mm256_cmpgt_epi32(column, none), _mm256_cmpgt_epi32(last, column)),
             _mm256_and_si256(_mm256_cmpgt_epi32(row, none), _mm256_cmpgt_epi32(end, place)));
-        /* Beyond some thousand rows the product of the place may not fit: then `inside` asks for the row, too. */
+        /* Beyond some thousand rows, the product for the position may overflow, so `inside` also tests the row. */
         inside = _mm256_and_si256(inside, _mm256_cmpgt_epi32(_mm256_set1_epi32(picture->rows - 1), row));
         __m256 here, beside, under, last_one;
         int32_t first = _mm256_extract_epi32(place, 0);
@@ -123,7 +124,7 @@ FAST static void fast(const Picture *picture, const float *m, const float *start
             __m256i lower = eight_within(_mm256_add_epi32(row, one), picture->rows);
             here = eight_of(picture, upper, left), beside = eight_of(picture, upper, next);
             under = eight_of(picture, lower, left), last_one = eight_of(picture, lower, next);
-        } else if (_mm256_testz_si256(far, far)) { /* all in sixteen pixels of two rows */
+        } else if (_mm256_testz_si256(far, far)) { /* all within sixteen pixels of two rows */
             __m256i packed = _mm256_shuffle_epi8(away, bytes);
             __m128i chosen = _mm_or_si128(_mm256_castsi256_si128(packed), _mm256_extracti128_si256(packed, 1));
             chosen = _mm_unpacklo_epi64(chosen, _mm_add_epi8(chosen, _mm_set1_epi8(1)));
@@ -163,7 +164,7 @@ WIDE static inline __m512 sixteen(__m128i levels)
     return _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(levels));
 }
 
-/* The same, sixteen columns at a time, where these lie within the picture, and within 63 pixels of two rows. */
+/* The same, sixteen columns at a time, if these lie within the picture and within 63 pixels of two rows. */
 WIDE static void wide(const Picture *picture, const float *m, const float *start, long from, long to, uint8_t *out)
 {
     const __m512i steps = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
@@ -184,7 +185,7 @@ WIDE static void wide(const Picture *picture, const float *m, const float *start
         __m512i place = _mm512_add_epi32(_mm512_mullo_epi32(row, width), column);
         int32_t first = _mm512_cvtsi512_si32(place);
         __m512i away = _mm512_sub_epi32(place, _mm512_set1_epi32(first));
-        __mmask16 near = _mm512_cmplt_epu32_mask(column, last); /* as unsigned numbers negative ones are large */
+        __mmask16 near = _mm512_cmplt_epu32_mask(column, last); /* unsigned, so negative numbers are large */
         near = _mm512_mask_cmplt_epu32_mask(near, row, last_row);
         near = _mm512_mask_cmplt_epu32_mask(near, away, _mm512_set1_epi32(63));
         if (near != 0xffff || first >= end) {
@@ -209,7 +210,7 @@ WIDE static void wide(const Picture *picture, const float *m, const float *start
 }
 #endif
 
-/* Rows `top` to `bottom` - 1, columns `left` to `right` - 1 of the warped picture, whose size is the picture's. */
+/* Rows `top` to `bottom` - 1 and columns `left` to `right` - 1 of the warped picture, which has the picture's size. */
 void warp(const uint8_t *pixels, long rows, long width, const double *matrix, long top, long bottom, long left,
           long right, uint8_t *out)
 {

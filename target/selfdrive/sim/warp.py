@@ -1,18 +1,18 @@
-"""A region of a picture, as OpenCV warps the whole."""
+"""Warps a region of a picture to the same bytes as OpenCV warps the whole picture."""
 
 import cv2
 import numpy as np
 
 from selfdrive.sim.picture import Region
 
-VECTOR = 64  # columns: of so many OpenCV calculates a row's pixels alike, however long the row is
+VECTOR = 64  # columns; a vector of this length in OpenCV, whatever the row's length
 
 
 def warp(source: np.ndarray, matrix: np.ndarray, region: Region) -> np.ndarray:
-    """The region of a picture as large as `source` (uint8), which shows at each place what `source` shows
-    where `matrix` (3 x 3) leads from there. Beyond its border `source` repeats its last pixels.
+    """Return the region of a picture of the size of `source` (uint8), in which each place shows `source` at
+    `matrix` (3 x 3) times that place. Outside `source`, its last pixels are repeated.
 
-    OpenCV gives the bits of the whole where rows are made from the first on, and whole vectors of columns.
+    To get the same bits as for the whole, rows start at column 0 and have whole vectors of columns.
     """
     columns = min(-(-region.right // VECTOR) * VECTOR, source.shape[1])
     seen = cv2.warpPerspective(

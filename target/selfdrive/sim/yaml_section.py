@@ -8,12 +8,12 @@ import yaml
 
 from selfdrive.common.errors import ConfigError
 
-# YAML 1.1 reads 060 as 48 and 1:30 as 90; here numbers must look like what they are.
+# YAML 1.1 reads 060 as 48 and 1:30 as 90; here only decimal numbers are allowed.
 _DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
 
 
 def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
-    """The mapping that a document consists of. ConfigError if it is not YAML, or not one mapping."""
+    """Return the mapping in a document. Raises ConfigError if it is not YAML or not a single mapping."""
     try:
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except (yaml.YAMLError, RecursionError) as error:
@@ -33,7 +33,7 @@ def read_yaml(text: str, where: str, keys: dict[str, str]) -> "Section":
 
 
 class Section:
-    """One mapping of the document. `keys` has the allowed keys with their meanings."""
+    """A mapping of the document. `keys` has the allowed keys with their meanings."""
 
     def __init__(self, node: yaml.Node, where: str, keys: dict[str, str]) -> None:
         self._where = where
@@ -56,7 +56,7 @@ class Section:
         return key in self._nodes
 
     def text(self, key: str, allowed: tuple[str, ...] = ()) -> str:
-        """A string, one of `allowed` if that is not empty."""
+        """Return a string, one of `allowed` unless that is empty."""
         node = self._node(key)
         good = isinstance(node, yaml.ScalarNode) and node.tag == "tag:yaml.org,2002:str" and node.value
         if not good or (allowed and node.value not in allowed):
@@ -65,17 +65,16 @@ class Section:
         return node.value
 
     def number(self, key: str, low: float, high: float, default: float | None = None) -> float:
-        """A finite number in `low`..`high`."""
         if default is not None and key not in self:
             return default
         return self._number(self._node(key), key, low, high)
 
     def numbers(self, key: str, low: float, high: float) -> tuple[float, ...]:
-        """A list of finite numbers in `low`..`high`, at least one."""
+        """Return a list of finite numbers in `low`..`high`, at least one."""
         return tuple(self._number(item, key, low, high) for item in self._items(key))
 
     def ascending(self, key: str, low: float, high: float) -> tuple[float, ...]:
-        """As `numbers`, in strictly ascending order."""
+        """Like `numbers`, in strictly ascending order."""
         values = self.numbers(key, low, high)
         for item, before, value in zip(self._items(key)[1:], values, values[1:], strict=False):
             if value <= before:
@@ -85,7 +84,7 @@ class Section:
         return values
 
     def quantity(self, name: str, units: tuple[str, ...]) -> str:
-        """The key that gives `name` in one of `units`; exactly one must be present."""
+        """Return the key that gives `name` in one of `units`; exactly one must be present."""
         found = [key for unit in units if (key := f"{name}_{unit}") in self]
         if len(found) != 1:
             names = [f"{name}_{unit}" for unit in units]
@@ -94,25 +93,21 @@ class Section:
         return found[0]
 
     def is_list(self, key: str) -> bool:
-        """Whether the key's value is a list."""
         return isinstance(self._node(key), yaml.SequenceNode)
 
     def section(self, key: str, keys: dict[str, str]) -> "Section":
-        """The mapping under `key`."""
         return Section(self._node(key), self._where, keys)
 
     def sections(self, key: str, keys: dict[str, str]) -> list["Section"]:
-        """The list of mappings under `key`."""
         return [Section(item, self._where, keys) for item in self._items(key)]
 
     def check(self, key: str, good: bool, expected: str, remedy: str) -> None:
-        """Reject the value of `key` unless it is `good`."""
         if not good:
             node = self._node(key)
             self._fail(node, f"{key}: {_shown(node)}", expected, remedy)
 
     def fail(self, got: str, expected: str, remedy: str) -> NoReturn:
-        """Raise ConfigError at the section's own line."""
+        """Raise ConfigError at the section's line."""
         raise ConfigError(got, where=self._where, line=self.line, expected=expected, remedy=remedy)
 
     def _node(self, key: str) -> yaml.Node:
@@ -140,7 +135,6 @@ class Section:
 
 
 def _shown(node: yaml.Node) -> str:
-    """The node's value for a message, shortened."""
     if isinstance(node, yaml.ScalarNode):
         return repr(node.value)[:60]
     return "a list" if isinstance(node, yaml.SequenceNode) else "a mapping"

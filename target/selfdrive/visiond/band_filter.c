@@ -1,20 +1,20 @@
 /* Stands for: band_filter.py.
- * The same operations in the same precision and, where they round, in the same order as in numpy and OpenCV, so the
- * same bits. */
+ * The same operations in the same precision as in numpy and OpenCV and, where they round, in the same order, for
+ * the same bits. */
 
 #include <math.h>
 #include <stdint.h>
 
 #define INLINE static inline __attribute__((always_inline))
 
-enum { NEAR = 5, EDGE = 8, REACH = 2 };       /* columns to the sides of one line and of two; a crest's neighbours */
+enum { NEAR = 5, EDGE = 8, REACH = 2 };       /* columns beside a single and a double line; a crest's neighbours */
 enum { AHEAD = 2, ASIDE = 4 };          /* half a speck's rows; half the columns of the widest mean */
-enum { WIDEST = 512 };                  /* columns of a road */
-enum { ACROSS = 51, ALONG = 9, AT_ONCE = 8 }; /* columns and rows of the texture; rows that are added up at once */
+enum { WIDEST = 512 };                  /* most columns of a road map */
+enum { ACROSS = 51, ALONG = 9, AT_ONCE = 8 }; /* columns and rows of the texture; rows summed at once */
 static const float DARK = 12.0f, LEAST = 0.006f, QUIET = 1.6f;
 
 typedef struct {
-    const uint8_t *road; /* rows x width; of the others those up to `sums` are rows x inner columns */
+    const uint8_t *road; /* rows x width; those below, up to `sums`, are rows x inner columns */
     int64_t rows, width;
     uint8_t *eroded, *opened; /* as large as the road */
     float *contrast, *rough;
@@ -26,13 +26,13 @@ typedef struct {
     float steepness;
 } Bands;
 
-/* The place in a row that OpenCV takes for one beyond its ends: mirrored, the last one once. */
+/* OpenCV's substitute for a position outside a row: mirrored at the last pixel. */
 INLINE long mirrored(long place, long size)
 {
     return place < 0 ? -place : place < size ? place : 2 * size - 2 - place;
 }
 
-/* The least level of the rows around, or the highest. */
+/* The lowest or highest level of the rows around. */
 INLINE void extreme(const uint8_t *restrict from, long rows, long width, int highest, uint8_t *restrict to)
 {
     for (long y = 0; y < rows; y++) {
@@ -48,7 +48,7 @@ INLINE void extreme(const uint8_t *restrict from, long rows, long width, int hig
     }
 }
 
-/* Means of three rows and of as many columns as road is compared with, or as a mark of one line or two is wide. */
+/* Means of three rows and of the columns used for comparison, or of a single or double line's width. */
 INLINE void means(const uint8_t *opened, long y, long rows, long width, float *restrict side, float *restrict one,
                   float *restrict two)
 {
@@ -92,7 +92,7 @@ INLINE void bands(const Bands *b)
     }
 }
 
-/* Running sums of roughness along rows: several rows at once, as a sum waits for the one before. */
+/* Running sums of roughness along rows, several rows at once, because each sum waits for the previous one. */
 INLINE void sums_of_rows(const Bands *b)
 {
     long inner = b->width - 2 * EDGE, wide = inner + ACROSS - 1;
@@ -124,7 +124,7 @@ INLINE void sums_of_rows(const Bands *b)
     }
 }
 
-/* Whether contrast is the highest of the columns around, as far as there are any. */
+/* Whether contrast is the highest of the surrounding columns. */
 INLINE int is_crest(const float *row, const float *sure, long x, long inner)
 {
     int highest = sure[x] > 0.0f;
@@ -133,7 +133,7 @@ INLINE int is_crest(const float *row, const float *sure, long x, long inner)
     return highest;
 }
 
-/* Numbers and weights of the points whose contrast is the highest around. */
+/* Numbers and weights of the points with the highest contrast. */
 INLINE long crests_of(const Bands *b)
 {
     long found = 0, inner = b->width - 2 * EDGE;
@@ -156,7 +156,7 @@ INLINE long crests_of(const Bands *b)
             column[x] = sum - leaves[x];
             sure[x] = (row[x] / (texture + LEAST) - QUIET) * b->steepness;
         }
-        int32_t crest[WIDEST + 1]; /* in pairs, as most are none */
+        int32_t crest[WIDEST + 1]; /* in pairs, because most are not crests */
         for (long x = REACH; x < inner - REACH; x++)
             crest[x] = (sure[x] > 0.0f) & (row[x] >= row[x - 2]) & (row[x] >= row[x - 1]) & (row[x] >= row[x + 1]) &
                        (row[x] >= row[x + 2]);
@@ -199,8 +199,8 @@ __attribute__((target("avx2"))) static long crests_fast(const Bands *b)
 }
 #endif
 
-/* Returns how many there are. There must be more rows than half of ALONG and more inner columns than half of ACROSS,
- * and room for AT_ONCE more rows of `sums` than the road has. */
+/* Returns the number of points. The map needs more rows than half of ALONG, more inner columns than half of ACROSS,
+ * and space for AT_ONCE more rows of `sums` than it has. */
 long crests(const Bands *b)
 {
 #if defined(__x86_64__) && !defined(PLAIN)

@@ -1,4 +1,4 @@
-"""Where the map of the road is brighter, in a band as wide as a mark, than on both sides of it."""
+"""Finds bright bands, as wide as lane marks, in the map of the road."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -6,23 +6,23 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-SINGLE = (3, 5)  # columns: of a mark, and from its middle to that of each side, so it may be 0.2 m wide
-DOUBLE = (9, 8)  # the same for two lines with a gap between, 0.3 m wide together
+SINGLE = (3, 5)  # columns: half width of a mark, and distance from its middle to the middle of each side
+DOUBLE = (9, 8)  # the same for a double line, 0.3 m wide in total
 EDGE = DOUBLE[1]
-SIDE = 5  # columns of road compared with, on each side
+SIDE = 5  # columns of road on each side for comparison
 ALONG = 3  # rows averaged
-SPECK = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop, not a mark
-NEIGHBOURHOOD = (51, 9)  # columns and rows in which texture is measured
-DARK = 12.0  # grey levels added to the road's brightness, so that noise in the dark is no contrast
-LEAST = 0.006  # contrast below which nothing is a mark, on the cleanest road
-QUIET, CLEAR = 1.6, 5.0  # response in units of the texture: below the first nothing, from the second on all
+SPECK = np.ones((5, 1), np.uint8)  # anything bright in fewer rows is a flake or a drop
+NEIGHBOURHOOD = (51, 9)  # columns and rows of the area in which texture is measured
+DARK = 12.0  # grey levels added to the road's brightness, so that noise in the dark has little contrast
+LEAST = 0.006  # lowest contrast of a mark, on the cleanest road
+QUIET, CLEAR = 1.6, 5.0  # response in units of the texture, at which certainty is 0 and 1
 STEEPNESS = 1.0 / (CLEAR - QUIET)
-STRONGEST = 1500  # points kept
+STRONGEST = 1500  # number of points kept
 ACROSS = np.ones((1, 5), np.uint8)
 
 
 class Points(NamedTuple):
-    """Where marks may be: row and column in the map, and how sure (0..1)."""
+    """Possible marks: row and column in the map, and certainty (0..1)."""
 
     row: np.ndarray
     column: np.ndarray
@@ -33,12 +33,12 @@ Crests = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers (row-major, without the edge columns) and weights of the points on crests of bright bands."""
+    """Numbers (row-major, without the edge columns) and weights of the crests of bright bands."""
     road = cv2.morphologyEx(road, cv2.MORPH_OPEN, SPECK)
     side, single, double = (_mean(road, columns) for columns in (SIDE, SINGLE[0], DOUBLE[0]))
     single = _inner(single)
     sides = _sides(side, SINGLE[1])
-    # Most results take the place of one that is not needed any more: new memory costs as much as the sums.
+    # Most results overwrite one that is no longer needed, because new memory costs as much as the sums.
     contrast = np.maximum(*sides)
     np.subtract(single, contrast, out=contrast)
     other = np.maximum(*_sides(side, DOUBLE[1]))
@@ -56,19 +56,18 @@ def crests(road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     sure = np.divide(contrast, texture, out=texture)
     sure -= np.float32(QUIET)
     sure *= np.float32(STEEPNESS)
-    # A crest is the highest of the five columns around.
+    # A crest is the highest of five columns around it.
     crest = (sure > 0.0) & (contrast >= cv2.dilate(contrast, ACROSS))
-    at = np.flatnonzero(crest)  # np.nonzero of two dimensions takes four times as long
+    at = np.flatnonzero(crest)  # np.nonzero in two dimensions takes four times as long
     return at, np.minimum(sure.ravel()[at], 1.0)
 
 
 def mark_points(road: np.ndarray, find: Crests = crests) -> Points:
-    """The crests of bright bands in `road`, a map (uint8, rows x columns) of the road."""
+    """Find the crests of bright bands in `road`, a map (uint8, rows x columns)."""
     return points_at(*strongest(*find(road)), road)
 
 
 def strongest(at: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers and weights of the points that are kept."""
     if len(at) > STRONGEST:
         keep = np.sort(np.argsort(weight, kind="stable")[-STRONGEST:])
         return at[keep], weight[keep]
@@ -76,7 +75,6 @@ def strongest(at: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def points_at(at: np.ndarray, weight: np.ndarray, road: np.ndarray) -> Points:
-    """The points with these numbers and weights in `road`."""
     row, column = np.divmod(at, road.shape[1] - 2 * EDGE)
     return Points(row, column + EDGE, weight)
 
@@ -86,11 +84,10 @@ def _mean(road: np.ndarray, columns: int) -> np.ndarray:
 
 
 def _inner(picture: np.ndarray) -> np.ndarray:
-    """Without the edge columns, which have no road beside them to compare with."""
     return picture[:, EDGE:-EDGE]
 
 
 def _sides(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
-    """The road to the left and to the right of each inner point."""
+    """The road to the left and right of each inner point."""
     end = side.shape[1]
     return side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]

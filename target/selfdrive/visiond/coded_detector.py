@@ -1,8 +1,8 @@
-"""The lane detector as the paper's authors coded it, which is more credulous than their text.
+"""The lane detector as the paper's authors coded it, which is less selective than their text.
 
-Each window with a mark stands for itself, edges of all of them are clustered through whatever links them, and
-the two clusters next to the picture's middle are the lane's lines, whatever they look like. The net is ours,
-as theirs is not published.
+Each window with a mark is used independently. Edges are clustered by linkage, and the two clusters next to
+the picture's middle are the lane's lines, whatever their shape. The net is ours, because theirs is not
+published.
 """
 
 from collections.abc import Sequence
@@ -22,29 +22,28 @@ from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine
 from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.lane_net import LaneNet
 
-WIDTH, ROWS = 640, 480  # px: of the pictures that all places below are meant for
+WIDTH, ROWS = 640, 480  # px, the size of pictures for all positions below
 FIRST_ROW, FIRST_COLUMN = 235, 90  # of the windows
 WINDOWS = 6, 29  # down, across
 SIZE = tuple((count - 1) * STRIDE + WINDOW for count in WINDOWS)  # px of the part that they cover
 PART = slice(FIRST_ROW, FIRST_ROW + SIZE[0]), slice(FIRST_COLUMN, FIRST_COLUMN + SIZE[1])
-THRESHOLD = 4.0  # log odds from which on a window has a mark; see coded_threshold
-STEEP = 4.0  # times the mean of the window's squared gradients: an edge
-LEAST_EDGES = 25  # px of a window that is looked at
-NEIGHBOURS = 5  # points that the clusters' radius is chosen to hold, were they spread evenly
+THRESHOLD = 4.0  # lowest log odds of a window with a mark; see coded_threshold
+STEEP = 4.0  # times the mean squared gradient of the window: an edge
+LEAST_EDGES = 25  # px, in a window that is used
+NEIGHBOURS = 5  # points within the clusters' radius if all were evenly spread
 LEAST_POINTS = 30  # of a cluster
-MIDDLE = 320  # column on whose sides the lane's lines are looked for
+MIDDLE = 320  # column that separates left and right lines
 ROW = 278  # where lines are read
-INWARD = 3  # px by which a line is read nearer to the middle
+INWARD = 3  # px by which a line is read closer to the middle
 METRES_PER_PIXEL = 0.024856
-MISSING = 0  # column in which a line without a cluster is taken to be
+MISSING = 0  # column of a line without a cluster
 
 
 class CodedDetector:
-    """Looks at pictures of 640 x 480 pixels; remembers where it last saw the lines.
+    """Examines pictures of 640 x 480 pixels and remembers where it last saw the lines.
 
-    It is sure of all that it says: lines are straight along the car, and its path never leaves the car's.
-    `calculated_by` tells which compiled code it calculates with, if any. Raises ConfigError for a camera with
-    pictures of another size.
+    It is always certain: lines are parallel to the car, and so is its path. `calculated_by` identifies the
+    compiled code in use, if any. Raises ConfigError for a camera with pictures of another size.
     """
 
     calculated_by = ""
@@ -62,13 +61,12 @@ class CodedDetector:
         self.state: tuple[float, ...] = (0.5 * LANE_WIDTH, -0.5 * LANE_WIDTH)  # y (m) of left and right line
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in `view.picture`. Where no edge is seen at all they stay where they were."""
+        """Return the lines in `view.picture`; without any edge, the last ones."""
         part = np.ascontiguousarray(view.picture[PART])
         points = self._points(part)
         return self._kept(_columns_of_lines(points) if points.size else None)
 
     def _kept(self, columns: Sequence[float] | None) -> LaneLines:
-        """The lines that are read in these columns; those seen last where there are none."""
         if columns:
             left, right = columns
             self.state = metres(left + INWARD), metres(right - INWARD)
@@ -76,8 +74,8 @@ class CodedDetector:
         return LaneLines(left=left, right=right, path=RoadLine(y=0.0))
 
     def _points(self, part: np.ndarray) -> np.ndarray:
-        """(row, column) in the picture of the edges in windows with a mark; an edge in several of them is
-        there as often."""
+        """(row, column) in the picture of edges in windows with a mark; an edge in several windows is
+        repeated."""
         edges = edges_in_windows(part)
         looked_at = np.flatnonzero(edges.sum(axis=(1, 2)) >= LEAST_EDGES)
         if not looked_at.size:
@@ -90,8 +88,8 @@ class CodedDetector:
 
 
 def edges_in_windows(part: np.ndarray) -> np.ndarray:
-    """Which pixels (windows, 32, 32) are edges in each window of the part: crests of the gradient down the
-    picture that are steep for their window, however faint."""
+    """Mark edge pixels (windows, 32, 32) in each window of the part: vertical crests of the gradient that are
+    steep for their window, however faint."""
     gradient = cv2.Sobel(part, cv2.CV_16S, 0, 1).astype(np.int32)
     power = gradient * gradient
     crest = np.zeros_like(power)
@@ -100,15 +98,15 @@ def edges_in_windows(part: np.ndarray) -> np.ndarray:
     down, across = (size // STRIDE for size in part.shape)
     tiles = power.reshape(down, STRIDE, across, STRIDE).sum(axis=(1, 3))
     sums = tiles[:-1, :-1] + tiles[1:, :-1] + tiles[:-1, 1:] + tiles[1:, 1:]
-    # Powers are whole numbers: they are above a limit when they are above its whole part.
+    # Powers are integers, so comparing with the limit's integer part is enough.
     limits = np.floor(STEEP / WINDOW**2 * sums).astype(np.int32)
     of_windows = np.lib.stride_tricks.sliding_window_view(crest, (WINDOW, WINDOW))[::STRIDE, ::STRIDE]
     return (of_windows > limits[:, :, np.newaxis, np.newaxis]).reshape(-1, WINDOW, WINDOW)
 
 
 def _columns_of_lines(points: np.ndarray) -> tuple[float, float]:
-    """In which columns the clusters of `points` (row, column) next to the middle cross the row where lines
-    are read, left and right of it."""
+    """Columns in which the clusters of `points` (row, column) next to the middle, left and right, cross the
+    row where lines are read."""
     places, counts = np.unique(points[:, 0] * WIDTH + points[:, 1], return_counts=True)
     pixels = np.column_stack(np.divmod(places, WIDTH))
     labels = _linked(pixels, _radius(points))
@@ -126,13 +124,13 @@ def _columns_of_lines(points: np.ndarray) -> tuple[float, float]:
 
 
 def _radius(points: np.ndarray) -> float:
-    """Of a circle that holds NEIGHBOURS of the points, were they spread evenly over the box around them."""
+    """Radius of a circle with NEIGHBOURS points, if all were evenly spread over their bounding box."""
     down, across = (points.max(axis=0) - points.min(axis=0)).tolist()
     return sqrt(down * across * NEIGHBOURS / (len(points) * pi))
 
 
 def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
-    """Cluster of each pixel: those are together that pixels lead to, none further away than the radius."""
+    """Cluster of each pixel: pixels are linked if they are not further apart than the radius."""
     one, other = cKDTree(pixels).query_pairs(radius, output_type="ndarray").T
     order, ends = np.argsort(one, kind="stable"), np.bincount(one, minlength=len(pixels)).cumsum()
     links = np.ones(len(one)), other[order], np.concatenate(([0], ends))
@@ -140,7 +138,7 @@ def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:
-    """The column in which the straight line through a cluster crosses the row where lines are read."""
+    """Column in which the line fitted to a cluster crosses the row where lines are read."""
     row, column = pixels.T.astype(float)
     weight = counts / counts.sum()
     mean_row, mean_column = dot(weight, row), dot(weight, column)
@@ -151,5 +149,5 @@ def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:
 
 
 def metres(column: float) -> float:
-    """How far (m, left positive) the road is to the side in a column of the row in which lines are read."""
+    """Lateral position (m, left positive) of the road in this column of the row where lines are read."""
     return (MIDDLE - column) * METRES_PER_PIXEL

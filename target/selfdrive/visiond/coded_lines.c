@@ -1,7 +1,7 @@
 /* Stands for: coded_detector.py, ../common/array_math.py, sums.h.
- * Edges in windows, their clusters, and where the lines of the two next to the middle are read: the numbers of the
- * Python to the bit. Edges and clusters are whole numbers; what is not is calculated by the same operations in the
- * same order, and sums are added up in numpy's. */
+ * Edges in windows, their clusters, and the columns of the two lines next to the middle: the same numbers as in
+ * Python to the bit. Edges and clusters are integers; everything else uses the same operations in the same order,
+ * and numpy's order of sums. */
 
 #include <math.h>
 #include <stdint.h>
@@ -12,19 +12,19 @@ enum { FIRST_ROW = 235, FIRST_COLUMN = 90, STEEP_SHIFT = 8 }; /* four times the 
 enum { LEAST_EDGES = 25, NEIGHBOURS = 5, LEAST_POINTS = 30, MIDDLE = 320, ROW = 278, MISSING = 0 };
 static const double PI = 3.141592653589793;
 
-/* What is made of a picture. */
+/* Data of one picture. */
 typedef struct {
     int32_t *power, *crest, *limits; /* of each pixel, pixel, window */
-    uint8_t *windows;                /* which have edges enough, then those with a mark */
-    uint8_t *counts;                 /* in how many windows a pixel is an edge */
+    uint8_t *windows;                /* those with enough edges, then those with a mark */
+    uint8_t *counts;                 /* number of windows in which each pixel is an edge */
     int32_t *column, *root;          /* of each edge */
-    int32_t *count;                  /* of each edge in its windows */
+    int32_t *count;                  /* number of windows of each edge */
     double *size, *mean;             /* of each cluster */
-    double *room;                    /* 5 for each pixel */
-    double lines[2];                 /* columns of the left line and the right one */
+    double *room;                    /* 5 per pixel */
+    double lines[2];                 /* columns of the left and right lines */
 } Coded;
 
-/* The square of the Sobel operator down the picture, mirrored at its outer pixels, and its crests. */
+/* Squares of the vertical Sobel operator, mirrored at the border, and their crests. */
 INLINE void crests(Coded *c, const uint8_t *restrict part)
 {
     int32_t *restrict power = c->power, *restrict crest = c->crest;
@@ -78,7 +78,7 @@ INLINE void edges(Coded *c, const uint8_t *part)
         }
 }
 
-/* In how many of the windows with a mark each pixel is an edge. */
+/* Count, for each pixel, the windows with a mark in which it is an edge. */
 INLINE void count_edges(Coded *c)
 {
     memset(c->counts, 0, ROWS * WIDTH);
@@ -109,8 +109,8 @@ INLINE void link(int32_t *root, int32_t one, int32_t other)
     root[x > y ? x : y] = x > y ? y : x;
 }
 
-/* Link the edges `from` to `to` - 1 of a row with those of another, `begin` to `end` - 1, up to `reach` columns away.
- * Of these the next to the left and to the right will do: whatever is further in their row is linked with them. */
+/* Link the edges `from` to `to` - 1 of a row with those of another row, `begin` to `end` - 1, up to `reach` columns
+ * away. Only the nearest to the left and right are needed, because those further away are linked with them. */
 INLINE void link_rows(const Coded *c, int32_t from, int32_t to, int32_t begin, int32_t end, int32_t reach)
 {
     int32_t other = begin;
@@ -125,7 +125,7 @@ INLINE void link_rows(const Coded *c, int32_t from, int32_t to, int32_t begin, i
     }
 }
 
-/* Clusters of edges, none further than `radius` from the next; `starts` are the rows' first edges. */
+/* Clusters of edges, linked up to a distance of `radius`; `starts` are the rows' first edges. */
 INLINE void clusters(const Coded *c, const int32_t *starts, double radius)
 {
     double square = radius * radius;
@@ -152,7 +152,7 @@ INLINE void clusters(const Coded *c, const int32_t *starts, double radius)
     }
 }
 
-/* The column in which the straight line through a cluster crosses the row where lines are read. */
+/* The column in which the line fitted to a cluster crosses the row where lines are read. */
 static double crossing(const Coded *c, const int32_t *starts, int32_t cluster)
 {
     enum { PIXELS = ROWS * WIDTH };
@@ -175,7 +175,7 @@ static double crossing(const Coded *c, const int32_t *starts, int32_t cluster)
     return mean_column + slope * ((double)ROW - mean_row);
 }
 
-/* Edges row by row, left to right, and the rows' first ones. Returns how often they are there, all windows counted. */
+/* List edges row by row, left to right, and the rows' first ones. Returns their number, summed over all windows. */
 INLINE long list_edges(Coded *c, int32_t *starts, double *box)
 {
     int32_t found = 0, left = WIDTH, right = 0, top = ROWS, bottom = 0;
@@ -213,7 +213,7 @@ INLINE long lines(Coded *c)
         return 0;
     clusters(c, starts, sqrt(box / ((double)all * PI)));
     int32_t edges = starts[ROWS];
-    for (int32_t k = 0; k < edges; k++) { /* a root is the first of its cluster */
+    for (int32_t k = 0; k < edges; k++) { /* the root is the first edge of its cluster */
         int32_t of = c->root[k] = root_of(c->root, k);
         if (of == k)
             c->size[k] = c->mean[k] = 0.0;
@@ -260,13 +260,13 @@ FAST static long lines_fast(Coded *c)
 #define CHOOSE(name, ...) name##_plain(__VA_ARGS__)
 #endif
 
-/* First step: edges of `part`, and the windows to be looked at. */
+/* First step: edges of `part`, and the windows to examine. */
 void take_edges(Coded *c, const uint8_t *part)
 {
     CHOOSE(edges, c, part);
 }
 
-/* Second: where lines through edges in windows with a mark are read. Returns 0 where there is no edge. */
+/* Second step: lines through edges in windows with a mark. Returns 0 if there is no edge. */
 long take_lines(Coded *c)
 {
     return CHOOSE(lines, c);

@@ -1,8 +1,8 @@
 """Finds the threshold of the detector as coded: `python -m selfdrive.visiond.coded_threshold`.
 
-Uses only clean pictures of the road: no effect, no fault, no hazard. A threshold qualifies if at most ALLOWED
-of the windows inside the lane are taken for marks, and if the fewest pictures have a line that is read more
-than OFF away. The middle of the qualifying ones is used.
+Uses only clean pictures of the road. A threshold qualifies if at most ALLOWED of the windows inside the lane
+are classified as marks, and if the fewest pictures have a line that is more than OFF away. The middle of the
+qualifying ones is used.
 """
 
 from collections.abc import Sequence
@@ -23,11 +23,11 @@ OFF = 0.3  # m
 TRIED = [0.25 * k for k in range(33)]  # log odds
 SEED, PICTURES = 0, 200
 OFFSET = 0.2  # m, standard deviation of the car's position
-BESIDE = 0.3  # m: a nearer window may show some of the line
+BESIDE = 0.3  # m; a nearer window may show part of the line
 
 
 def thresholds() -> list[tuple[float, float, float]]:
-    """Threshold, share of marked windows inside the lane, share of pictures with a line off."""
+    """Threshold, share of windows inside the lane classified as marks, share of pictures with a line off."""
     chance = np.random.default_rng(SEED)
     road = RoadRenderer(CameraModel(), SOLID, int(chance.integers(2**31)), periods=66)
     offsets = chance.normal(0.0, OFFSET, PICTURES).tolist()
@@ -37,7 +37,6 @@ def thresholds() -> list[tuple[float, float, float]]:
 
 
 def _inside(road: RoadRenderer, picture: np.ndarray, offset: float) -> np.ndarray:
-    """Scores of the windows wholly between the lane's lines."""
     model = road.model
     part = np.ascontiguousarray(picture[coded.PART])
     scores = LaneNet.load().score(windows(Hog(*part.shape).blocks(part)).reshape(-1, FEATURES))
@@ -54,7 +53,6 @@ def _inside(road: RoadRenderer, picture: np.ndarray, offset: float) -> np.ndarra
 def _off(
     road: RoadRenderer, threshold: float, pictures: Sequence[np.ndarray], offsets: Sequence[float]
 ) -> float:
-    """Share of the pictures in which a line is read elsewhere than on the detector's own scale."""
     detector, off = coded.CodedDetector(road.model, threshold), 0
     for picture, offset in zip(pictures, offsets, strict=True):
         there = {"left_lane_y": 0.0, "right_lane_y": 0.0, "path_y": 0.0, "bend": (), "lead_d_rel": 0.0}
@@ -66,7 +64,6 @@ def _off(
 
 
 def main() -> None:
-    """Print the effect of each threshold, and the one to use."""
     cv2.setNumThreads(1)
     found = thresholds()
     for threshold, marked, off in found:

@@ -1,4 +1,4 @@
-"""The detector as coded, with compiled C arithmetic if available: the same lines to the bit."""
+"""The detector as coded, in compiled C if available: the same lines to the bit."""
 
 import ctypes
 from pathlib import Path
@@ -37,7 +37,6 @@ class _Coded(ctypes.Structure):
 
 
 def build_coded_detector(model: CameraModel) -> CodedDetector:
-    """The detector, compiled if available and enabled."""
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
     if None in libraries or not adds_up_alike(libraries[0]):
         return CodedDetector(model)
@@ -45,7 +44,7 @@ def build_coded_detector(model: CameraModel) -> CodedDetector:
 
 
 class CompiledCodedDetector(CodedDetector):
-    """Same as CodedDetector: `lines` is compiled `coded_lines.c`, `windows` compiled `mark_windows.c`."""
+    """CodedDetector with `lines`, compiled `coded_lines.c`, and `windows`, compiled `mark_windows.c`."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
@@ -59,9 +58,8 @@ class CompiledCodedDetector(CodedDetector):
         self._take_lines.argtypes, self._take_lines.restype = [ctypes.c_void_p], ctypes.c_long
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in `view.picture`, as CodedDetector sees them."""
         part = np.ascontiguousarray(view.picture[PART])
-        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault may change a picture this way
+        if part.dtype != np.uint8 or part.shape != SIZE:  # a fault may change a picture like this
             return super().detect(view)
         address = part.ctypes.data
         self._take_edges(self._at, address)

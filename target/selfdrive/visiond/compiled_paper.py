@@ -1,4 +1,4 @@
-"""The paper's lane detector, with compiled C arithmetic if available: the same lines to the bit."""
+"""The paper's lane detector, in compiled C if available: the same lines to the bit."""
 
 import ctypes
 from math import cos, tan
@@ -19,7 +19,7 @@ from selfdrive.visiond.paper_detector import EPS, THRESHOLD, PaperDetector, lane
 from selfdrive.visiond.road_region import RoadRegion
 
 C_SOURCE = Path(__file__).with_name("mark_lines.c")
-EXACT = 2**24  # smaller integers are exact in single precision, whatever the order of a sum
+EXACT = 2**24  # smaller integers, and sums of them, are exact in single precision
 NONE = 2**31 - 1
 
 
@@ -50,7 +50,6 @@ class _Paper(ctypes.Structure):
 
 
 def build_paper_detector(model: CameraModel) -> PaperDetector:
-    """The detector, compiled if available and enabled."""
     libraries = [compiled.library(source) for source in (C_SOURCE, compiled_windows.C_SOURCE)]
     if None in libraries or not adds_up_alike(libraries[0]):
         return PaperDetector(model)
@@ -58,7 +57,7 @@ def build_paper_detector(model: CameraModel) -> PaperDetector:
 
 
 class CompiledPaperDetector(PaperDetector):
-    """Same as PaperDetector: `lines` is compiled `mark_lines.c`, `windows` compiled `mark_windows.c`."""
+    """PaperDetector with `lines`, compiled `mark_lines.c`, and `windows`, compiled `mark_windows.c`."""
 
     def __init__(self, model: CameraModel, lines: compiled.Library, windows: compiled.Library) -> None:
         super().__init__(model)
@@ -94,9 +93,8 @@ class CompiledPaperDetector(PaperDetector):
             function.argtypes, function.restype = [ctypes.c_void_p] * count, None
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in `view.picture`, as PaperDetector sees them."""
         part = np.ascontiguousarray(view.picture[self._region.part])
-        if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault may do that to a picture
+        if part.dtype != np.uint8 or part.shape != self._region.shape:  # a fault may cause this
             return super().detect(view)
         address, sums = part.ctypes.data, self._arrays["sums"]
         self._take_gradients(self._at, address)
@@ -112,7 +110,6 @@ class CompiledPaperDetector(PaperDetector):
 
 
 def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
-    """C's inputs and outputs for pictures of that part of the road."""
     rows, width = region.shape
     tiles, size = (rows // STRIDE, width // STRIDE), rows * width
     return {
@@ -135,6 +132,5 @@ def _rooms(region: RoadRegion, scale: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _points(region: RoadRegion) -> list[np.ndarray]:
-    """Space for all pixels of that part as points."""
     size = region.shape[0] * region.shape[1] + 1
     return [np.zeros(size) for _ in range(3)] + [np.zeros(size, np.uint8)]

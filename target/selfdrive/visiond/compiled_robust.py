@@ -1,4 +1,4 @@
-"""The geometric lane detector, with compiled C arithmetic if available: the same lines to the bit."""
+"""The geometric lane detector, in compiled C if available: the same lines to the bit."""
 
 import ctypes
 from functools import cache
@@ -16,13 +16,12 @@ from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.robust_detector import RobustDetector
 from selfdrive.visiond.voting import BIN, SIDEWAYS, Belief, Pose, vote
 
-CANDIDATES = 512  # possible meeting points of lines, MOST in the C file
+CANDIDATES = 512  # for the lines' meeting point; MOST in the C file
 AT_ONCE = 8  # rows, of the C file
 C_SOURCES = [Path(__file__).with_name(name) for name in ("band_filter.c", "voting.c", "road_view.c")]
 
 
 def build_robust_detector(model: CameraModel) -> RobustDetector:
-    """The detector, compiled if available and enabled."""
     libraries = [compiled.library(source) for source in C_SOURCES]
     if None in libraries:
         return RobustDetector(model)
@@ -49,7 +48,7 @@ class _Bands(ctypes.Structure):
 
 
 class CompiledCrests:
-    """Same as `crests` for maps of that shape, with `library`, compiled `band_filter.c`."""
+    """`crests` for maps of that shape, with `library`, compiled `band_filter.c`."""
 
     def __init__(self, library: compiled.Library, shape: tuple[int, int]) -> None:
         self._crests = library.code.crests
@@ -73,8 +72,7 @@ class CompiledCrests:
         self._address = ctypes.addressof(self._bands)
 
     def __call__(self, road: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Numbers and weights of the points."""
-        if road.shape != self._shape or road.dtype != np.uint8:  # a fault may change a picture this way
+        if road.shape != self._shape or road.dtype != np.uint8:  # a fault may change a picture like this
             return crests(road)
         road = np.ascontiguousarray(road)
         self._bands.road = road.ctypes.data
@@ -84,7 +82,7 @@ class CompiledCrests:
 
 @cache
 def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether maps have OpenCV's bits: another version may interpolate differently."""
+    """Whether maps have OpenCV's bits; other versions may interpolate differently."""
     shape = model.rows, model.width
     noise = (
         (np.arange(model.rows * model.width, dtype=np.uint32) * 40503 >> 7).astype(np.uint8).reshape(shape)
@@ -94,7 +92,7 @@ def maps_alike(library: compiled.Library, model: CameraModel) -> bool:
 
 @cache
 def finds_alike(library: compiled.Library) -> bool:
-    """Whether crests have the bits of OpenCV's means: another version may add in another order."""
+    """Whether crests have the bits of OpenCV's means; other versions may add in a different order."""
     number = np.arange(48 * 260)
     road = (60 + number * 40503 % 65521 % 61 + 12 * (number % 260 % 37 < 3)).astype(np.uint8).reshape(48, 260)
     found, wanted = CompiledCrests(library, road.shape)(road), crests(road)
@@ -113,7 +111,7 @@ class _Map(ctypes.Structure):
 
 
 class CompiledVote:
-    """Same as `vote` for maps of `view`, with `library`, compiled `voting.c`."""
+    """`vote` for maps of `view`, with `library`, compiled `voting.c`."""
 
     def __init__(self, library: compiled.Library, view: RoadView) -> None:
         pointer, number = ctypes.c_void_p, ctypes.c_long
@@ -135,9 +133,8 @@ class CompiledVote:
     def __call__(
         self, view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief
     ) -> Pose:
-        """The lines from points and belief."""
         if road.shape != self._shape or road.dtype != np.uint8 or not road.flags.c_contiguous:
-            return vote(view, road, at, weight, belief)  # a fault may change a picture this way
+            return vote(view, road, at, weight, belief)  # a fault may change a picture like this
         at, weight = np.ascontiguousarray(at, np.int64), np.ascontiguousarray(weight, np.float32)
         self._belief[:] = [*belief.left, *belief.dip, *belief.middle, *belief.width]
         points = at.ctypes.data, weight.ctypes.data, len(at)
@@ -150,7 +147,7 @@ class CompiledVote:
 
 @cache
 def votes_alike(library: compiled.Library, model: CameraModel) -> bool:
-    """Whether votes have the bits of OpenCV's filters: another version may add in another order."""
+    """Whether votes have the bits of OpenCV's filters; other versions may add in a different order."""
     view = RoadView(model)
     number = np.arange(400)
     road = (np.arange(len(view.drop) * len(view.y)) % 251).astype(np.uint8).reshape(len(view.drop), -1)

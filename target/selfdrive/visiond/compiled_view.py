@@ -31,7 +31,7 @@ class _View(ctypes.Structure):
 
 
 class CompiledRoadView(RoadView):
-    """Same as RoadView, with `library`, compiled `road_view.c`."""
+    """RoadView with `library`, compiled `road_view.c`."""
 
     def __init__(self, model: CameraModel, library: compiled.Library) -> None:
         super().__init__(model)
@@ -63,7 +63,7 @@ class CompiledRoadView(RoadView):
 
 
 def _places(columns: np.ndarray, parts: np.ndarray, width: int) -> np.ndarray:
-    """The position of each map point in its row, as in the C file; points outside are at the ends."""
+    """Position of each map point in its row, as in the C file; points outside are at the ends."""
     place = (columns[:, :, 0].astype(np.int32) << 5) + parts
     place = np.clip(place, 0, (width - 1) << 5)
     column = np.minimum(place >> 5, width - 2)

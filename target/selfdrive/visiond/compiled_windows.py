@@ -1,4 +1,4 @@
-"""Decides in C which windows of a picture hold a lane mark, as Hog and LaneNet do."""
+"""Finds windows with a lane mark in compiled C, like Hog and LaneNet."""
 
 import ctypes
 from pathlib import Path
@@ -11,8 +11,8 @@ from selfdrive.visiond.hog import BINS, BLOCK_FEATURES, CELL, FEATURES
 from selfdrive.visiond.lane_net import FEATURE_STEPS, HIDDEN, WEIGHT_STEPS, LaneNet
 
 C_SOURCE = Path(__file__).with_name("mark_windows.c")
-FINEST = 2**13  # maximum steps in 1 of a weight in the first of two scores
-PADDED = 1776  # summed steps of a window: features, and zeros up to whole vectors
+FINEST = 2**13  # most weight steps per 1 in the first of two scores
+PADDED = 1776  # number of a window's features, padded to whole vectors
 
 
 class _Net(ctypes.Structure):
@@ -50,7 +50,7 @@ class MarkWindows:
             "power": np.zeros((down, across), np.float32),
             "blocks": np.zeros((down - 1, across - 1, BLOCK_FEATURES), np.int16),
         }
-        self.blocks = self._arrays["blocks"]  # of examined windows of the last picture, in steps
+        self.blocks = self._arrays["blocks"]  # of the windows examined last, in steps
         pointers = {name: array.ctypes.data for name, array in self._arrays.items()}
         self._net = _Net(
             rows=rows,
@@ -67,18 +67,18 @@ class MarkWindows:
         self._at = ctypes.addressof(self._net)
 
     def decide(self, part: int, windows: int) -> bool:
-        """Clear those of the windows (bool, at the address `windows`) that have no mark.
+        """Clear the windows (bool, at the address `windows`) that have no mark.
 
-        `part` is the address of the picture (uint8). False if the Python code must decide.
+        `part` is the address of the picture (uint8). Returns False if the Python code must decide.
         """
         return bool(self._which(self._at, part, windows))
 
 
 def _coarse_steps(net: LaneNet) -> float:
-    """The largest number of steps in 1 of a weight for which weights fit into 16 bits and all sums into 32.
+    """Largest number of steps per 1 for which weights fit into 16 bits and all sums into 32.
 
-    Features are not negative, and a block's have a length of at most 1: its part of a sum is at most the
-    length of its positive, or negative, weights.
+    Features are not negative and a block's norm is at most 1, so its part of a sum is at most the norm of its
+    positive, or negative, weights.
     """
     blocks = net.hidden.T.reshape(HIDDEN, -1, BLOCK_FEATURES).astype(float)
     signs = [np.maximum(part, 0.0) for part in (blocks, -blocks)]

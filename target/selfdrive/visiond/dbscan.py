@@ -1,8 +1,8 @@
-"""DBSCAN (M. Ester and others, 1996) on the pixels of a mask, exact and quick.
+"""DBSCAN (M. Ester and others, 1996) on the pixels of a mask, exact and fast.
 
-The distance is the larger of the two between rows and columns (Chebyshev). A pixel's neighbours then are
-those of a square, so a box filter counts them. Two core pixels are neighbours exactly if the eps x eps
-squares that begin at each touch or overlap: clusters are the connected components of a mask of such squares.
+The distance is the larger of rows and columns (Chebyshev), so neighbours form a square and a box filter
+counts them. Two core pixels are neighbours exactly if their eps x eps squares touch or overlap, so clusters
+are the connected components of a mask of such squares.
 """
 
 import cv2
@@ -14,11 +14,11 @@ _NONE = 65535
 
 
 def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: int) -> np.ndarray:
-    """Cluster (0, 1, ...) of each of some pixels of a picture of that shape, NOISE for outliers.
+    """Return the cluster (0, 1, ...) of each pixel, or NOISE for outliers.
 
-    `points` are their numbers in row-major order, ascending. A core pixel has at least `min_samples` of them,
-    itself included, no further than `eps` pixels away. Clusters are numbered, and pixels at the edge of
-    several given to one, as scikit-learn does.
+    `points` are row-major numbers of pixels in a picture of that shape, ascending. A core pixel has at least
+    `min_samples` of them, itself included, within `eps` pixels. The numbering of clusters, and the choice for
+    pixels at the edge of several, are scikit-learn's.
     """
     mask = _marked(points, shape)
     square = np.ones((2 * eps + 1, 2 * eps + 1), np.uint8)
@@ -35,7 +35,7 @@ def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: in
         return found.astype(np.intp)
     numbered = np.full(shape, _NONE, np.uint16)
     numbered.ravel()[cores] = found
-    around = cv2.erode(numbered, square).take(points)  # the first cluster with a core pixel near enough
+    around = cv2.erode(numbered, square).take(points)  # the first cluster with a core pixel in range
     around[is_core] = found
     found = around.astype(np.intp)
     found[found == _NONE] = NOISE
@@ -43,16 +43,15 @@ def dbscan(points: np.ndarray, shape: tuple[int, int], eps: int, min_samples: in
 
 
 def _marked(points: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Mask (uint8) with ones at these pixels."""
     mask = np.zeros(shape, np.uint8)
     mask.ravel()[points] = 1
     return mask
 
 
 def _order(labels: np.ndarray, count: int) -> np.ndarray:
-    """Number of each of `count` components by the first of the core pixels with these labels; uint16."""
+    """Rank `count` components by the first of the core pixels with these labels; uint16."""
     first = np.empty(count, np.intp)
-    first[labels[::-1]] = np.arange(labels.size)[::-1]  # of equal ones the last assignment counts
+    first[labels[::-1]] = np.arange(labels.size)[::-1]  # the last assignment wins
     order = np.empty(count, np.uint16)
     order[0] = _NONE  # the background
     order[1 + np.argsort(first[1:], kind="stable")] = np.arange(count - 1, dtype=np.uint16)

@@ -10,7 +10,7 @@ LANE_WIDTH = 3.7  # m
 class RoadLine(NamedTuple):
     """A line ahead of the car: `y` (m, left positive) at the car, then y + slope * x + bend[x].
 
-    `prob` is 0 if the line was not seen; `y` and `slope` are then the expected ones.
+    If the line was not seen, `prob` is 0, and `y` and `slope` are the expected ones.
     """
 
     y: float
@@ -28,18 +28,17 @@ class LaneLines(NamedTuple):
 
 
 class LaneDetector(Protocol):
-    """Finds the lane's lines in the camera's view, 20 times a second."""
+    """Finds the lane's lines in the camera's view, at 20 Hz."""
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in this view. A detector may remember only earlier views of the same run."""
+        """Return the lines in this view. A detector may remember only earlier views of the same run."""
         ...
 
 
 class IdealDetector:
-    """Knows the view's geometry with certainty: for runs without pictures."""
+    """Reads the view's geometry, in runs without pictures."""
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The true lines."""
         return LaneLines(
             left=RoadLine(y=view.left_lane_y, bend=view.bend),
             right=RoadLine(y=view.right_lane_y, bend=view.bend),
@@ -54,7 +53,6 @@ class MirroredDetector:
         self._detector = detector
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in this view."""
         return LaneLines(*(_mirrored(line) for line in self._detector.detect(view)))
 
 
@@ -64,7 +62,7 @@ def _mirrored(line: RoadLine) -> RoadLine:
 
 
 def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> RoadLine:
-    """The lane centre: between two lines, or half a `width` (m) from the one that is seen.
+    """The lane centre: between two lines, or half a `width` (m) from a single one.
 
     If none is seen, the path goes straight ahead.
     """
@@ -84,7 +82,7 @@ def path_between(left: RoadLine, right: RoadLine, width: float = LANE_WIDTH) -> 
 
 
 def points(y: float, line: RoadLine) -> tuple[float, ...]:
-    """A message's 50 points (m, a metre apart) of `line`, passing the car at `y`."""
+    """A message's 50 points (m, 1 m apart) of `line`, which passes the car at `y`."""
     if line.bend is not None:
         return tuple([y + bend for bend in line.bend])
     slope = line.slope

@@ -1,4 +1,4 @@
-"""Straight lines through clusters of edges, and which of them bound the lane."""
+"""Fits straight lines to clusters of edges and selects those that bound the lane."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -10,22 +10,22 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.visiond.detector import RoadLine
 from selfdrive.visiond.road_region import RoadRegion
 
-MIN_PIXELS = 24  # of a cluster, or a line, that is looked at
-MIN_SPREAD = 3.0  # standard deviation of the rows it covers
-MAX_SLOPE = 0.15  # a line that leads further from the car's heading is none of its lane's
-BESIDE = 8.0  # m ahead: where it is decided which line is nearest
-CROWD = 0.8  # m beyond the nearest line there is no other one: the one with more edges counts
-TRIES = 8  # clusters on each side that are looked at, from the nearest
-REACHES = 0.3, 0.2  # m: how far from a line edges belong to it, each time it is fitted
-LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and as many out of it
+MIN_PIXELS = 24  # in a cluster, or a line, that is used
+MIN_SPREAD = 3.0  # standard deviation of its rows
+MAX_SLOPE = 0.15  # lines that diverge more from the car's heading are not its lane's
+BESIDE = 8.0  # m ahead, where the nearest line is determined
+CROWD = 0.8  # m; of lines this close, the one with more edges is used
+TRIES = 8  # clusters examined on each side, from the nearest
+REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
+LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and at least as many out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
 SHARP = 0.05  # m, standard deviation of the edges on one side of a strip of paint
-SURE_PIXELS = 80.0  # edge pixels of a line about which there is no doubt
-SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges from it that halves its probability
+SURE_PIXELS = 80.0  # edge pixels of a line with full certainty
+SURE_SPREAD = 0.25  # m: root mean square distance of a line's edges at which its probability is half
 
 
 class Points(NamedTuple):
-    """Edge pixels: row and column in the picture, whether the picture gets brighter there, m to the pixel."""
+    """Edge pixels: row and column in the picture, whether the picture gets brighter there, m per pixel."""
 
     row: np.ndarray
     column: np.ndarray
@@ -33,14 +33,13 @@ class Points(NamedTuple):
     scale: np.ndarray
 
     def some(self, chosen: np.ndarray) -> "Points":
-        """Those with these indices."""
         return Points(*[part.take(chosen) for part in self])
 
 
 class EdgeLines:
-    """Fits lines in the region of one camera's pictures, and tells where on the road they are.
+    """Fits lines in the region of one camera's pictures, in road coordinates.
 
-    `scale` is m to the pixel in each row of the region.
+    `scale` is m per pixel in each row of the region.
     """
 
     def __init__(self, model: CameraModel, region: RoadRegion) -> None:
@@ -52,9 +51,9 @@ class EdgeLines:
     def nearest(
         self, at: np.ndarray, rising: np.ndarray, labels: np.ndarray
     ) -> tuple[RoadLine | None, RoadLine | None]:
-        """The lines next to the car, left and right, of the edges at the pixels `at` (numbers, row-major).
+        """The lines next to the car, left and right, among the edges at the pixels `at` (row-major numbers).
 
-        For each of them `rising` tells whether the picture gets brighter there, `labels` the cluster.
+        For each of them, `rising` is whether the picture gets brighter there, `labels` is the cluster.
         """
         clustered = labels >= 0
         if not clustered.any():
@@ -75,7 +74,6 @@ class EdgeLines:
         return sides[0], sides[1]
 
     def _points(self, at: np.ndarray, rising: np.ndarray) -> Points:
-        """The pixels with these numbers."""
         region = self._region
         row = at // region.shape[1]
         column = at - row * region.shape[1]
@@ -87,7 +85,7 @@ class EdgeLines:
         )
 
     def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
-        """The line of the first of the clusters (m away, a, b) that is one, or a better one close to it."""
+        """The first valid line of the clusters (m away, a, b), or a better one close to it."""
         best, first, most, where = None, 0.0, 0, 0.0
         for away, a, b in clusters:
             if best is not None and (away > first + CROWD or away < where + REACHES[0]):
@@ -99,7 +97,7 @@ class EdgeLines:
         return best
 
     def _line(self, a: float, b: float, points: Points) -> tuple[RoadLine | None, int]:
-        """The line through all edges about column = a * row + b, and their number.
+        """The line through all edges near column = a * row + b, and their number.
 
         None if they are not those of a mark.
         """
@@ -120,7 +118,7 @@ class EdgeLines:
 
 
 def _away(points: Points, a: float, b: float) -> np.ndarray:
-    """How far (m) points are to the right of the line column = a * row + b."""
+    """Distance (m) of points to the right of the line column = a * row + b."""
     away = points.column - a * points.row
     away -= b
     away *= points.scale
@@ -128,11 +126,11 @@ def _away(points: Points, a: float, b: float) -> np.ndarray:
 
 
 def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
-    """Whether the picture gets brighter left of the middle of the line, and darker right of it.
+    """Whether the picture gets brighter left of the line's middle, and darker right of it.
 
-    `away` (m, right positive) is how far each edge is from the middle. A shadow's edge does only one of the
-    two, a dark seam does them the other way round. A seam beside the paint adds edges of its own, and its
-    far edge is left out: what is left must then be as sharp as paint's.
+    `away` (m, right positive) is each edge's distance from the middle. A shadow's edge does only one of the
+    two; a dark seam is the reverse. The far edge of a seam beside the paint is left out; the rest must be as
+    sharp as paint.
     """
     brighter, darker = away[rising], away[~rising]
     least = LEAST_SHARE * away.size
@@ -151,7 +149,6 @@ def _is_mark(away: np.ndarray, rising: np.ndarray) -> bool:
 
 
 def _is_paint(brighter: np.ndarray, darker: np.ndarray) -> bool:
-    """Whether what lies between both kinds of edges is as wide as paint."""
     width = float(darker.sum()) / darker.size - float(brighter.sum()) / brighter.size
     return MARK_WIDTHS[0] <= width <= MARK_WIDTHS[1]
 
@@ -168,7 +165,7 @@ def _fit_one(row: np.ndarray, column: np.ndarray) -> tuple[float, float, float]:
 def _fit(
     row: np.ndarray, column: np.ndarray, label: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """For each cluster: pixels, and what `_fit_one` finds."""
+    """For each cluster: number of pixels, and the result of `_fit_one`."""
     size = np.bincount(label)
     mean_row, mean_column = (np.bincount(label, value) / size for value in (row, column))
     down, across = row - mean_row.take(label), column - mean_column.take(label)

@@ -3,8 +3,8 @@
 TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the
 lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x
 480, the frame scaled to 640 and moved vertically until its vanishing row is 200. The first word of a key
-(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml as for runs. A new detector
-examines every frame, without history.
+(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml. Every frame is examined by a
+new detector, without history.
 """
 
 import argparse
@@ -49,7 +49,7 @@ def _canonical_model(focal: float, height: float) -> CameraModel:
 
 
 UDACITY = _canonical_model(focal=579.0, height=1.21)  # lines 3.7 m apart diverge by 3.05 px per row
-TUSIMPLE = _canonical_model(focal=500.0, height=1.68)  # 2.2 px a row
+TUSIMPLE = _canonical_model(focal=500.0, height=1.68)  # 2.2 px per row
 SOURCES = {
     "p1": Source(vanishing_row=318, rows=540, model=UDACITY),
     "vid": Source(vanishing_row=318, rows=540, model=UDACITY),
@@ -61,7 +61,7 @@ SOURCES = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Frame:
-    """A frame to examine: colour and grey in the canonical frame, and its lines' true columns in row 278."""
+    """A frame to examine, in colour in the canonical frame, and its lines' true columns in row 278."""
 
     key: str
     colour: np.ndarray
@@ -86,7 +86,6 @@ class Finding:
 
     @property
     def good(self) -> bool:
-        """Whether both lines were found, close enough."""
         limit = TOLERANCE * (self.frame.right - self.frame.left)
         return all(error is not None and abs(error) <= limit for error in (self.left, self.right))
 
@@ -101,7 +100,7 @@ def canonical(colour: np.ndarray, source: Source) -> np.ndarray:
 
 
 def read_frames(folder: Path, truth: Path) -> list[Frame]:
-    """The frames that the truth file names. ConfigError if one is missing or unreadable."""
+    """Read the frames that the truth file names. Raises ConfigError if one is missing or unreadable."""
     images = [path for path in sorted(folder.rglob("*")) if path.suffix.lower() in IMAGES]
     own = _source_of(camera_of(folder)) if (folder / CALIBRATION).exists() else None
     frames = []
@@ -128,7 +127,6 @@ def read_frames(folder: Path, truth: Path) -> list[Frame]:
 
 
 def evaluate(detector: str, frames: list[Frame]) -> list[Finding]:
-    """The result of `detector` for each frame, without history."""
     return [look(build(detector, frame.model), frame, frame.grey) for frame in frames]
 
 
@@ -144,12 +142,11 @@ def look(detector: LaneDetector, frame: Frame, picture: np.ndarray) -> Finding:
 
 
 def build(name: str, model: CameraModel) -> PaperDetector | RobustDetector:
-    """A new detector of that name for pictures of a camera."""
     return PaperDetector(model) if name == PAPER else RobustDetector(model)
 
 
 def report(detector: str, findings: list[Finding]) -> str:
-    """The table of errors, and the share of frames in which both lines were found closely enough."""
+    """The table of errors, and the share of frames in which both lines were found."""
     rows = [f"{detector}: errors in row {ROW} (px), limit {TOLERANCE:.4f} of the spacing"]
     for finding in findings:
         frame = finding.frame
@@ -178,7 +175,6 @@ def draw(finding: Finding) -> np.ndarray:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     cv2.setNumThreads(1)
     try:
@@ -195,7 +191,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _source_of(model: CameraModel) -> Source:
-    """The source for frames from a camera of this model."""
     scale = WIDTH / model.width
     fy = model.fy * scale
     seen = CameraModel(
@@ -228,7 +223,7 @@ def _read_truth(path: Path) -> dict:
 
 
 def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
-    """Columns of both lines in row 278: from the lines if there are any, else from their centres."""
+    """Columns of both lines in row 278, from the lines if available, else from their centres."""
     try:
         if entry.get("L") and entry.get("R"):
             left, right = (entry[side][0] * ROW + entry[side][1] for side in "LR")
@@ -249,9 +244,9 @@ def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
 
 
 def _image(key: str, images: list[Path], folder: Path) -> Path:
-    """The key's file: `KEY.jpg`, or without the key's first word. ConfigError if it is missing.
+    """The key's file: `KEY.jpg`, or without the key's first word. Raises ConfigError if it is missing.
 
-    Among files of equal name, the one in a folder named by the key's first word is used.
+    Of several files, the one in a folder named by the key's first word is used.
     """
     camera, _, name = key.partition("_")
     named = [path for path in images if path.stem == key] or [path for path in images if path.stem == name]

@@ -1,8 +1,7 @@
 """Histograms of oriented gradients (N. Dalal and B. Triggs, 2005), for a whole picture at once.
 
-Cells of 4 x 4 pixels, nine unsigned orientations, blocks of 2 x 2 cells, L2 normalised; each pixel votes
-with its gradient's length for the one orientation it falls into. Detection windows of 32 x 32 pixels share
-their cells and blocks, so these are computed once.
+Cells of 4 x 4 pixels, nine unsigned orientations, blocks of 2 x 2 cells, L2 normalised; each pixel's gradient
+votes with its length for one orientation. Detection windows of 32 x 32 pixels share cells and blocks.
 """
 
 from dataclasses import dataclass
@@ -14,34 +13,34 @@ import numpy as np
 CELL = 4  # pixels
 BINS = 9
 WINDOW = 32  # pixels
-STRIDE = 16  # pixels from window to window
+STRIDE = 16  # pixels between windows
 WINDOW_BLOCKS = WINDOW // CELL - 1  # blocks of 2 x 2 cells in a window, each way
 BLOCK_FEATURES = 4 * BINS
 FEATURES = WINDOW_BLOCKS * WINDOW_BLOCKS * BLOCK_FEATURES
 
-_TINY = 1e-10  # keeps the norm of an empty block from zero
-_STEPS = 511  # differences of two grey levels: -255 .. 255
+_TINY = 1e-10  # prevents division by zero in empty blocks
+_STEPS = 511  # possible differences of two grey levels, -255..255
 _CODE = np.array(
     [[0, -_STEPS, 0], [-1, 0, 1], [0, _STEPS, 0]], np.float32
-)  # all sums exact in single precision
+)  # all sums are exact in single precision
 
 
 @dataclass(frozen=True, slots=True)
 class _Tables:
     """Orientation and length of every possible gradient, at (dy + 255) * 511 + dx + 255."""
 
-    orientation: np.ndarray  # uint8: a table of bytes stays in the processor's cache
+    orientation: np.ndarray  # uint8, so that the table fits into the processor's cache
     length: np.ndarray  # divided by the pixels of a cell, so that a cell's sum is its mean
 
 
 def _tables() -> _Tables:
-    """Calculated for a quarter of the gradients, to the right and down; the others are its mirror images."""
+    """Calculated for a quarter of the gradients and mirrored."""
     step = np.arange(_STEPS // 2 + 1)
     dx, dy = step[np.newaxis, :], step[:, np.newaxis]
     angle = np.array([[atan2(y, x) for x in range(_STEPS // 2 + 1)] for y in range(_STEPS // 2 + 1)])
     orientation = (angle * (BINS / pi)).astype(np.uint8)
     mirrored = BINS - 1 - orientation
-    mirrored[0] = 0  # along a row left is right, as orientations have no sign
+    mirrored[0] = 0  # for a horizontal gradient, left equals right, because orientations are unsigned
     down = np.hstack((mirrored[:, :0:-1], orientation))
     length = np.sqrt(dx * dx + dy * dy) / CELL**2
     length = np.hstack((length[:, :0:-1], length))
@@ -49,10 +48,10 @@ def _tables() -> _Tables:
 
 
 class Hog:
-    """Computes the blocks of pictures of one size, whose sides are multiples of a cell's.
+    """Computes the blocks of pictures of one size, a multiple of a cell's.
 
-    Its memory is used again for each picture: to get it anew each time takes as long as to calculate.
-    `calculated_by` tells apart what calculates the same in another way.
+    Memory is reused, because allocating it takes as long as the calculation. `calculated_by` identifies the
+    implementation.
     """
 
     calculated_by = ""
@@ -68,7 +67,8 @@ class Hog:
         self._blocks = np.empty((self._cells[0] - 1, self._cells[1] - 1, 2, 2 * BINS), np.float32)
 
     def blocks(self, picture: np.ndarray) -> np.ndarray:
-        """Normalised blocks (rows, columns, 36), float32, of a uint8 picture, until the next call."""
+        """Return normalised blocks (rows, columns, 36), float32, of a uint8 picture; the next call overwrites
+        them."""
         cells = self._votes(picture)
         power = (cells * cells).sum(axis=2)
         power = power[:-1] + power[1:]
@@ -77,23 +77,21 @@ class Hog:
         return self._blocks.reshape(*scale.shape, BLOCK_FEATURES)
 
     def _votes(self, picture: np.ndarray) -> np.ndarray:
-        """What the pixels of each cell vote for each orientation (rows, columns, 9), float32."""
         self._code[...] = _gradient_codes(picture)
-        code = self._code.ravel()  # all inside the tables: "wrap" only saves a copy
+        code = self._code.ravel()  # all in range: "wrap" only saves a copy
         bins = np.add(self._tables.orientation.take(code), self._first_bin, out=self._bins)
         lengths = self._tables.length.take(code, out=self._lengths, mode="wrap")
         votes = np.bincount(bins, lengths, self._cells[0] * self._cells[1] * BINS)
         return votes.astype(np.float32).reshape(*self._cells, BINS)
 
     def _scaled(self, cells: np.ndarray, scale: np.ndarray) -> None:
-        """Write the blocks' four cells each, multiplied by the block's scale."""
         down, right, one = cells.strides
         pairs = np.lib.stride_tricks.as_strided(cells, (*scale.shape, 2, 2 * BINS), (down, right, down, one))
         np.multiply(pairs, scale[:, :, np.newaxis, np.newaxis], out=self._blocks)
 
 
 def windows(blocks: np.ndarray) -> np.ndarray:
-    """View (rows, columns, 7, 252) of the windows in `blocks`: a window's seven rows of seven blocks each."""
+    """View (rows, columns, 7, 252) of the windows in `blocks`: per window, seven rows of seven blocks."""
     step = STRIDE // CELL
     rows, columns = ((size - WINDOW_BLOCKS) // step + 1 for size in blocks.shape[:2])
     down, right, one = blocks.strides
@@ -106,5 +104,5 @@ def windows(blocks: np.ndarray) -> np.ndarray:
 
 
 def _gradient_codes(picture: np.ndarray) -> np.ndarray:
-    """Index of each pixel's gradient (central differences, 0 across the border) in the tables, float32."""
+    """Index of each pixel's gradient (central differences, 0 at the border) in the tables, float32."""
     return cv2.filter2D(picture, cv2.CV_32F, _CODE, delta=_STEPS**2 // 2, borderType=cv2.BORDER_REFLECT_101)

@@ -1,4 +1,4 @@
-"""The neural net that tells windows with a lane mark from those without: one hidden layer of ten nodes."""
+"""The neural net that recognises windows with a lane mark: one hidden layer of ten nodes."""
 
 from math import tanh
 from pathlib import Path
@@ -9,14 +9,14 @@ from selfdrive.common.array_math import each
 
 WEIGHTS = Path(__file__).with_name("lane_net.npz")
 HIDDEN = 10
-FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # in 1: of what a window shows, and of what it counts
-AT_ONCE = 32  # windows: memory for more is got anew from the system each time, which takes longer than sums
+FEATURE_STEPS, WEIGHT_STEPS = 2**12, 2**20  # per 1, of features and weights
+AT_ONCE = 32  # windows; allocating more memory each time takes longer than the sums
 
 
 class LaneNet:
     """Weights `hidden` (features x 10), `hidden_bias` (10), `out` (10) and `out_bias` (1), float32.
 
-    `whole` has those of `hidden` in whole steps, float64.
+    `whole` is `hidden` in integer steps, as float64.
     """
 
     def __init__(
@@ -28,7 +28,7 @@ class LaneNet:
 
     @classmethod
     def load(cls, path: Path = WEIGHTS) -> "LaneNet":
-        """The net that `python -m selfdrive.visiond.train` wrote."""
+        """Load a net that `python -m selfdrive.visiond.train` wrote."""
         with np.load(path) as stored:
             return cls(stored["hidden"], stored["hidden_bias"], stored["out"], stored["out_bias"])
 
@@ -43,10 +43,10 @@ class LaneNet:
         )
 
     def score(self, features: np.ndarray) -> np.ndarray:
-        """Log odds that there is a mark, for `features` (windows, features) in float32.
+        """Log odds of a mark, for `features` (windows, features) in float32.
 
-        Features and weights are rounded to whole numbers of steps, so that a double holds each sum exactly:
-        then it does not matter in which order a processor adds.
+        Features and weights are rounded to integer steps, so that doubles hold each sum exactly and the order
+        of additions does not matter.
         """
         steps = np.empty((len(features), self.whole.shape[1]))
         for k in range(0, len(features), AT_ONCE):

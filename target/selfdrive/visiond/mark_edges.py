@@ -1,18 +1,19 @@
-"""Edges of lane marks: the Sobel operator across the picture, and which tiles of it hold a mark."""
+"""Edges of lane marks: the horizontal Sobel operator, and the tiles of a picture that have a mark."""
 
 import cv2
 import numpy as np
 
 from selfdrive.visiond.hog import STRIDE
 
-RATIO = 1.6  # how much steeper than its surroundings' root mean square an edge is
-FLOOR = 40.0  # of the Sobel sum, whose weights come to 4: less is grain, however even the surroundings
+RATIO = 1.6  # steepness of an edge, relative to the root mean square of its surroundings
+FLOOR = 40.0  # of the Sobel sum, whose weights add up to 4; anything less is grain
 
 
 def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
-    """16 x 16 pixel tiles (bool) that at least `need` of the marked windows cover.
+    """Return 16 x 16 pixel tiles (bool) that at least `need` of the marked windows cover.
 
-    `marked` (bool) has the windows' rows and columns; a tile inside the picture's part lies in four of them.
+    `marked` (bool) has the windows' rows and columns; a tile in the inner part of the picture lies in four
+    windows.
     """
     rows, columns = marked.shape
     cover = np.zeros((rows + 1, columns + 1), np.uint8)
@@ -23,23 +24,21 @@ def tiles_with_mark(marked: np.ndarray, need: int) -> np.ndarray:
 
 
 def windows_on(tiles: np.ndarray) -> np.ndarray:
-    """Windows (rows x columns, bool) that cover any of these tiles (bool)."""
+    """Return the windows (rows x columns, bool) that cover any of these tiles (bool)."""
     down = tiles[:-1] | tiles[1:]
     return down[:, :-1] | down[:, 1:]
 
 
 def tile_numbers(rows: int, width: int) -> np.ndarray:
-    """Of each pixel, in row-major order, the number of its tile."""
     row, column = np.ogrid[:rows, :width]
     return (row // STRIDE * (width // STRIDE) + column // STRIDE).astype(np.uint16).ravel()
 
 
 def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Steep edges in `part` (uint8, its sides multiples of a tile's), and which of them get brighter.
+    """Find steep edges in `part` (uint8, sides are multiples of a tile's), and which of them get brighter.
 
-    Steep is relative to the root mean square of the tiles around, so light and haze do not matter. The first
-    are the numbers of the pixels, in row-major order; the second has a bool for each: to its right the
-    picture is brighter.
+    Steepness is relative to the root mean square of nearby tiles, so light and haze do not matter. Returns
+    row-major pixel numbers, and for each a bool: the picture is brighter on its right.
     """
     rows, width = part.shape
     gradient = cv2.Sobel(part, cv2.CV_32F, 1, 0, ksize=3)
@@ -52,5 +51,5 @@ def edges(part: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def limits(power: np.ndarray) -> np.ndarray:
-    """Squared gradients above which edges in each tile are steep, given the tiles' mean ones (float32)."""
+    """Squared gradients above which edges are steep, for each tile, from the tiles' mean ones (float32)."""
     return np.maximum(RATIO**2 * cv2.blur(power, (3, 3)), FLOOR**2)

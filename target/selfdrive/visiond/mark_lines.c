@@ -1,7 +1,7 @@
 /* Stands for: mark_edges.py, dbscan.py, edge_lines.py, paper_detector.py, ../common/array_math.py, ../common/camera_model.py, sums.h.
- * Edges of a picture, their clusters, and the lines next to the car: the numbers of the Python to the bit. Pixels
- * and clusters are whole numbers; what is not is calculated by the same operations in the same order, and sums
- * are added up in numpy's. */
+ * Edges of a picture, their clusters, and the lines next to the car: the same numbers as in Python to the bit.
+ * Pixels and clusters are integers; everything else uses the same operations in the same order, and numpy's order
+ * of sums. */
 
 #include <math.h>
 #include <stdint.h>
@@ -15,36 +15,36 @@ static const double MIN_SPREAD = 3.0, MAX_SLOPE = 0.15, BESIDE = 8.0, CROWD = 0.
 static const double LEAST_SHARE = 0.12, THINNEST = 0.03, WIDEST = 0.45, SHARP = 0.05, SURE_PIXELS = 80.0;
 static const double SURE_SPREAD = 0.25;
 
-/* Edge pixels on the road: place in the picture, m to the pixel, whether it gets brighter to the right. */
+/* Edge pixels on the road: position in the picture, m per pixel, whether it gets brighter to the right. */
 typedef struct {
     double *row, *column, *scale;
     uint8_t *rising;
 } Points;
 
-/* Pictures of one size and the camera that takes them, and room for what is made of one. */
+/* Pictures of one size, their camera, and memory for one picture's data. */
 typedef struct {
     int64_t rows, width, first_row, first_column;
     double cx, horizon, cos_pitch, tan_pitch, fx, fy, height, fx_cos;
-    const double *scale; /* m to the pixel, of each row */
-    const uint8_t *windows; /* which are on the road */
-    int16_t *gradient;      /* across the picture */
-    int32_t *sums;          /* of the squared gradients in each tile */
-    float *limits;          /* of those that are steep */
+    const double *scale; /* m per pixel, per row */
+    const uint8_t *windows; /* those on the road */
+    int16_t *gradient;      /* horizontal */
+    int32_t *sums;          /* of squared gradients, per tile */
+    float *limits;          /* of steep squared gradients */
     uint8_t *looked_at;     /* windows with steep edges, then those with a mark */
     int32_t *at, *label;    /* of each edge: pixel and cluster */
-    uint8_t *mask;          /* rows + 8, width + 8; then one for each row */
+    uint8_t *mask;          /* rows + 8, width + 8; then one per row */
     uint8_t *crowd;         /* rows, width */
     int32_t *number;        /* rows, width: cluster of a core pixel */
-    int32_t *run;           /* 4 for each run of pixels: first and last column, row, root */
+    int32_t *run;           /* 4 per run of pixels: first and last column, row, root */
     int32_t *named;         /* cluster of each run */
-    double *sum;            /* 5 for each cluster: pixels, mean row and column, and two sums of squares */
-    double *room;           /* 5 for each pixel */
+    double *sum;            /* 5 per cluster: pixels, mean row and column, and two sums of squares */
+    double *room;           /* 5 per pixel */
     Points all, own;
     int64_t count;          /* edges */
     double lines[2][4];     /* left and right: 1 if there is one, y, slope, probability */
 } Paper;
 
-/* The Sobel operator; tile sums of its squares. The picture is mirrored at its outer pixels. */
+/* The Sobel operator, and tile sums of its squares. The picture is mirrored at its border. */
 INLINE void sobel(Paper *p, const uint8_t *restrict part)
 {
     long rows = p->rows, width = p->width, tiles = width / STRIDE;
@@ -69,7 +69,7 @@ INLINE void sobel(Paper *p, const uint8_t *restrict part)
     }
 }
 
-/* The largest whole number whose square is not above the limit. */
+/* The largest integer whose square is not above the limit. */
 INLINE int16_t root_of(float limit)
 {
     int32_t root = (int32_t)sqrtf(limit);
@@ -80,7 +80,7 @@ INLINE int16_t root_of(float limit)
     return root > INT16_MAX ? INT16_MAX : (int16_t)root;
 }
 
-/* Pixels above the limit of their tile, in order, and the windows on the road that see one. */
+/* Pixels above the limit of their tile, in order, and the windows on the road that contain one. */
 INLINE void steep(Paper *p)
 {
     long width = p->width, tiles = width / STRIDE, down = p->rows / STRIDE - 1, across = tiles - 1, count = 0;
@@ -117,7 +117,7 @@ INLINE void steep(Paper *p)
     p->count = count;
 }
 
-/* Leave out the edges in tiles that too few windows with a mark cover. */
+/* Remove the edges in tiles that too few windows with a mark cover. */
 INLINE void in_marks(Paper *p)
 {
     long width = p->width, tiles = width / STRIDE, down = p->rows / STRIDE - 1, across = tiles - 1, count = 0;
@@ -139,7 +139,7 @@ INLINE void in_marks(Paper *p)
     p->count = count;
 }
 
-/* How many edges the square around each pixel has; only in rows with edges. */
+/* Number of edges in the square around each pixel; only for rows with edges. */
 INLINE void crowds(Paper *p, const uint8_t *has_edges)
 {
     long width = p->width, step = width + 2 * EPS;
@@ -173,7 +173,7 @@ INLINE int32_t root(int32_t *run, int32_t k)
     return k;
 }
 
-/* Runs of core pixels in a row, none further than EPS from the next, are linked with those of the rows above. */
+/* Link runs of core pixels in a row, at most EPS apart, with those of the rows above. */
 static int32_t linked_runs(Paper *p)
 {
     long width = p->width;
@@ -195,7 +195,7 @@ static int32_t linked_runs(Paper *p)
         int32_t other = begin;
         while (other > 0 && run[4 * (other - 1) + 2] >= row - EPS)
             other--;
-        for (int32_t upper = other; upper < begin;) { /* a row above after the other */
+        for (int32_t upper = other; upper < begin;) { /* the rows above, one by one */
             int32_t above = run[4 * upper + 2], here = begin;
             while (upper < begin && run[4 * upper + 2] == above && here < count) {
                 int32_t *a = run + 4 * upper, *b = run + 4 * here;
@@ -215,7 +215,7 @@ static int32_t linked_runs(Paper *p)
     return count;
 }
 
-/* The first cluster with a core pixel no further than EPS from a pixel; -1 if there is none. */
+/* The first cluster with a core pixel within EPS of a pixel; -1 if there is none. */
 INLINE int32_t nearest_cluster(const Paper *p, int32_t at)
 {
     long y = at / p->width, x = at - y * p->width;
@@ -228,8 +228,8 @@ INLINE int32_t nearest_cluster(const Paper *p, int32_t at)
     return first == NONE ? -1 : first;
 }
 
-/* DBSCAN: the cluster of each edge, -1 for outliers. Clusters are numbered by their first core pixel, and a pixel
- * at the edge of several is given to the first. Returns how many there are. */
+/* DBSCAN: the cluster of each edge, -1 for outliers. Clusters are numbered by their first core pixel, and a pixel at
+ * the edge of several belongs to the first. Returns their number. */
 INLINE int32_t clusters(Paper *p)
 {
     long width = p->width, step = width + 2 * EPS;
@@ -248,7 +248,7 @@ INLINE int32_t clusters(Paper *p)
     }
     for (long k = 0; k < p->count; k++) {
         int32_t at = p->at[k], y = (int32_t)(at / width), x = (int32_t)(at - y * width);
-        p->mask[(y + EPS) * step + EPS + x] = 0; /* as it was */
+        p->mask[(y + EPS) * step + EPS + x] = 0; /* restored */
         p->label[k] = -1;
         if (p->crowd[at] < MIN_SAMPLES)
             continue;
@@ -333,7 +333,7 @@ static int is_mark(const double *away, const uint8_t *rising, long count, double
     return is_sharp_paint(some, kept, darker, down, least, more);
 }
 
-/* The line through all edges about column = a * row + b: 1, y, slope, probability. Returns their number, or 0. */
+/* The line through all edges near column = a * row + b: 1, y, slope, probability. Returns their number, or 0. */
 static long line_about(Paper *p, double a, double b, long all, double *line)
 {
     const Points *from = &p->all;
@@ -376,7 +376,7 @@ static long line_about(Paper *p, double a, double b, long all, double *line)
     return count;
 }
 
-/* Edges in clusters, as points on the road; sums of each cluster. Returns how many. */
+/* Edges in clusters, as points on the road, and sums of each cluster. Returns the number of points. */
 INLINE long points_of(Paper *p, int32_t found)
 {
     long count = 0, y = 0, end = p->width;
@@ -406,7 +406,7 @@ INLINE long points_of(Paper *p, int32_t found)
     return count;
 }
 
-/* The clusters on one side of the car, from the nearest on: m away, a, b of each. Returns how many. */
+/* The clusters on one side of the car, from the nearest: m away, a, b of each. Returns their number. */
 INLINE int nearest_on(const Paper *p, double side, int32_t found, double near[TRIES][3])
 {
     int count = 0;
@@ -498,7 +498,7 @@ void take_gradients(Paper *p, const uint8_t *part)
     CHOOSE(sobel, p, part);
 }
 
-/* Second: edges above the `limits`, and the windows to be looked at. */
+/* Second: edges above the `limits`, and the windows to examine. */
 void take_edges(Paper *p)
 {
     CHOOSE(steep, p);

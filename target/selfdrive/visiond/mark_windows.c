@@ -1,8 +1,8 @@
 /* Stands for: hog.py, lane_net.py.
- * Which windows of a picture hold a lane mark. The features are the Python's to the bit, as whole numbers of
+ * Finds windows of a picture with a lane mark. The features are the same as in Python to the bit, as integer
  * steps: the same operations in the same order, a cell's votes added in double precision, pixel by pixel. The
- * net's score is not, but its sign is: a coarse one decides where it is further from the threshold than it can be
- * wrong, else one whose sums are exact; where even that is too close, the Python is asked to decide. */
+ * net's score is not, but its sign is: a coarse score decides if it is further from the threshold than its largest
+ * error, else a score with exact sums; if even that is too close, Python decides. */
 
 #include <math.h>
 #include <stdint.h>
@@ -12,18 +12,18 @@
 
 enum { CELL = 4, BINS = 9, STRIDE = 16, WINDOW = 32, BLOCK = 4 * BINS, ACROSS = 7, ROW = ACROSS * BLOCK };
 enum { FEATURES = ACROSS * ROW, PADDED = 1776, HIDDEN = 10, LANES = 16 };
-enum { STEPS = 4096 };                 /* in 1, of a feature */
-static const double WHOLE = 1048576.0; /* in 1, of a weight */
+enum { STEPS = 4096 };                 /* per 1, of a feature */
+static const double WHOLE = 1048576.0; /* per 1, of a weight */
 static const float TINY = 1e-10f;
-static const double CLOSE = 1e-9; /* far more than the rounding of a sum of ten products can do */
+static const double CLOSE = 1e-9; /* much larger than the rounding error of a sum of ten products */
 static const float TANH_ERROR = 2e-4f;
 
-/* What is the same for all pictures of one size. `coarse` are the weights by node, rounded to 1 / `coarse_steps`;
- * `out_size` the sum of the sizes of `out`. */
+/* Data for all pictures of one size. `coarse` has the weights by node, rounded to 1 / `coarse_steps`; `out_size` is
+ * the sum of the absolute values of `out`. */
 typedef struct {
     int64_t rows, width;
     double threshold;
-    const double *lengths; /* of gradients, by their squares, divided by the pixels of a cell */
+    const double *lengths; /* of gradients by their squares, divided by the pixels of a cell */
     const int16_t *coarse;
     const double *whole;
     const float *bias, *out;
@@ -35,8 +35,8 @@ typedef struct {
     int16_t *blocks; /* rows / 4 - 1, width / 4 - 1, 36 */
 } Net;
 
-/* The square of a gradient's length, and into which of nine bins it falls: between which of the directions of 20,
- * 40, 60 and 80 degrees and their mirror images. */
+/* The square of a gradient's length and its bin, of nine, which are separated by the directions of 20, 40, 60 and 80
+ * degrees and their mirror images. */
 INLINE void gradient(int32_t dx, int32_t dy, int32_t *square, int32_t *bin)
 {
     float across = (float)(dx < 0 ? -dx : dx), down = (float)(dy < 0 ? -dy : dy);
@@ -47,7 +47,7 @@ INLINE void gradient(int32_t dx, int32_t dy, int32_t *square, int32_t *bin)
     *square = dx * dx + dy * dy;
 }
 
-/* Those of columns `from` to `to` - 1 of a row. A picture is mirrored at its outer pixels. */
+/* The gradients of columns `from` to `to` - 1 of a row. The picture is mirrored at its border. */
 INLINE void gradients(const uint8_t *above, const uint8_t *row, const uint8_t *below, long width, long from, long to,
                       int32_t *restrict square, int32_t *restrict bin)
 {
@@ -60,7 +60,7 @@ INLINE void gradients(const uint8_t *above, const uint8_t *row, const uint8_t *b
         gradient(0, below[width - 1] - above[width - 1], square + width - 1 - from, bin + width - 1 - from);
 }
 
-/* Votes of the cells of a row of tiles, from the tile `first` to `end` - 1. */
+/* Votes of the cells of a row of tiles, from tile `first` to `end` - 1. */
 INLINE void votes(const Net *net, const uint8_t *picture, long tile_row, long first, long end)
 {
     long width = net->width, from = first * STRIDE, to = end * STRIDE, count = (to - from) / CELL;
@@ -73,7 +73,7 @@ INLINE void votes(const Net *net, const uint8_t *picture, long tile_row, long fi
             const uint8_t *row = picture + y * width;
             int inner = y > 0 && y < net->rows - 1;
             gradients(inner ? row - width : row, row, inner ? row + width : row, width, from, to, squares, bins);
-            /* Within a cell from left to right; one cell after the other, so that no sum waits for the last. */
+            /* Within a cell from left to right, but cell by cell, so that no sum waits for the previous one. */
             for (long k = 0; k < CELL; k++)
                 for (long cell = 0; cell < count; cell++)
                     sums[cell * BINS + bins[cell * CELL + k]] += lengths[squares[cell * CELL + k]];
@@ -102,7 +102,7 @@ INLINE void blocks(const Net *net, long y, long first, long end)
         for (long lower = 0; lower < 2; lower++) {
             const float *pair = net->cells + ((y + lower) * right + x) * BINS;
             for (long k = 0; k < 2 * BINS; k++) {
-                /* Rounded to the nearest, halves to even: beyond 2^23 a float has no fraction left. */
+                /* Rounded to nearest, halves to even: beyond 2^23 a float has no fraction. */
                 union { float number; int32_t bits; } whole = {(pair[k] * scale) * (float)STEPS + 12582912.0f};
                 out[lower * 2 * BINS + k] = (int16_t)(whole.bits - 0x4b400000);
             }
@@ -110,7 +110,7 @@ INLINE void blocks(const Net *net, long y, long first, long end)
     }
 }
 
-/* tanh, wrong by less than TANH_ERROR: the continued fraction of Lambert, up to where it has come close to 1. */
+/* tanh with an error below TANH_ERROR: Lambert's continued fraction, as far as it is close to 1. */
 INLINE float about_tanh(float x)
 {
     x = x > 4.9f ? 4.9f : x < -4.9f ? -4.9f : x;
@@ -119,7 +119,7 @@ INLINE float about_tanh(float x)
     return upper / (135135.0f + square * (62370.0f + square * (3150.0f + square * 28.0f)));
 }
 
-/* The score of a window's steps, and by how much it may be wrong. */
+/* The score of a window's steps and its largest error. */
 INLINE float coarse_score(const Net *net, const int16_t *steps, float *error)
 {
     float sums[LANES] = {0}, score = net->out_bias;
@@ -137,12 +137,12 @@ INLINE float coarse_score(const Net *net, const int16_t *steps, float *error)
         sums[node] = about_tanh(sums[node] / (STEPS * net->coarse_steps) + net->bias[node]);
     for (long node = 0; node < HIDDEN; node++)
         score += sums[node] * net->out[node];
-    /* Each weight is wrong by half a step at most, and tanh never makes an error larger. */
+    /* Each weight is off by at most half a step, and tanh never enlarges an error. */
     *error = net->out_size * ((float)all / STEPS * (0.5f / net->coarse_steps) + TANH_ERROR);
     return score;
 }
 
-/* The score with the sums of the Python, which a double holds exactly. */
+/* The score with Python's sums, which are exact in double precision. */
 INLINE double exact_score(const Net *net, const int16_t *steps)
 {
     double sums[HIDDEN] = {0}, score = 0.0;
@@ -154,7 +154,7 @@ INLINE double exact_score(const Net *net, const int16_t *steps)
     return score + (double)net->out_bias;
 }
 
-/* Whether any of the up to four windows that may hold a tile is looked at. */
+/* Whether any of the (up to four) windows that contain a tile is examined. */
 INLINE int needed(const uint8_t *windows, long down, long across, long y, long x)
 {
     for (long row = y > 0 ? y - 1 : 0; row <= y && row < down; row++)
@@ -164,7 +164,7 @@ INLINE int needed(const uint8_t *windows, long down, long across, long y, long x
     return 0;
 }
 
-/* The end of the run of tiles from column x on that are needed; x if that one is not. */
+/* The end of the run of needed tiles from column x on; x if that tile is not needed. */
 INLINE long run_end(const uint8_t *windows, long down, long across, long y, long x)
 {
     while (x <= across && needed(windows, down, across, y, x))
@@ -183,7 +183,7 @@ INLINE long marked(const Net *net, const uint8_t *picture, uint8_t *windows)
             if (end > x)
                 votes(net, picture, y, x, end);
         }
-    /* What a block at the end of a run takes from beyond it is of no account: no window has that block. */
+    /* A block at the end of a run may use invalid values beyond it, because no window has that block. */
     for (long y = 0; y <= down; y++)
         for (long x = 0, end; x <= across; x = end + 1) {
             end = run_end(windows, down, across, y, x);
@@ -222,7 +222,7 @@ __attribute__((target("avx2"))) static long fast(const Net *net, const uint8_t *
 }
 #endif
 
-/* Of the windows that are looked at (1) those without a mark become 0. Returns 0 where Python must decide. */
+/* Clear the windows (1: examine) that have no mark. Returns 0 if Python must decide. */
 long which(const Net *net, const uint8_t *picture, uint8_t *windows)
 {
 #if defined(__x86_64__) && !defined(PLAIN)

@@ -1,7 +1,7 @@
-"""The paper's lane detector: gradients, a neural net, edges and clusters, each picture for itself.
+"""The paper's lane detector, which examines each picture independently.
 
 Windows with a lane mark (HOG and a net with one hidden layer of ten), Sobel edges inside them, DBSCAN on the
-edges; the clusters next to the car's middle, left and right, are the lane's lines, fitted by straight ones.
+edges; straight lines are fitted to the clusters next to the car's middle, left and right.
 """
 
 import numpy as np
@@ -18,17 +18,17 @@ from selfdrive.visiond.road_region import RoadRegion
 
 EPS, MIN_SAMPLES = 4, 8  # pixels, edge pixels
 THRESHOLD = 0.0  # log odds above which a window has a mark
-NEED = 2  # marked windows of the four that share a tile
+NEED = 2  # marked windows among the four that share a tile
 
 
 class PaperDetector:
-    """Looks at pictures of one camera; remembers none of them.
+    """Examines pictures of one camera, without memory.
 
-    `calculated_by` tells which compiled code it calculates with, if any.
+    `calculated_by` identifies the compiled code in use, if any.
     """
 
     calculated_by = ""
-    state: tuple[float, ...] = ()  # nothing is remembered
+    state: tuple[float, ...] = ()  # no memory
 
     def __init__(self, model: CameraModel) -> None:
         self._region = RoadRegion(model)
@@ -38,7 +38,7 @@ class PaperDetector:
         self._lines = EdgeLines(model, self._region)
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in `view.picture`. One that is not seen has prob 0, and is where a lane's would be."""
+        """Return the lines in `view.picture`; a line not seen has prob 0 and the expected position."""
         part = np.ascontiguousarray(view.picture[self._region.part])
         at, rising = edges(part)
         tile = self._tile.take(at)
@@ -48,7 +48,6 @@ class PaperDetector:
         return lane_between(*self._lines.nearest(at, rising, labels))
 
     def _marked(self, part: np.ndarray, tile: np.ndarray) -> np.ndarray:
-        """Which windows (rows x columns, bool) on these tiles (numbers) hold a lane mark."""
         looked_at = self._region.windows
         tiles = np.zeros((looked_at.shape[0] + 1, looked_at.shape[1] + 1), bool)
         tiles.ravel()[tile] = True
@@ -62,7 +61,7 @@ class PaperDetector:
 
 
 def lane_between(left: RoadLine | None, right: RoadLine | None) -> LaneLines:
-    """The lane between these lines. One that is not seen is where a lane's would be."""
+    """The lane between these lines; a missing one is placed where a lane's would be."""
     left = left or RoadLine(y=0.5 * LANE_WIDTH, prob=0.0)
     right = right or RoadLine(y=-0.5 * LANE_WIDTH, prob=0.0)
     return LaneLines(left=left, right=right, path=path_between(left, right))

@@ -1,7 +1,7 @@
 """The part of the picture in which the paper's detector searches for lane marks, and its windows.
 
-It is the road around the car, from `NEAR` to `FAR` metres ahead and `SIDE` metres to the left and right (more
-further ahead, because the car may point off the road), so it follows from the camera's calibration.
+It is the road from `NEAR` to `FAR` metres ahead and `SIDE` metres to the left and right (more further ahead,
+because the car may point off the road), according to the camera's calibration.
 """
 
 from math import ceil, floor
@@ -14,13 +14,13 @@ from selfdrive.visiond.hog import STRIDE, WINDOW
 
 NEAR, FAR = 4.9, 30.0  # m ahead; the nearest row is always examined, the furthest may be left out
 SIDE = 3.8  # m: a lane's line when the car is almost in the next lane
-TURN = 0.08  # m further out per metre ahead
+TURN = 0.08  # m wider per metre ahead
 
 
 class RoadRegion:
-    """Rows and columns of the picture (`part`), and which of its windows see enough of the road.
+    """Rows and columns of the picture (`part`), and which of its windows show enough of the road.
 
-    ConfigError if the camera sees too little of the road for one window.
+    Raises ConfigError if the camera sees too little of the road for one window.
     """
 
     def __init__(self, model: CameraModel) -> None:
@@ -43,7 +43,6 @@ class RoadRegion:
         self.windows = self._seeing_road(model)
 
     def _seeing_road(self, model: CameraModel) -> np.ndarray:
-        """(rows, columns) of windows: the window's last row has some of the road in its columns."""
         down, across = ((size - WINDOW) // STRIDE + 1 for size in self.shape)
         left = self.first_column + STRIDE * np.arange(across) - model.cx
         reach = np.array([_reach(model, self.first_row + STRIDE * row + WINDOW - 1) for row in range(down)])

@@ -1,19 +1,19 @@
 /* Stands for: road_view.py.
- * The picture seen as a map of the road, with OpenCV's bits: whole numbers, rounded to the nearest. */
+ * The picture as a map of the road, with OpenCV's bits: integers, rounded to nearest. */
 
 #include <stdint.h>
 
-enum { LEVELS = 3, PARTS = 5 }; /* pictures, each half as large as the one before; bits of a part of a pixel */
+enum { LEVELS = 3, PARTS = 5 }; /* pictures, each half as large as the previous; bits of a pixel's fraction */
 
 typedef struct {
-    int64_t rows, first;   /* of the map, and which row of its picture the first one is */
-    const int32_t *places; /* rows x columns: of the left pixel in its row, times 64, and how many 32nds beyond it */
+    int64_t rows, first;   /* of the map, and the first row of its picture */
+    const int32_t *places; /* rows x columns: 64 times the left pixel's column, plus 32nds beyond it */
 } Level;
 
 typedef struct {
     int64_t rows, width, columns; /* of the picture; of the map */
     Level levels[LEVELS];
-    uint8_t *smaller[LEVELS - 1]; /* the second picture and the third, with room for four pixels more */
+    uint8_t *smaller[LEVELS - 1]; /* the second and third picture, with space for four more pixels */
     uint8_t *road;
 } View;
 
@@ -38,7 +38,7 @@ static void take_row(const uint8_t *row, const int32_t *places, long columns, ui
 #if defined(__x86_64__) && !defined(PLAIN)
 #include <immintrin.h>
 
-/* The same, eight columns at a time. Two pixels more than are used are read. */
+/* The same, eight columns at a time. Reads two pixels more than are used. */
 __attribute__((target("avx2"))) static void take_row_fast(const uint8_t *row, const int32_t *places, long columns,
                                                           uint8_t *out)
 {
@@ -59,7 +59,7 @@ __attribute__((target("avx2"))) static void take_row_fast(const uint8_t *row, co
 }
 #endif
 
-/* The map of a picture whose rows and columns can be halved without a rest as often as there are levels. */
+/* The map of a picture whose rows and columns can be halved once per level without remainder. */
 void take_map(const View *view, const uint8_t *picture)
 {
     void (*take)(const uint8_t *, const int32_t *, long, uint8_t *) = take_row;

@@ -1,7 +1,7 @@
-"""The picture seen as a map of the road: rows by distance ahead, columns by metres to the left or right.
+"""The picture as a map of the road: rows by distance ahead, columns by lateral position.
 
-In the map every lane mark is equally wide, and a line along the car's heading stands upright. Near rows are
-taken from a reduced picture, whose pixels are the mean of many, so nothing in between is lost.
+In the map, every lane mark has the same width, and a line along the car's heading is vertical. Near rows come
+from a reduced picture, whose pixels are means, so no detail is skipped.
 """
 
 import cv2
@@ -12,19 +12,19 @@ from selfdrive.common.errors import ConfigError
 
 CELL = 0.04  # m, a column of the map
 REACH = 5.2  # m, to the left and to the right
-FINEST = 1.3 / 0.12  # px/m; where fewer, a mark of 0.12 m is too narrow to be told from texture
+FINEST = 1.3 / 0.12  # px/m; with fewer, a mark of 0.12 m looks like texture
 FARTHEST = 35.0  # m
-LEAST_DROP = 13.0  # px below the horizon: beyond what a camera's pitch may be off
+LEAST_DROP = 13.0  # px below the horizon, more than a camera's pitch may be off
 LEAST_ROWS = 8
-LEVELS = 3  # the picture, at half and at a quarter of its size
-BLEND = 40.0  # px/m beyond which the next smaller picture is used
+LEVELS = 3  # full, half and quarter size
+BLEND = 40.0  # px/m above which the next smaller picture is used
 
 
 class RoadView:
     """Maps pictures of one camera.
 
     Per row of the map, nearest last: `drop` (px below the horizon), `scale` (px of the picture per m of road)
-    and `share` (rows of the picture it stands for). `y` (m, left positive) by column, largest first.
+    and `share` (number of picture rows that it represents). `y` (m, left positive) per column, largest first.
     Raises ConfigError if the camera sees too little of the road.
     """
 
@@ -40,7 +40,7 @@ class RoadView:
                 expected=f"at least {LEAST_ROWS}",
                 remedy="use larger pictures, or a camera that sees the road before the car",
             )
-        # Nothing is looked at above this row. It begins a row of every level, so the levels stay the same.
+        # Rows above this one are not used. It begins a row of every level, so the levels stay the same.
         self._first = int(min(rows)) >> LEVELS << LEVELS
         self._levels = [_maps(model, of_level, self.y, level, self._first) for level, of_level in found]
         self.drop = np.array(rows, np.float32) - np.float32(model.horizon)
@@ -48,7 +48,7 @@ class RoadView:
         self.share = np.array(shares, np.float32)
 
     def map(self, picture: np.ndarray) -> np.ndarray:
-        """The map (uint8, rows x columns) of a grey picture (uint8)."""
+        """Return the map (uint8, rows x columns) of a grey picture (uint8)."""
         picture = np.asarray(picture[self._first :, :])
         parts = []
         for level, (columns, rows) in enumerate(self._levels):
@@ -58,12 +58,12 @@ class RoadView:
         return np.concatenate(parts)
 
     def rows_with_content(self, road: np.ndarray) -> float:
-        """How many of the picture's rows the map's rows that are not all of one tone stand for."""
+        """Number of picture rows represented by the map's rows that are not uniform."""
         return float(self.share[road.max(axis=1) > road.min(axis=1)].sum())
 
 
 def _rows_of(model: CameraModel, level: int) -> list[float]:
-    """The picture's rows (full size) that are taken from this level, one for each row of its picture."""
+    """The picture's rows (full size) taken from this level, one per row of its picture."""
     step = 2**level
     finest = BLEND * step / 2 if level else 0.0
     coarsest = BLEND * step if level < LEVELS - 1 else np.inf
@@ -80,7 +80,7 @@ def _rows_of(model: CameraModel, level: int) -> list[float]:
 def _maps(
     model: CameraModel, rows: list[float], y: np.ndarray, level: int, first: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Columns and rows of the level's picture, which begins at a row, to take each point of the map from."""
+    """Columns and rows in the level's picture (from row `first`) for each point of the map."""
     scale = np.array([1.0 / model.metres_per_pixel(row) for row in rows])
     columns = model.cx - scale[:, None] * y
     there = np.broadcast_to(np.array(rows)[:, None] - first, columns.shape)

@@ -1,7 +1,7 @@
 """The geometric lane detector: bands as wide as marks, votes for two parallel lines, and a memory.
 
-Its last result decides where to look next, so rain, snow or dirt, which add points anywhere, hardly matter. A
-line that is not seen is placed by the other one; without any, both are kept for a while.
+Its last result determines where to look next, so rain, snow or dirt hardly matter. A line that is not seen is
+placed relative to the other one; without any, both are kept for a while.
 """
 
 from selfdrive.common.camera_model import CameraModel
@@ -11,17 +11,17 @@ from selfdrive.visiond.detector import LANE_WIDTH, LaneLines, RoadLine, path_bet
 from selfdrive.visiond.road_view import RoadView
 from selfdrive.visiond.voting import Belief, Pose, Vote, vote
 
-SEEN = 0.5  # probability from which a found line is believed
+SEEN = 0.5  # probability above which a found line is used
 FADING = 0.92  # factor on the probability of an unseen line per picture
-FORGET = 20  # pictures without any line after which the position is unknown
-GONE = 0.01  # a less probable line is dropped
-MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m per picture; rad: the car's possible motion
-WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: possible changes of lane and pitch
-BEYOND = 0.3  # m past a line, from which the car is in the next lane
+FORGET = 20  # pictures without any line until the position is unknown
+GONE = 0.01  # less probable lines are dropped
+MIDDLE_SIGMA, LEFT_RATE = (0.10, 0.03), 0.012  # m and m per picture; rad: possible motion of the car
+WIDTH_SIGMA, DIP_SIGMA = 0.02, 1.5  # m, px: possible changes of lane width and pitch
+BEYOND = 0.3  # m past a line, where the car is in the next lane
 
 
 class RobustDetector:
-    """Finds the lines in one run's pictures from one camera. Remembers its last result.
+    """Finds the lines in one run's pictures from one camera, and remembers its last result.
 
     `calculated_by` identifies the compiled code of `view`, `find` and `choose`, if any.
     """
@@ -43,7 +43,7 @@ class RobustDetector:
 
     @property
     def state(self) -> tuple[float, ...]:
-        """The complete memory, as numbers that can be set again."""
+        """The complete memory, as numbers that can be restored."""
         return (self._missed, *self._probs, *(self._pose or ()))
 
     @state.setter
@@ -53,14 +53,12 @@ class RobustDetector:
         self._pose = Pose(*pose) if pose else None
 
     def detect(self, view: CameraView) -> LaneLines:
-        """The lines in the view's picture, which is of the camera's size."""
         road = self._view.map(view.picture)
         points = strongest(*self._find(road))
         self._remember(self._choose(self._view, road, *points, self._belief()))
         return self._lines()
 
     def _belief(self) -> Belief:
-        """Where lines are expected."""
         pose = self._pose
         if pose is None:
             return Belief()
@@ -72,7 +70,6 @@ class RobustDetector:
         )
 
     def _remember(self, pose: Pose) -> None:
-        """Take over the result, if anything was seen."""
         seen = (pose.prob_left, pose.prob_right)
         if max(seen) > SEEN or self._pose is None:
             self._pose, self._missed = pose, 0
@@ -86,7 +83,6 @@ class RobustDetector:
             self._change_lane()
 
     def _change_lane(self) -> None:
-        """Switch to the lane that the car is in now."""
         lane = self._pose.width if self._pose.middle < 0.0 else -self._pose.width
         self._pose = self._pose._replace(y_left=self._pose.y_left + lane, y_right=self._pose.y_right + lane)
 
@@ -99,7 +95,6 @@ class RobustDetector:
         return LaneLines(left=left, right=right, path=path_between(left, right, self._pose.width))
 
     def _line(self, y: float, prob: float) -> RoadLine:
-        """The road line for the pose's line."""
         model, pose = self._model, self._pose
         a = -y * model.spread(1.0)
         b = model.cx - pose.left - a * (model.horizon - pose.dip)

@@ -1,10 +1,10 @@
-/* Sums in numpy's order, so that they have its bits. */
+/* Sums in numpy's order, for the same bits. */
 
 #include <string.h>
 
 #define INLINE static inline __attribute__((always_inline))
 
-/* Numpy's sum of values next to each other. */
+/* Numpy's sum of contiguous values. */
 static double sum_of(const double *values, long count)
 {
     if (count < 8) {
@@ -36,7 +36,7 @@ static double dot(const double *a, const double *b, long count, double *room)
     return sum_of(room, count);
 }
 
-/* The scalar product as it is calculated here, to be compared with numpy's. */
+/* The scalar product as calculated here, to compare with numpy's. */
 double product(const double *a, const double *b, long count, double *room)
 {
     return dot(a, b, count, room);

@@ -1,8 +1,8 @@
 """Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
 
 It learns only from windows of rendered roads, drawn from the seed, and prints its accuracy on windows of
-other such roads. It takes some minutes; `--small`, for a trial, some seconds. Needs scikit-learn, which the
-detector does not.
+different roads. It takes some minutes, or some seconds with `--small`. Needs scikit-learn, which the detector
+does not.
 """
 
 import argparse
@@ -20,13 +20,12 @@ from threadpoolctl import threadpool_limits
 from selfdrive.visiond.lane_net import HIDDEN, WEIGHTS, LaneNet
 from selfdrive.visiond.training_windows import labelled_windows
 
-FULL, SMALL = (600, 60), (12, 4)  # roads for training, and for testing
+FULL, SMALL = (600, 60), (12, 4)  # roads for training and testing
 EPOCHS = 25
 DECAY = 3e-3  # penalty on large weights
 
 
 def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
-    """The net fitted to these windows."""
     model = MLPClassifier(
         hidden_layer_sizes=(HIDDEN,),
         activation="tanh",
@@ -37,7 +36,7 @@ def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
         random_state=seed,
     )
     with threadpool_limits(1), warnings.catch_warnings():  # sums depend on the number of threads
-        warnings.simplefilter("ignore", ConvergenceWarning)  # stopping after so many epochs is intended
+        warnings.simplefilter("ignore", ConvergenceWarning)  # the limited number of iterations is intended
         model.fit(features, labels)
     hidden, out = (weights.astype(np.float32) for weights in model.coefs_)
     hidden_bias, out_bias = (bias.astype(np.float32) for bias in model.intercepts_)
@@ -45,7 +44,6 @@ def train(features: np.ndarray, labels: np.ndarray, seed: int) -> LaneNet:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command: train, test, write the weights."""
     parser = argparse.ArgumentParser(prog="python -m selfdrive.visiond.train", description=__doc__)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, default=WEIGHTS, help="the file to write")

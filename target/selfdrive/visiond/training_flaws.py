@@ -1,4 +1,4 @@
-"""What real pictures have and rendered roads lack: verges by the lane, long shadows, bends, bad cameras."""
+"""Adds features of real pictures that rendered roads lack: verges, long shadows, bends, bad cameras."""
 
 from collections.abc import Iterable
 
@@ -8,13 +8,13 @@ import numpy as np
 from selfdrive.common.camera_model import CameraModel
 
 LEAST_BEND = 250.0  # m of a curve's radius
-NEAR_HORIZON = 4.0  # rows below it where the road is assumed to end
+NEAR_HORIZON = 4.0  # rows below it, where the road is assumed to end
 
 
 class Ground:
-    """A verge that may begin directly at the lane, and bands along the road that are darker or lighter.
+    """A verge that may begin directly at the lane, and darker or lighter bands along the road.
 
-    Bands are shadows of barriers, strips of newer asphalt, gutters. Drawn once for a scene.
+    Bands are shadows of barriers, strips of newer asphalt, gutters. They are drawn once per scene.
     """
 
     def __init__(self, model: CameraModel, lane_width: float, rng: np.random.Generator) -> None:
@@ -32,7 +32,7 @@ class Ground:
     def changed(
         self, picture: np.ndarray, paint: np.ndarray, offset: float, heading: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The picture of a road seen from there, with verges and bands, and the remaining paint."""
+        """Return the picture of a road from that pose with verges and bands, and the remaining paint."""
         y = self._left + np.float32(heading) * self._ahead + np.float32(offset)
         tones = picture.astype(np.float32)
         for start, width, factor, soft in self._bands:
@@ -44,14 +44,13 @@ class Ground:
         return np.clip(tones, 0.0, 255.0).astype(np.uint8), np.where(grown, np.uint8(0), paint)
 
     def _texture(self, rng: np.random.Generator) -> np.ndarray:
-        """Grass, stones, dry earth: grey levels for the whole picture."""
         fine = rng.standard_normal(self._left.shape, dtype=np.float32)
         fine = cv2.GaussianBlur(fine, (0, 0), rng.uniform(0.6, 2.5), sigmaY=rng.uniform(0.6, 2.5))
         return self._tone + fine * (rng.uniform(2.0, 40.0) / max(float(fine.std()), 1e-6))
 
 
 def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Generator) -> list[np.ndarray]:
-    """The pictures with the straight road bent, mostly slightly."""
+    """Bend the straight road in the pictures, mostly slightly."""
     bend = rng.uniform(-1.0, 1.0) ** 3 / LEAST_BEND
     rows = np.maximum(np.arange(model.rows), model.horizon + NEAR_HORIZON)
     shift = [0.5 * bend * model.distance(row) ** 2 / model.metres_per_pixel(row) for row in rows]
@@ -63,7 +62,7 @@ def bent(model: CameraModel, images: Iterable[np.ndarray], rng: np.random.Genera
 
 
 def taken(picture: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """The picture as recorded by a camera and file format: soft, noisy, compressed, with other contrast."""
+    """Simulate a camera and file format: soft, noisy, compressed, with different contrast."""
     if rng.random() < 0.6:
         picture = cv2.GaussianBlur(picture, (0, 0), rng.uniform(0.3, 1.6))
     tones = picture * rng.uniform(0.5, 1.3) + rng.uniform(-25.0, 60.0)

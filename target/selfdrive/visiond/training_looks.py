@@ -1,6 +1,6 @@
 """Roads and cameras for training the lane detector, varied far more than the simulated road.
 
-So the detector learns what a lane mark is, not what this road's marks look like. Tones are grey levels.
+So the detector learns lane marks in general, not this road's. Tones are grey levels.
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ LEAST_CONTRAST = 14.0  # grey levels between paint and asphalt
 
 
 def random_camera(rng: np.random.Generator) -> CameraModel:
-    """A camera behind a windscreen or on a roof; every third is similar to the default."""
+    """A camera behind a windscreen or on a roof; every third one is similar to the default."""
     if rng.random() < 0.33:
         default = CameraModel()
         return replace(
@@ -32,7 +32,6 @@ def random_camera(rng: np.random.Generator) -> CameraModel:
 
 
 def random_look(rng: np.random.Generator) -> Look:
-    """A road of any kind, at any time of day."""
     asphalt = _either(rng, (45.0, 120.0), (110.0, 185.0))
     paints = [_paint(asphalt, rng) for _ in range(4)]
     return Look(
@@ -64,7 +63,6 @@ def random_look(rng: np.random.Generator) -> Look:
 
 
 def _paint(asphalt: float, rng: np.random.Generator) -> Paint:
-    """A line that stands out from the road, sometimes barely."""
     room = 245.0 - asphalt
     tone = asphalt + room * rng.uniform(0.25, 1.0)
     most = max(0.0, 1.0 - LEAST_CONTRAST / (tone - asphalt))
@@ -97,5 +95,5 @@ def _either(rng: np.random.Generator, first: tuple[float, float], second: tuple[
 
 
 def _sometimes(rng: np.random.Generator, share: float, least: float, most: float) -> float:
-    """0, or with probability `share` a value from `least` to `most`."""
+    """Return 0, or with probability `share` a value from `least` to `most`."""
     return rng.uniform(least, most) if rng.random() < share else 0.0

@@ -1,6 +1,6 @@
 """Scenes for training the lane detector: rendered roads of all kinds, seen by all kinds of cameras.
 
-All draws come from one Generator, so a seed reproduces the scenes.
+All random numbers come from one Generator, so a seed reproduces the scenes.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from selfdrive.sim.road_renderer import RoadRenderer
 from selfdrive.visiond.training_flaws import Ground, bent, taken
 from selfdrive.visiond.training_looks import random_camera, random_look
 
-PERIODS = 4  # of 12.2 m: the length of a scene's road
+PERIODS = 4  # of 12.2 m, length of a scene's road
 VIEWS = 6  # pictures of each scene
 
 
@@ -29,7 +29,6 @@ class View:
 
 
 def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
-    """`VIEWS` pictures of each of `scenes` scenes."""
     for _ in range(scenes):
         look, model, seed = random_look(rng), random_camera(rng), int(rng.integers(2**31))
         road = RoadRenderer(model, look, seed, periods=PERIODS)
@@ -45,7 +44,6 @@ def views(scenes: int, rng: np.random.Generator) -> Iterator[View]:
 
 
 def _hidden(look: Look, model: CameraModel) -> np.ndarray:
-    """Which pixels show a car."""
     picture = np.zeros((model.rows, model.width), np.uint8)
     for car in look.cars:
         draw_car(picture, model, car)
@@ -53,8 +51,6 @@ def _hidden(look: Look, model: CameraModel) -> np.ndarray:
 
 
 def _only_paint(look: Look) -> Look:
-    """The same road in black with white paint, without traffic."""
-
     def line(old: Paint | None) -> Paint | None:
         return old and replace(old, tone=255.0, wear=0.0, fade=0.0)
 

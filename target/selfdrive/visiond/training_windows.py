@@ -1,4 +1,4 @@
-"""Labelled detection windows from training scenes: features, and whether they hold a lane mark."""
+"""Labelled detection windows from training scenes."""
 
 import cv2
 import numpy as np
@@ -7,15 +7,15 @@ from selfdrive.visiond.hog import FEATURES, STRIDE, WINDOW, Hog, windows
 from selfdrive.visiond.road_region import RoadRegion
 from selfdrive.visiond.training_scenes import VIEWS, View, views
 
-EACH = 12  # windows with a mark, and as many without, per picture at most
-LEAST_PAINT = 40.0  # pixels of paint that make a mark; windows with less, but some, are not used
-LEAST_CONTRAST = 6.0  # grey levels between paint and surroundings; less is not used either
+EACH = 12  # most windows per picture with a mark, and without
+LEAST_PAINT = 40.0  # pixels of paint in a mark; windows with less, but some, are not used
+LEAST_CONTRAST = 6.0  # grey levels between paint and surroundings; windows with less are not used
 NO_PAINT = 2.0  # pixels
-RING = np.ones((7, 7), np.uint8)  # neighbourhood that paint is compared with
+RING = np.ones((7, 7), np.uint8)  # neighbourhood for comparison with paint
 
 
 def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Features (windows x 1764, float32) and labels (bool) from `scenes` scenes, in equal parts."""
+    """Return features (windows x 1764, float32) and labels (bool) from `scenes` scenes, in equal parts."""
     features = np.empty((2 * EACH * VIEWS * scenes, FEATURES), np.float32)
     labels = np.empty(len(features), bool)
     used = 0
@@ -31,7 +31,6 @@ def labelled_windows(scenes: int, rng: np.random.Generator) -> tuple[np.ndarray,
 
 
 def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """(row, column) of windows drawn with these weights, without repetition."""
     possible = np.argwhere(weight > 0.0)
     chance = weight[weight > 0.0]
     number = min(EACH, len(possible))
@@ -43,10 +42,10 @@ def _drawn(weight: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _weights(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
-    """The sampling weight of each window (rows x columns) with a mark, and without one.
+    """Sampling weight of each window (rows x columns) with a mark, and of each without.
 
-    Windows with a visible mark have equal weights; those without weigh more the more edges they have, because
-    only edges can mislead the detector.
+    Windows with a visible mark have equal weights; those without have more weight the more edges they have,
+    because only edges can mislead the detector.
     """
     picture = view.picture[region.part].astype(np.float32)
     paint = (view.paint[region.part] > 127).view(np.uint8)
@@ -61,7 +60,6 @@ def _weights(view: View, region: RoadRegion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _sums(image: np.ndarray) -> np.ndarray:
-    """The sum of each window's pixels (rows x columns)."""
     rows, columns = (size // STRIDE for size in image.shape)
     tiles = image.reshape(rows, STRIDE, columns, STRIDE).sum(axis=(1, 3))
     assert WINDOW == 2 * STRIDE

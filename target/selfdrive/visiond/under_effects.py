@@ -1,10 +1,9 @@
 """Measures how well detectors find real lanes in bad weather.
 
-`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as
-`selfdrive.visiond.evaluate`. Each frame is put behind each level of each effect, once per seed, and examined
-by detectors without history. The result counts pictures in which a detector misses a line. They are not
-independent: a frame always shows the same road. `--strips` writes all levels of a frame side by side for
-inspection.
+`python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as `selfdrive.visiond.evaluate`.
+Each frame is changed by each level of each effect, once per seed, and examined by detectors without history.
+The result is the number of pictures in which a detector misses a line; these are not independent, because a
+frame always shows the same road. `--strips` writes all levels of a frame side by side for inspection.
 """
 
 import argparse
@@ -43,7 +42,6 @@ class Row(NamedTuple):
 
 
 def measure(frames: Sequence[Frame], kinds: Sequence[type[Effect]], seeds: int) -> Iterator[Row]:
-    """The rows of these effects, level by level."""
     models = {frame.model for frame in frames}
     made = {model: [build(name, model) for name in DETECTORS] for model in models}
     for kind in kinds:
@@ -57,7 +55,6 @@ def measure(frames: Sequence[Frame], kinds: Sequence[type[Effect]], seeds: int) 
 
 
 def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, picture: np.ndarray) -> Finding:
-    """The detector's result for a picture, which it forgets afterwards."""
     new = detector.state
     finding = look(detector, frame, picture)
     detector.state = new
@@ -67,7 +64,7 @@ def _without_a_past(detector: PaperDetector | RobustDetector, frame: Frame, pict
 def _pictures(
     frames: Sequence[Frame], kind: type[Effect], amount: float, seeds: int
 ) -> Iterator[tuple[Frame, np.ndarray]]:
-    """The frames behind an effect, for each seed; only one if the effect is not random."""
+    """The frames changed by an effect, for each seed; only one if the effect is not random."""
     before = None
     for seed in range(1, seeds + 1):
         made = {model: kind(amount, seed, model) for model in {frame.model for frame in frames}}
@@ -79,7 +76,7 @@ def _pictures(
 
 
 def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
-    """The frame behind all levels of an effect, with their amounts (grey)."""
+    """The frame under all levels of an effect, with their amounts (grey)."""
     panels = []
     for level, amount in enumerate(LEVELS[kind], 1):
         seen = kind(amount, 1, frame.model).apply(frame.grey, MOMENT)
@@ -90,7 +87,6 @@ def strip(frame: Frame, kind: type[Effect]) -> np.ndarray:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     cv2.setNumThreads(1)
     kinds = [kind for kind in LEVELS if not options.effect or kind.__name__ in options.effect]
@@ -109,7 +105,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _told(rows: Iterator[Row]) -> Iterator[Row]:
-    """The rows, each printed when it is ready."""
     print(f"{'effect':<16}{'level':>6}{'amount':>9}{'pictures':>10}", *(f"{n:>8}" for n in DETECTORS))
     for row in rows:
         counts = "".join(f"{count:>9}" for count in row.missed)

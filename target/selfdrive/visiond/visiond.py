@@ -1,4 +1,4 @@
-"""visiond: from the camera's view to the road model, 20 times a second."""
+"""visiond: from the camera's view to the road model, at 20 Hz."""
 
 from selfdrive.messages import CameraView, LeadVision, ModelData, PathData
 from selfdrive.visiond.detector import LaneDetector, RoadLine, points
@@ -10,7 +10,7 @@ LEAD_STD = 0.1  # m
 class Visiond:
     """Runs a detector on each view and publishes the result.
 
-    `latest` is the newest published ModelData, None before the first; its `t` gives its age.
+    `latest` is the newest ModelData, None before the first; its `t` gives its age.
     """
 
     def __init__(self, detector: LaneDetector) -> None:
@@ -18,7 +18,7 @@ class Visiond:
         self.latest: ModelData | None = None
 
     def update(self, view: CameraView, t: float) -> None:
-        """Form a road model of the view taken at time `t` (s) and publish it."""
+        """Compute and publish a road model of the view taken at time `t` (s)."""
         lines = self._detector.detect(view)
         left_lane_y = lines.left.y
         right_lane_y = lines.right.y
@@ -39,5 +39,5 @@ class Visiond:
 
 
 def _line(y: float, line: RoadLine) -> PathData:
-    """The message of a line that passes the car at `y` (m, left positive)."""
+    """The message for a line that passes the car at `y` (m, left positive)."""
     return PathData(points=points(y, line), valid=line.prob > 0.0, prob=line.prob, std=LINE_STD)

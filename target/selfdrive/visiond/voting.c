@@ -1,6 +1,6 @@
 /* Stands for: voting.py, band_filter.py, road_view.py, ../common/array_math.py, sums.h.
- * From points in the map of the road to lines, with the bits of the Python: the same operations in the same order
- * and precision, sums in numpy's order, filters in OpenCV's. */
+ * From points in the map of the road to lines, with the same bits as in Python: the same operations in the same
+ * order and precision, sums in numpy's order, filters in OpenCV's. */
 
 #include <math.h>
 #include <stdint.h>
@@ -15,7 +15,7 @@ static const float FAINT = 0.02f, ALIKE = 10.0f, BLUR[2] = {0.5f, 0.05f};
 enum { UNKNOWN = 4, TERMS = UNKNOWN + 1, ROUNDS = 4 };
 static const double NEAR[ROUNDS] = {0.30, 0.20, 0.15, 0.15};
 
-/* x of matrix * x = right, by elimination; `rows` have both. */
+/* Solve matrix * x = right by elimination; `rows` have both. */
 static void solve(double rows[UNKNOWN][TERMS], double *x)
 {
     for (int i = 0; i < UNKNOWN; i++)
@@ -30,7 +30,7 @@ static void solve(double rows[UNKNOWN][TERMS], double *x)
         x[i] = rows[i][UNKNOWN] / rows[i][i];
 }
 
-/* `dot` of sums.h without a place for the products. */
+/* `dot` of sums.h without memory for the products. */
 INLINE double dot_of_few(const double *a, const double *b, long count)
 {
     double s[8], sum = 0.0;
@@ -82,7 +82,7 @@ INLINE void step(const float *left, const float *drop, const float *voters_metre
             double y = state[2 + side];
             error[k] = ((double)left[i] - state[0]) - y * metre[i];
             double off = error[k] / (metre[i] * near), much = 1.0 - off * off;
-            count[k] = much <= 0.0 ? 0.0 : much; /* what is no number stays */
+            count[k] = much <= 0.0 ? 0.0 : much; /* NaN is kept */
             terms[0][k] = 1.0;
             terms[1][k] = y * (double)voters_metre[i];
             terms[2][k] = side ? 0.0 : metre[i];
@@ -144,8 +144,8 @@ settle_fast(const float *left, const float *drop, const float *voters_metre, con
 }
 #endif
 
-/* Moves `state` by all steps. `metre` (n), `error` and `count` (2, n) become those of the last one, before it moved.
- * `expected` (4, 4) times its own transpose is `prior`; `room` has space for 18 numbers for each point. */
+/* Move `state` by all steps. `metre` (n), `error` and `count` (2, n) become those of the last step, before it moved.
+ * `expected` (4, 4) times its own transpose is `prior`; `room` has space for 18 numbers per point. */
 static Settle *settle(void)
 {
 #if defined(__x86_64__) && !defined(PLAIN)
@@ -155,7 +155,7 @@ static Settle *settle(void)
     return settle_plain;
 }
 
-/* What is expected of one number, and the candidates for it; no `count` where there would be more than fit. */
+/* The expected value of one number, and its candidates; `count` is 0 if there would be too many. */
 typedef struct {
     double mean, sigma;
     long count;
@@ -178,7 +178,7 @@ static float unlikely(const Expected *of, float value)
     return off * off;
 }
 
-/* `log` of array_math.py: 2 artanh((m - 1) / (m + 1)) of the mantissa, and its power of two. */
+/* `log` of array_math.py: 2 artanh((m - 1) / (m + 1)) of the mantissa m, plus the exponent times log 2. */
 static double logarithm(float value)
 {
     int power;
@@ -201,7 +201,7 @@ static void take_votes(const float *lefts, const float *drops, const float *metr
     for (long i = 0; i < n; i++) {
         float y = (lefts[i] - left) / (metres[i] * (drops[i] + dip));
         float bin = ((float)SIDEWAYS - y) * (float)(1.0 / BIN) + (float)OUTSIDE;
-        long last = BINS + OUTSIDE; /* what no integer holds becomes the least one, as processors convert it */
+        long last = BINS + OUTSIDE; /* processors convert values that do not fit to the smallest integer */
         sums[bin >= (float)last ? (bin < 2147483648.0f ? last : 0) : bin > 0.0f ? (long)bin : 0] += weights[i];
     }
     float shares[BINS + 2] = {0.0f};
@@ -211,7 +211,7 @@ static void take_votes(const float *lefts, const float *drops, const float *metr
         votes[k] = (0.5f * shares[k] + shares[k + 1]) + 0.5f * shares[k + 2];
 }
 
-/* How much the votes for each y stand out from those around. */
+/* How much the votes for each y exceed those around. */
 static void take_support(const float *votes, float unlikely, double *support)
 {
     float wide[BINS + 2 * AROUND];
@@ -230,8 +230,8 @@ static void take_support(const float *votes, float unlikely, double *support)
 }
 
 /* Choose the pair of lines: `pose` becomes left, dip, y_left, y_right. `belief` has means and deviations of left,
- * dip, middle and width; `room` has space for the supports of MOST candidates. Returns 0 where it cannot tell: for
- * more candidates, or a lane that does not fit in. */
+ * dip, middle and width; `room` has space for the supports of MOST candidates. Returns 0 if there are more
+ * candidates, or if a lane does not fit. */
 static long elect(const float *lefts, const float *drops, const float *metres, const float *weights, long n, double rows,
                   const double *belief, double *room, double *pose)
 {
@@ -277,8 +277,9 @@ static long elect(const float *lefts, const float *drops, const float *metres, c
     return best > -INFINITY;
 }
 
-/* The map of the road: `y` of its columns; `drop`, `scale` and `share` of its rows; `edge` columns at each side without
- * points. Then room: for the points as voters, for the fit (18 and 5 numbers for each), for supports. */
+/* The map of the road: `y` of its columns; `drop`, `scale` and `share` of its rows; `edge` columns at each side
+ * without points. The rest is memory: for the points as voters, for the fit (18 and 5 numbers per point), for
+ * supports. */
 typedef struct {
     const float *y, *drop, *scale, *share;
     int64_t rows, columns, edge;
@@ -286,7 +287,7 @@ typedef struct {
     double *room, *found, *supports;
 } Map;
 
-/* How many of the picture's rows stand behind the map's rows that are not all of one tone. */
+/* Number of picture rows represented by the map's rows that are not uniform. */
 static double rows_with_content(const Map *map, const uint8_t *road)
 {
     float rows = 0.0f; /* shares are powers of two, so the order of the sum does not matter */
@@ -335,11 +336,11 @@ static float sum_of_floats(const float *values, long count)
     return sum;
 }
 
-/* Logarithm of how improbable a line is: the more so, the fewer points are on it and the more beside it. */
+/* Logarithm of a line's improbability, which rises with fewer points on the line and more points beside it. */
 static double doubt(const Map *map, const double *metre, const double *error, const double *count, long n, double rows)
 {
     const double near = NEAR[ROUNDS - 1];
-    float *beside = map->precision; /* which has had its use */
+    float *beside = map->precision; /* no longer needed */
     double *seen = map->room;
     for (long i = 0; i < n; i++) {
         double off = fabs(error[i] / metre[i]);
@@ -352,8 +353,8 @@ static double doubt(const Map *map, const double *metre, const double *error, co
     return -(above <= 0.0 ? 0.0 : above) / (double)(FAINT + chance);
 }
 
-/* Find the lines in the map `road`, whose `n` points have the numbers `at` and are so `sure`. `pose` becomes left, dip,
- * y_left, y_right, and the logarithms of how improbable each line is. Returns 0 where `elect` does. */
+/* Find the lines in the map `road`, whose `n` points have the numbers `at` and certainties `sure`. `pose` becomes
+ * left, dip, y_left, y_right, and the logarithms of the lines' improbabilities. Returns 0 if `elect` does. */
 long vote(const Map *map, const uint8_t *road, const int64_t *at, const float *sure, long n, const double *belief,
           double *pose)
 {

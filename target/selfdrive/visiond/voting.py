@@ -1,8 +1,8 @@
-"""Which two parallel lines explain the points where marks may be: first votes, then a fit.
+"""Finds the two parallel lines that explain the points of possible marks: first votes, then a fit.
 
-Lines along the road meet in one point of the picture: the car's heading moves it sideways, and a camera
-pitched otherwise than it was calibrated moves it up or down. A line `y` m beside the camera is seen, `drop`
-px below the known horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
+Lines along the road meet in one point of the picture, which the car's heading moves sideways, and an error of
+the camera's pitch moves up or down. A line `y` m beside the camera is seen, `drop` px below the known
+horizon, `left + y * metre * (drop + dip)` px left of the camera's column.
 """
 
 from collections.abc import Callable
@@ -16,24 +16,23 @@ from selfdrive.common.array_math import each, log, product
 from selfdrive.visiond.band_filter import Points, points_at
 from selfdrive.visiond.road_view import RoadView
 
-BIN = 0.1  # m, of the votes
-SIDEWAYS = 4.0  # m, how far to the left and to the right lines are looked for
+BIN = 0.1  # m, for votes
+SIDEWAYS = 4.0  # m, largest lateral position of lines
 LEFT_STEP, DIP_STEP = 4.0, 6.0  # px between candidates
-SCATTER = 0.005  # share of a line's rows in which points lie by chance, on the cleanest road
+SCATTER = 0.005  # share of a line's rows with points by chance, on the cleanest road
 AROUND = (
     np.array([[1] * 8 + [0] * 5 + [1] * 8], np.float32) / 16
-)  # bins of y where a line has no votes itself
-BESIDE = 0.8  # m, how far from a line points are counted to know how many are there by chance
-ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m, how far from a line points count in each round of the fit
-ALIKE = 10.0  # points that err alike, as neighbours do: so many tell no more than one
-FAINT = 0.02  # share of rows that makes a line probable where nothing else gives points; a dash is 0.05
-BLUR = 0.5, 0.05  # px and m: by how much a point may be beside its mark
+)  # bins of y in which a line has no votes itself
+BESIDE = 0.8  # m from a line, where points by chance are counted
+ROUNDS = (0.30, 0.20, 0.15, 0.15)  # m from a line, where points are used in each round of the fit
+ALIKE = 10.0  # points with the same error, because neighbours are not independent
+FAINT = 0.02  # share of rows that makes a line probable if there are no other points; a dash is 0.05
+BLUR = 0.5, 0.05  # px and m by which a point may miss its mark
 
 
 class Pose(NamedTuple):
-    """Two lines: the point where they meet (px), y (m) of each at the camera, and how probably each is there:
-    0 where no more points lie than by chance.
-    """
+    """Two lines: the point where they meet (px), y (m) of each at the camera, and their probabilities: 0 if
+    there are no more points than by chance."""
 
     left: float
     dip: float
@@ -54,9 +53,9 @@ class Pose(NamedTuple):
 
 
 class Belief(NamedTuple):
-    """What is expected before looking, each with its standard deviation.
+    """The expected pose, each value with its standard deviation.
 
-    Without a past: the lane is 3.7 m wide and the car well inside it, heading nearly along the road.
+    By default the lane is 3.7 m wide and the car well inside it, heading nearly along the road.
     """
 
     middle: tuple[float, float] = (0.0, 0.8)  # m
@@ -66,9 +65,9 @@ class Belief(NamedTuple):
 
 
 class Voters:
-    """The points, as numbers of px left of the camera's column and below the horizon; `weight` in rows.
+    """The points, in px left of the camera's column and below the horizon; `weight` in rows.
 
-    `rows` are the picture's rows that could have given points.
+    `rows` is the number of the picture's rows that may have points.
     """
 
     def __init__(self, view: RoadView, points: Points, rows: float) -> None:
@@ -85,13 +84,12 @@ Vote = Callable[[RoadView, np.ndarray, np.ndarray, np.ndarray, Belief], Pose]
 
 
 def vote(view: RoadView, road: np.ndarray, at: np.ndarray, weight: np.ndarray, belief: Belief) -> Pose:
-    """The lines that belief and points tell; points by number in the map `road`, with weights (`crests`)."""
+    """Find the lines from belief and points, given by number in the map `road`, with weights (`crests`)."""
     voters = Voters(view, points_at(at, weight, road), view.rows_with_content(road))
     return fit(elect(voters, belief), voters, belief)
 
 
 def elect(voters: Voters, belief: Belief) -> Pose:
-    """The pair of lines with the most support from points and belief."""
     left = _candidates(*belief.left, LEFT_STEP)
     dip = _candidates(*belief.dip, DIP_STEP)
     left, dip = np.repeat(left, len(dip)), np.tile(dip, len(left))
@@ -114,7 +112,6 @@ def elect(voters: Voters, belief: Belief) -> Pose:
 
 
 def _candidates(mean: float, sigma: float, step: float) -> np.ndarray:
-    """Values `step` apart that reach two standard deviations to both sides."""
     n = int(2.0 * sigma / step)
     return (mean + step * np.arange(-n, n + 1)).astype(np.float32)
 
@@ -124,7 +121,7 @@ def _unlikely(value: np.ndarray, mean: float, sigma: float) -> np.ndarray:
 
 
 def _votes(voters: Voters, left: np.ndarray, dip: np.ndarray) -> np.ndarray:
-    """Share of rows with a point, by candidate and by y; each point counts in about three bins of y."""
+    """Share of rows with a point, by candidate and by y; each point is counted in about three bins of y."""
     bins, outside = round(2 * SIDEWAYS / BIN), 1
     y = (voters.left - left[:, None]) / (voters.metre * (voters.drop + dip[:, None]))
     column = ((SIDEWAYS - y) * np.float32(1.0 / BIN) + outside).astype(np.int32)
@@ -140,10 +137,9 @@ def _votes(voters: Voters, left: np.ndarray, dip: np.ndarray) -> np.ndarray:
 
 
 class Fitted(NamedTuple):
-    """Where the fit came to, `state` (4), and what its last step had before it moved that.
+    """The result of the fit, `state` (4), and the values of its last step before the state moved.
 
-    `metre` is px to the m at each of n points; `error` (px) and `count` (how much it counts) are by line and
-    point (2, n).
+    `metre` is px per m at each of n points; `error` (px) and `count` (weight) are by line and point (2, n).
     """
 
     state: np.ndarray
@@ -153,12 +149,12 @@ class Fitted(NamedTuple):
 
 
 def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: np.ndarray) -> Fitted:
-    """`state` (left, dip, y_left, y_right) moved by weighted Gauss-Newton steps.
+    """Move `state` (left, dip, y_left, y_right) by weighted Gauss-Newton steps.
 
-    A point counts less the further it is away. `expected` (4, 4) times the state should be `believed`.
+    Points have less weight the further away they are. `expected` (4, 4) times the state should be `believed`.
     """
     n = len(voters.left)
-    terms = np.zeros((5, 2, n))  # what error changes with each unknown, and the error
+    terms = np.zeros((5, 2, n))  # derivatives of the error by each unknown, and the error
     terms[0] = 1.0
     prior = product(expected.T, expected)
     for near in ROUNDS:
@@ -178,7 +174,7 @@ def settled(state: np.ndarray, voters: Voters, expected: np.ndarray, believed: n
 
 
 def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
-    """`pose` moved to where the points around its lines are; belief decides what points leave open."""
+    """Fit `pose` to the points around its lines; belief decides what they leave open."""
     means, sigmas = np.array([belief.left, belief.dip, belief.middle, belief.width]).T
     expected = np.array([(1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 0.5, 0.5), (0, 0, 1, -1)]) / sigmas[:, None]
     state, metre, error, count = settled(np.array(pose[:4]), voters, expected, means / sigmas)
@@ -192,7 +188,7 @@ def fit(pose: Pose, voters: Voters, belief: Belief) -> Pose:
 
 
 def _solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """x of matrix * x = right, for a positive definite matrix, by elimination."""
+    """Solve matrix * x = right for a positive definite matrix, by elimination."""
     rows = np.column_stack((matrix, right)).tolist()
     for i, pivot in enumerate(rows):
         for row in rows[:i] + rows[i + 1 :]:

@@ -9,10 +9,10 @@ from selfdrive.common.interp import clip
 from selfdrive.common.realtime import DT_CTRL
 from selfdrive.messages import CanFrame, CarControl, CarState
 
-BRAKE_ON = 0.02  # a demand of at least this starts braking
-BRAKE_OFF = 0.005  # below this braking ends
+BRAKE_ON = 0.02  # a demand of at least this much starts braking
+BRAKE_OFF = 0.005  # below this, braking ends
 BRAKE_GAP = 0.01  # smaller changes of the demand are ignored
-BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake may fall at once
+BRAKE_RISE = 1.0 * DT_CTRL  # per cycle; the brake may drop immediately
 
 PEDALS_EVERY = 2  # cycles
 DISPLAY_EVERY = 10  # cycles
@@ -26,7 +26,7 @@ class BrakeHysteresis:
         self._steady = 0.0
 
     def update(self, brake: float) -> float:
-        """Brake to command for a demanded `brake`, both in 0..1."""
+        """Return the brake command for the demand `brake`, both in 0..1."""
         if brake < BRAKE_OFF or (brake < BRAKE_ON and not self._braking):
             brake = 0.0
         self._braking = brake > 0.0
@@ -40,7 +40,7 @@ class BrakeHysteresis:
 
 
 class CarController:
-    """Applies limits, hysteresis and rate limits, quantises, packs. One instance per run."""
+    """Applies limits, hysteresis and rate limits, and packs the result. One instance per run."""
 
     def __init__(self) -> None:
         self._hysteresis = BrakeHysteresis()
@@ -48,9 +48,9 @@ class CarController:
         self._can = CommandPacker()
 
     def update(self, control: CarControl, car: CarState, frame: int) -> list[CanFrame]:
-        """Frames of control cycle `frame`; `car` is the state that the demand is based on.
+        """Return the frames of control cycle `frame`; `car` is the state that the demand is based on.
 
-        A demand that is not a number is sent as zero.
+        A NaN demand is sent as zero.
         """
         demand = control.actuators
         enabled = control.enabled

@@ -34,9 +34,9 @@ _BUTTON_NAMES = {
 
 
 class CarStateReader:
-    """Listens to the car bus; `update` returns a CarState of everything received so far.
+    """Reads the car bus.
 
-    The speed estimate starts at 0, as in the original, whatever the car's speed, so it overshoots by a tenth
+    As in the original, the speed estimate starts at 0 whatever the car's speed, so it overshoots by a tenth
     in its first half second.
     """
 
@@ -48,7 +48,6 @@ class CarStateReader:
         self._brake_switch = False
 
     def update(self, frames: Sequence[CanFrame], t: float) -> CarState:
-        """Take the frames received until time `t` (s)."""
         self._parser.update(frames, t)
         state = CarState(t=t, can_valid=self._parser.valid)
         self._read_motion(state)
@@ -82,7 +81,7 @@ class CarStateReader:
         pedal, cruise_enabled, brake_switch, brake_pressed = values["POWERTRAIN_DATA"]
         state.gas = pedal / 255.0
         state.gas_pressed = pedal > 0
-        # the switch flickers for single frames; two in a row mean a foot
+        # the switch flickers for single frames; two in a row mean that the brake is pressed
         state.brake_pressed = bool(brake_pressed or (brake_switch and self._brake_switch))
         self._brake_switch = bool(brake_switch)
         state.cruise_enabled = bool(cruise_enabled)

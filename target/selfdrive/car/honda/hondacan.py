@@ -1,4 +1,4 @@
-"""The frames the controller sends to the Civic."""
+"""The frames that the controller sends to the car."""
 
 from selfdrive.can.dbc import load
 from selfdrive.can.packer import Packer
@@ -7,7 +7,7 @@ from selfdrive.messages import CanFrame
 
 
 class CommandPacker:
-    """Packs commands from counts; every message has its own counter."""
+    """Packs commands in counts; every message has its own counter."""
 
     def __init__(self) -> None:
         messages = load(CAR_DBC)
@@ -38,13 +38,12 @@ class CommandPacker:
         return self._brake.pack(values, counter)
 
     def gas(self, counts: int, counter: int) -> CanFrame:
-        """Counts of the pedal interceptor; 0 switches it off."""
+        """Gas in counts of the pedal interceptor; 0 switches it off."""
         return self._gas.pack((counts, counts, counts > 0), counter)
 
     def cruise_display(self, speed_kph: int, lead: int, mini_car: bool, counter: int) -> CanFrame:
-        """Set speed (255: none); `lead` 0 no lane car, 1 dashed, 2 solid."""
+        """Set speed (255: none); `lead` is 0 for no lead car, 1 dashed, 2 solid."""
         return self._cruise_display.pack((speed_kph, lead, mini_car), counter)
 
     def lane_display(self, lanes: bool, steering_required: bool, beep: bool, counter: int) -> CanFrame:
-        """Lane symbol and the request to take the wheel."""
         return self._lane_display.pack((lanes, steering_required, beep), counter)

@@ -25,9 +25,9 @@ from selfdrive.controls.lib.events import (
 )
 from selfdrive.messages import CanFrame, CarControl, CarState
 
-CAN_ERROR_CYCLES = 5  # consecutive invalid cycles before an error is raised
+CAN_ERROR_CYCLES = 5  # consecutive invalid cycles before can_error is raised
 
-# What each condition of CarState requests while it lasts.
+# The event that each condition of CarState raises.
 _CONDITIONS = (
     ("steer_error", Event("steer_unavailable", (NO_ENTRY, IMMEDIATE_DISABLE, PERMANENT))),
     ("steer_not_allowed", Event("steer_temp_unavailable", (NO_ENTRY, WARNING))),
@@ -50,7 +50,8 @@ _BUTTON_CANCEL = Event("button_cancel", (USER_DISABLE,))
 
 
 def get_params() -> CarParams:
-    """Physical data and tuning of the Civic; the lateral gains are the original's, per degree, in radians."""
+    """Physical data and tuning of the Civic; the lateral gains are the original's, converted from degrees to
+    radians."""
     wheelbase = 2.70
     return CarParams(
         name="HONDA CIVIC 2016 TOURING",
@@ -78,7 +79,7 @@ def get_params() -> CarParams:
 
 
 class CarInterface:
-    """Reads the car and commands it. One instance per run holds all state."""
+    """Reads and commands the car. One instance per run."""
 
     def __init__(self, params: CarParams | None = None) -> None:
         self.params = params or get_params()
@@ -88,7 +89,7 @@ class CarInterface:
         self._invalid_cycles = 0
 
     def update(self, frames: Sequence[CanFrame], t: float) -> CarState:
-        """Take all frames received since the last call, at time `t` (s); returns a new CarState."""
+        """Process all frames received since the last call, at time `t` (s); return a new CarState."""
         previous, car = self._car, self._reader.update(frames, t)
         self._invalid_cycles = 0 if car.can_valid else self._invalid_cycles + 1
         car.events = tuple(self._events(car, previous))
@@ -96,9 +97,9 @@ class CarInterface:
         return car
 
     def apply(self, control: CarControl, frame: int) -> list[CanFrame]:
-        """Limit and pack the demand of control cycle `frame` (0, 1, ...); returns frames to send.
+        """Limit and pack the demand of control cycle `frame` (0, 1, ...); return the frames to send.
 
-        Steering is sent every cycle, gas and brake every second, the dashboard every tenth. If
+        Steering is sent every cycle, gas and brake every second cycle, the dashboard every tenth. If
         `control.enabled` is False, all actuators are sent as zero.
         """
         return self._controller.update(control, self._car, frame)

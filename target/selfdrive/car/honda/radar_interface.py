@@ -1,4 +1,4 @@
-"""The radar's CAN frames (bus 1) to tracks."""
+"""Reads tracks from the radar's CAN frames (bus 1)."""
 
 from collections.abc import Sequence
 
@@ -17,7 +17,7 @@ _LAST_OF_CYCLE = "TRACK_15"
 
 
 class RadarInterface:
-    """Collects one radar cycle: state frame, then the track frame that completes it (20 Hz)."""
+    """Collects one radar cycle (20 Hz): a state frame, then the track frame that completes it."""
 
     def __init__(self) -> None:
         self._parser = CanParser(load(RADAR_DBC), RADAR_MESSAGES, RADAR_BUS)
@@ -25,10 +25,11 @@ class RadarInterface:
         self._tracking = False
 
     def update(self, frames: Sequence[CanFrame], t: float) -> RadarData | None:
-        """Take the frames of this step at time `t` (s); returns RadarData when a cycle is complete, else
+        """Process the frames of this step at time `t` (s); return RadarData when a cycle is complete, else
         None.
 
-        A silent radar returns None for ever: the receiver must check the age."""
+        If the radar is silent, this always returns None: the receiver must check the age of the data.
+        """
         parser = self._parser
         parser.update(frames, t)
         if _LAST_OF_CYCLE not in parser.updated:
@@ -45,7 +46,7 @@ class RadarInterface:
         if distance >= NO_TRACK_DISTANCE:
             self._tracking = False
             return ()
-        if not self._tracking:  # a track that begins anew is another object, with another history
+        if not self._tracking:  # a track that reappears is a new object
             self._tracking = True
             self._track_id += 1
         return (RadarPoint(self._track_id, distance, -lateral, speed),)

@@ -1,4 +1,4 @@
-"""Constants of the car's electronics: buses, codes, message rates."""
+"""Buses, codes and message rates of the car's electronics."""
 
 from pathlib import Path
 
@@ -25,19 +25,19 @@ GEAR_CODES = {name: code for code, name in GEARS.items()}
 
 STEER_STATUS_NORMAL = 0
 STEER_STATUS_FAULT = 5  # assumed until the EPS reports otherwise
-STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS may refuse torque for now, but is not broken
+STEER_STATUS_PASSING = (0, 2, 3, 4, 6)  # the EPS may temporarily refuse torque, but is not broken
 
 RADAR_GOOD = 0x79
-NO_TRACK_DISTANCE = 255.0  # m; a track at this distance or more has ended
+NO_TRACK_DISTANCE = 255.0  # m; at this distance or more, there is no track
 
 STEER_COUNTS = 0x1000  # sent for a demand of 1
-STEER_FULL_COUNTS = 0xF00  # what the EPS takes as full torque
+STEER_FULL_COUNTS = 0xF00  # full torque for the EPS
 BRAKE_COUNTS = 256
-PEDAL_COUNTS = 1004  # of the pedal interceptor, for a demand of 1
+PEDAL_COUNTS = 1004  # of the pedal interceptor for a demand of 1
 PEDAL_REST = 328
-STEER_OVERRIDE_TORQUE = 1200  # driver's torque in counts that means hands on the wheel
+STEER_OVERRIDE_TORQUE = 1200  # counts; above this, the driver's hands are on the wheel
 
-# The messages that the controller reads. STEER_STATUS, seat belt etc. start in their unsafe state.
+# The messages that the controller reads. Some, such as STEER_STATUS, start in their unsafe state.
 CAR_MESSAGES = {
     "ENGINE_DATA": Expected(("XMISSION_SPEED",), 100),
     "WHEEL_SPEEDS": Expected(("WHEEL_SPEED_FL", "WHEEL_SPEED_FR", "WHEEL_SPEED_RL", "WHEEL_SPEED_RR"), 100),

@@ -7,12 +7,13 @@ from selfdrive.controls.lib.alerts import ALERTS, Alert
 
 
 class AlertManager:
-    """Alerts last for their duration after the last raise; shown is the highest priority, then the newest."""
+    """Alerts last for their duration after the last raise. Shown is the one with the highest priority, then
+    the newest."""
 
     def __init__(self, table: Mapping[str, Alert] = ALERTS) -> None:
         self._table = table
         self._raised: dict[str, float] = {}  # name: time last raised
-        self._next_change = inf  # s, no alert expires before this
+        self._next_change = inf  # s, no alert expires earlier
         self.active: tuple[str, ...] = ()
         self.text1 = ""
         self.text2 = ""
@@ -20,14 +21,14 @@ class AlertManager:
         self.audible = "none"
 
     def add(self, name: str, t: float) -> None:
-        """Raise an alert at time `t` (s). An unknown name raises KeyError."""
+        """Raise an alert at time `t` (s). Raises KeyError for an unknown name."""
         if name not in self._table:
             raise KeyError(f"no alert is named {name!r}")
         self._raised[name] = t
         self._next_change = t
 
     def process(self, t: float) -> None:
-        """Drop expired alerts and set the shown one at time `t` (s)."""
+        """Drop expired alerts and select the one to show at time `t` (s)."""
         if t < self._next_change:
             return
         self._raised = {n: t0 for n, t0 in self._raised.items() if t0 + self._table[n].duration > t}

@@ -21,12 +21,11 @@ class Alert(NamedTuple):
 
     @property
     def ends(self) -> tuple[float, float, float]:
-        """Seconds until sound, picture and text end."""
+        """Seconds until sound, picture and text end, in this order."""
         return self.sound_s, self.visual_s, self.text_s
 
     @property
     def duration(self) -> float:
-        """Seconds until the alert ends completely."""
         return max(self.ends)
 
 
@@ -49,7 +48,7 @@ _SPECIAL = {
     ),
 }
 
-# Event name: the problem in a few words.
+# Event name: the problem.
 _IMMEDIATE = {
     "can_error": "CAN messages are missing",
     "radar_error": "No data from the radar",
@@ -76,7 +75,7 @@ _PERMANENT = ("steer_unavailable", "brake_unavailable")
 
 
 def _table() -> dict[str, Alert]:
-    """All alerts by name; refusals end in `_no_entry`, lasting ones in `_permanent`."""
+    """All alerts by name; refusals end in `_no_entry`, permanent alerts in `_permanent`."""
     table = dict(_SPECIAL)
     for name, text in _IMMEDIATE.items():
         table[name] = Alert("Take over now", text, HIGH, "steer_required", "chime_repeated", 1.0, 3.0, 4.0)

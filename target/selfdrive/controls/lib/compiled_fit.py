@@ -14,13 +14,12 @@ C_SOURCE = Path(__file__).with_name("cubic_fit.c")
 
 
 def build_fit() -> CubicFit:
-    """A CubicFit, compiled if available and enabled."""
     library = compiled.library(C_SOURCE)
     return CompiledFit(library) if library else CubicFit()
 
 
 class CompiledFit(CubicFit):
-    """Same as CubicFit, with `library`, compiled `cubic_fit.c`."""
+    """CubicFit that calls `cubic_fit.c`."""
 
     def __init__(self, library: compiled.Library) -> None:
         self._fit = library.code.fit
@@ -32,7 +31,6 @@ class CompiledFit(CubicFit):
         self._arguments = of, points, ctypes.c_long(N_POINTS), poly
 
     def __call__(self, points: Sequence[float]) -> Poly:
-        """The cubic through `points` (m)."""
         try:
             self._points[:] = array("d", points)
         except (TypeError, OverflowError, BufferError):  # a fault may replace or drop points

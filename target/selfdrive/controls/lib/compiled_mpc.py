@@ -1,6 +1,7 @@
 """The solvers of both model-predictive controllers: compiled C if available, else CasADi's.
 
-CasADi is imported only if needed: importing it and building both takes as long as seconds of driving.
+CasADi is imported only if needed, because importing it and building both solvers takes as long as simulating
+a few seconds of driving.
 """
 
 import ctypes
@@ -16,20 +17,19 @@ from selfdrive.controls.lib.horizon import INTERVALS, N_NODES
 from selfdrive.controls.lib.mpc_iteration import Solver
 
 C_SOURCE = Path(__file__).with_name("mpc.c")
-CASADI = "3.8.2"  # the version whose arithmetic the C file has; others may simplify differently
+CASADI = "3.8.2"  # the version whose arithmetic the C file reproduces
 LONGITUDINAL_WEIGHTS = (5.0, 0.1, 10.0, 20.0)  # as in `long_ocp`
 LATERAL_WEIGHTS = (1.0, 1.0, 1.0, 1.0)  # as in `lateral_ocp`, except for the steering rate's
 
 
 class Code(NamedTuple):
-    """The parts of compiled solvers: the library of `mpc.c`, and the address of DAQP's function."""
+    """The library of `mpc.c` and the address of DAQP's function."""
 
     library: ctypes.CDLL
     daqp: ctypes.c_void_p
 
 
 def build_longitudinal() -> Solver:
-    """The solver of `long_ocp`."""
     if code := _code():
         return CompiledSolver(code, "long_iteration", LONGITUDINAL_WEIGHTS, n_state=6, n_param=1)
     from selfdrive.controls.lib.long_ocp import long_ocp
@@ -39,7 +39,6 @@ def build_longitudinal() -> Solver:
 
 
 def build_lateral(steer_rate_cost: float) -> Solver:
-    """The solver of `lateral_ocp`."""
     if code := _code():
         weights = (*LATERAL_WEIGHTS, steer_rate_cost)
         return CompiledSolver(code, "lateral_iteration", weights, n_state=4, n_param=17)
@@ -59,7 +58,7 @@ def _code() -> Code | None:
 
 @cache
 def _daqp() -> ctypes.c_void_p | None:
-    """`daqp_quadprog` of the DAQP in CasADi; None if it is missing or CasADi's version differs."""
+    """`daqp_quadprog` of CasADi's DAQP; None if it is missing or CasADi's version differs."""
     casadi = find_spec("casadi")
     if casadi is None or casadi.origin is None:
         return None
@@ -73,7 +72,7 @@ def _daqp() -> ctypes.c_void_p | None:
 
 
 class CompiledSolver:
-    """Same as CasADi's function: `iteration` is the function of `mpc.c`."""
+    """Calls the function `iteration` of `mpc.c` through the interface of a CasADi function."""
 
     def __init__(
         self, code: Code, iteration: str, weights: Sequence[float], *, n_state: int, n_param: int
@@ -86,15 +85,13 @@ class CompiledSolver:
         self._outputs = n_trajectory, n_trajectory, 2
 
     def size1_in(self, i: int) -> int:
-        """Length of argument `i`."""
         return self._inputs[i]
 
     def size1_out(self, i: int) -> int:
-        """Length of result `i`."""
         return self._outputs[i]
 
     def buffer(self) -> tuple["Addresses", Callable[[], None]]:
-        """Addresses to set, and the function that solves with them."""
+        """Return the addresses to set, and the function that solves with them."""
         addresses = Addresses(self._daqp, memoryview(self._weights))
         return addresses, partial(self._iterate, addresses.call)
 
@@ -108,11 +105,9 @@ class Addresses:
         self._set(1, weights)
 
     def set_arg(self, i: int, values: memoryview) -> None:
-        """Doubles that argument `i` is read from."""
         self._set(2 + i, values)
 
     def set_res(self, i: int, values: memoryview) -> None:
-        """Doubles that result `i` is written to."""
         self._set(5 + i, values)
 
     def _set(self, place: int, values: memoryview) -> None:

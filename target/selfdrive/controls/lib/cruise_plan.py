@@ -12,22 +12,22 @@ A_MAX = (1.0, 1.0, 0.8, 0.5, 0.3)
 A_MAX_FOLLOWING = (1.5, 1.5, 1.2, 0.7, 0.3)
 MIN_JERK = 0.1  # m/s^3
 
-A_TOTAL = ((0.0, 20.0, 40.0), (1.5, 1.9, 3.2))  # m/s^2 over m/s, longitudinal and lateral together
+A_TOTAL = ((0.0, 20.0, 40.0), (1.5, 1.9, 3.2))  # m/s^2 over m/s, longitudinal and lateral combined
 FOLLOWING_DISTANCE = 45.0  # m
 ABSENT_DRIVER_A = -0.2  # m/s^2
 
 
 def is_following(v_ego: float, lead: LeadData) -> bool:
-    """Whether a nearby lead pulls away, so that the car may keep up."""
+    """Return whether a nearby lead pulls away, so that the car may keep up."""
     near = lead.status and lead.d_rel < FOLLOWING_DISTANCE
     return near and lead.v_lead_k > v_ego and lead.a_lead_k > 0.0
 
 
 def cruise_limits(v_ego: float, following: bool, a_lateral: float, slow_down: bool) -> Limits:
-    """Limits at `v_ego` (m/s) with a lateral acceleration of `a_lateral` (m/s^2).
+    """Return the limits at `v_ego` (m/s) with a lateral acceleration of `a_lateral` (m/s^2).
 
-    Turns leave less acceleration; `slow_down` forces a gentle deceleration. Jerk limits equal the
-    acceleration limits on the straight.
+    Turns leave less acceleration; `slow_down` forces a gentle deceleration. Jerk limits are numerically those
+    of the acceleration on a straight road.
     """
     a_min = interp(v_ego, BREAKPOINTS, A_MIN)
     a_max = interp(v_ego, BREAKPOINTS, A_MAX_FOLLOWING if following else A_MAX)

@@ -1,4 +1,4 @@
-"""The set speed, in whole km/h as the driver sees it."""
+"""The set speed, in whole km/h as displayed."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ V_CRUISE_MIN = 8  # km/h
 V_CRUISE_MAX = 144  # km/h
 V_CRUISE_DELTA = 8  # km/h
 V_CRUISE_ENABLE_MIN = 40  # km/h
-V_CRUISE_NONE = 255  # km/h, never engaged yet
+V_CRUISE_NONE = 255  # km/h, before the first engagement
 
 
 def initial_v_cruise(v_ego: float) -> int:
@@ -18,10 +18,10 @@ def initial_v_cruise(v_ego: float) -> int:
 
 
 def button_v_cruise(v_cruise: int, buttons: Iterable[ButtonEvent]) -> int:
-    """Set speed (km/h) after the buttons released in this cycle while engaged.
+    """Return the set speed (km/h) after the buttons released in this cycle while engaged.
 
-    Both buttons start from the multiple of 8 at or below the set speed, so a first `decel` from 95 gives 80,
-    as in the original.
+    As in the original, both buttons start from the multiple of 8 at or below the set speed, so a first
+    `decel` from 95 gives 80.
     """
     for button in buttons:
         if button.pressed:

@@ -15,7 +15,6 @@ class CubicFit:
     """Least squares on points at 0, 1, ... 49 m."""
 
     def __call__(self, points: Sequence[float]) -> Poly:
-        """The cubic through `points` (m)."""
         a, b, c, d = weights(N_POINTS)
         return (
             total(map(mul, a, points)),
@@ -27,7 +26,7 @@ class CubicFit:
 
 @cache
 def weights(n: int) -> tuple[tuple[float, ...], ...]:
-    """What each of `n` points has to do with each coefficient: worked out exactly, so that it is the same on
+    """Weights of each of `n` points in each coefficient. Calculated exactly, so that they are the same on
     every machine."""
     normal = [[total(x ** (i + j) for x in range(n)) for j in POWERS] for i in POWERS]
     return tuple(
@@ -37,10 +36,10 @@ def weights(n: int) -> tuple[tuple[float, ...], ...]:
 
 
 def _inverse(matrix: list[list[int]]) -> list[tuple[list[int], int]]:
-    """Rows of the inverse of a positive definite matrix, and what each is to be divided by: exact."""
+    """Exact inverse of a positive definite matrix: its rows, and the divisor of each."""
     n = len(matrix)
     rows = [row + [int(i == j) for j in range(n)] for i, row in enumerate(matrix)]
-    before = 1  # the last pivot, which divides all (E. H. Bareiss, Math. Comp. 22, 1968)
+    before = 1  # the last pivot, which divides all elements (E. H. Bareiss, Math. Comp. 22, 1968)
     for i in range(n):
         pivot = rows[i][i]
         for j in range(n):

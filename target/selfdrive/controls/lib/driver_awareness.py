@@ -1,10 +1,10 @@
-"""Driver awareness: after six minutes without any driver action, the car slows down."""
+"""Slows the car down after six minutes without any driver action."""
 
 from selfdrive.common.realtime import DT_CTRL
 
 AWARENESS_TIME = 360.0  # s until the car starts to slow down
 AWARENESS_PRE_TIME = 20.0  # s before that, a first alert is shown
-PRE_ALERT_TIME = 4.0  # s, how long the first alert is shown
+PRE_ALERT_TIME = 4.0  # s, duration of the first alert
 
 
 class DriverAwareness:
@@ -15,11 +15,10 @@ class DriverAwareness:
 
     @property
     def absent(self) -> bool:
-        """True if the car must slow down on its own."""
         return self.status < 0.0
 
     def count_down(self) -> str:
-        """One engaged cycle; returns the alert to raise, or an empty string."""
+        """Count one engaged cycle; return the alert to raise, or an empty string."""
         self.status -= DT_CTRL / AWARENESS_TIME
         if self.status <= 0.0:
             return "driver_distracted"
@@ -31,5 +30,4 @@ class DriverAwareness:
         )
 
     def reset(self) -> None:
-        """The driver acted, or is driving."""
         self.status = 1.0

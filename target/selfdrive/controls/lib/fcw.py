@@ -8,18 +8,18 @@ from selfdrive.messages import CarState, LeadData
 
 MAX_TTC = 5.0  # s
 WARN_TTC = 2.5  # s
-LEAD_STOP_TIME = 2.0  # s, a lead is assumed to need at least this long to stop
+LEAD_STOP_TIME = 2.0  # s, minimum time in which a lead is assumed to stop
 COUNT_ENOUGH = 10.0
 SEEN_STEP = 0.33  # a lead must have been seen for 30 cycles
 BLINKER_STEP = 10.0 / 60.0  # no blinker for 3 s
 MIN_INTERVAL = 5.0  # s between warnings
-PLAN_NODES = 9  # of the plan's nodes, 0..2.8 s, are checked for braking
-A_HARD = -3.0  # m/s^2, a plan that brakes harder always warns
+PLAN_NODES = 9  # number of plan nodes (0..2.8 s) checked for braking
+A_HARD = -3.0  # m/s^2, a plan that brakes harder always qualifies
 A_THRESHOLD = ((0.0, 30.0), (-3.0, -2.0))  # m/s^2 over the lead's speed in m/s
 
 
 def time_to_collision(v_ego: float, a_ego: float, lead: LeadData) -> float:
-    """Seconds until the gap is closed at constant accelerations; at most 5."""
+    """Return the seconds until the gap closes at constant accelerations; at most 5."""
     v_closing = v_ego - lead.v_lead
     a_closing = min(a_ego - lead.a_lead_k, lead.v_lead / LEAD_STOP_TIME)
     root = v_closing * v_closing + 2.0 * lead.d_rel * a_closing
@@ -35,7 +35,6 @@ class FcwChecker:
         self.reset()
 
     def reset(self) -> None:
-        """A new lead: restart all counts."""
         self._last_warning = -inf  # s
         self._v_lead_max = 0.0
         self._speed = self._ttc = self._lead_moved = self._closing = 0
@@ -43,7 +42,7 @@ class FcwChecker:
         self._seen = self._no_blinker = 0.0
 
     def update(self, t: float, car: CarState, lead: LeadData, a_plan: Sequence[float]) -> bool:
-        """Whether to warn the driver now; `a_plan` is the planned acceleration (m/s^2)."""
+        """Return whether to warn the driver now; `a_plan` is the planned acceleration (m/s^2)."""
         self._v_lead_max = max(self._v_lead_max, lead.v_lead)
         if not lead.fcw:
             return False
@@ -56,7 +55,6 @@ class FcwChecker:
         return False
 
     def _count(self, car: CarState, lead: LeadData) -> bool:
-        """Advance all counters; True if every one is high enough."""
         self._speed = self._speed + 1 if car.v_ego > 5.0 else 0
         self._ttc = self._ttc + 1 if time_to_collision(car.v_ego, car.a_ego, lead) < WARN_TTC else 0
         self._lead_moved = self._lead_moved + 1 if self._v_lead_max > 2.5 else 0

@@ -1,6 +1,6 @@
-"""The times at which both model-predictive controllers plan: 21 nodes, and the intervals between them."""
+"""The 21 nodes at which both model-predictive controllers plan, and the intervals between them."""
 
 LATERAL_STEP = 0.05  # s, of RK4
 LONGITUDINAL_STEP = 0.2  # s
-INTERVALS = ((1, 1.0),) * 5 + ((3, 3.0),) * 15  # one step, then three, which weigh three times as much
+INTERVALS = ((1, 1.0),) * 5 + ((3, 3.0),) * 15  # (RK4 steps, weight)
 N_NODES = len(INTERVALS) + 1

@@ -1,4 +1,4 @@
-"""Lateral control: from the lanes to a steering torque."""
+"""Lateral control: from lanes to steering torque."""
 
 from selfdrive.car.params import CarParams
 from selfdrive.common.conversions import DEG_TO_RAD
@@ -15,8 +15,8 @@ MIN_SATURATION_ERROR = 0.1 * DEG_TO_RAD  # rad
 class LatControl:
     """Desired steering-wheel angle from the MPC at 20 Hz, tracked by a PI loop at 100 Hz.
 
-    As in the original, each angle is kept until the next. If an MPC without a solution returns NaN, the
-    torque is full left: the limiter's upper end.
+    As in the original, each angle is kept until the next. If the MPC has no solution and returns NaN, the
+    torque is full left, the limiter's upper end.
     """
 
     def __init__(self, params: CarParams) -> None:
@@ -30,16 +30,15 @@ class LatControl:
 
     @property
     def saturated(self) -> bool:
-        """The desired angle has been out of the steering's reach for some time."""
         return self._pid.saturated
 
     def plan(self, car: CarState, lanes: Lanes, angle_offset: float) -> None:
-        """A new model message: solve for the angle wanted; `angle_offset` in rad at the steering wheel."""
+        """Solve for the desired angle after a model message; `angle_offset` in rad at the steering wheel."""
         factor = self.model.curvature_factor(car.v_ego)
         self.angle_desired = self.mpc.update(lanes, car.v_ego, car.steering_angle, angle_offset, factor)
 
     def update(self, car: CarState, active: bool) -> float:
-        """One cycle; returns the torque in -1..1, left positive."""
+        """Run one cycle; return the torque in -1..1, left positive."""
         if car.v_ego < MIN_STEER_SPEED or not active:
             self._pid.reset()
             return 0.0

@@ -1,4 +1,4 @@
-"""Lateral model-predictive control: how to steer along a path between two lanes.
+"""Lateral model-predictive control: steers along a path between two lanes.
 
 The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
 """
@@ -14,13 +14,13 @@ from selfdrive.controls.lib.mpc_iteration import Iteration
 
 Poly = tuple[float, float, float, float]
 
-MIN_SPEED = 5.0  # m/s; below this, the plan uses it to avoid rough solutions
+MIN_SPEED = 5.0  # m/s; the plan uses at least this speed, to avoid rough solutions
 FIRST_RATE = 0.1  # rad/s, the initial guess without a plan
 
 
 @dataclass(slots=True)
 class Lanes:
-    """The road ahead: cubics y(x) in m, highest power first, left positive, and their probabilities."""
+    """The road ahead: cubics y(x) in m (highest power first, left positive) and their probabilities."""
 
     left_poly: Poly
     right_poly: Poly
@@ -31,22 +31,20 @@ class Lanes:
 
 
 class LateralMpc:
-    """Plans the road-wheel angle; one real-time iteration per update (20 Hz, with each model message).
+    """Plans the road-wheel angle, with one real-time iteration per model message (20 Hz).
 
     Results: `angle_desired` (rad at the steering wheel, offset included), `delta_desired` (rad at the road
-    wheels, 0.05 s ahead), `delta_plan` (21 nodes, 0..2.5 s: every 0.05 s to 0.25 s, then every 0.15 s; from
-    the last finite solution), `nans` (the last solution was not finite), `resets` (the number of such
+    wheels, 0.05 s ahead), `delta_plan` (the last finite solution at 21 nodes, 0..2.5 s: every 0.05 s to 0.25
+    s, then every 0.15 s), `nans` (whether the last solution was not finite), `resets` (the number of such
     solutions).
 
-    A non-finite solution (lanes hundreds of metres away, NaN in the input) gives NaN for both angles until
-    the next update, which starts from nothing and the measured angle. If the problem has no solution (a
-    heading or wheel angle out of bounds by more than the steering rate can correct) or is too badly
-    conditioned (lanes more than about 20 m from the plan), the previous steering rates are kept; `unsolved`
-    counts this.
+    A non-finite solution (lanes hundreds of metres away, NaN in the input) gives NaN for both angles; the
+    next update restarts from the measured angle. The previous steering rates are kept, and `unsolved` counts
+    this, if the problem has no solution (a heading or wheel angle too far out of bounds for the steering
+    rate) or is badly conditioned (lanes more than about 20 m from the plan).
     """
 
     def __init__(self, params: CarParams) -> None:
-        """Uses the car's steering ratio, actuation delay and steering rate cost."""
         self.params = params
         self._iteration = Iteration(build_lateral(params.steer_rate_cost))
         self.reset()
@@ -63,7 +61,6 @@ class LateralMpc:
 
     @property
     def unsolved(self) -> int:
-        """Number of updates in which the solver failed and the previous steering rates were kept."""
         return self._iteration.unsolved
 
     def update(
@@ -74,15 +71,14 @@ class LateralMpc:
         angle_offset: float,
         curvature_factor: float,
     ) -> float:
-        """Plan for `lanes`; returns `angle_desired` (rad at the steering wheel).
+        """Plan for `lanes`; return `angle_desired` (rad at the steering wheel).
 
         Speed in m/s; measured steering-wheel angle and its learnt offset in rad; `curvature_factor` in 1/m is
-        the path curvature for a road-wheel angle of 1 rad. Call it with every model message, engaged or not,
-        as the original does: the plan starts from its own last angle. A non-finite solution gives NaN; the
-        next one starts at the measured angle.
+        the path curvature for a road-wheel angle of 1 rad. As in the original, call it with every model
+        message, engaged or not: the plan starts from its own last angle.
         """
         ratio = self.params.steer_ratio
-        driven = v_ego * self.params.steer_actuator_delay  # m, until a command takes effect
+        driven = v_ego * self.params.steer_actuator_delay  # m until a command takes effect
         start = (driven, 0.0, driven * curvature_factor * steering_angle / ratio, self._delta)
         road = (*lanes.left_poly, *lanes.right_poly, *lanes.path_poly)
         probs = (lanes.left_prob, lanes.right_prob, lanes.lane_width)

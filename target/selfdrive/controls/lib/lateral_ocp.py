@@ -1,4 +1,4 @@
-"""The lateral optimal control problem: to steer along a path between two lanes.
+"""The lateral optimal control problem: steer along a path between two lanes.
 
 Its terms and their constants are those of openpilot v0.4.2.
 """
@@ -24,9 +24,9 @@ def _ode(z: ca.SX, rate: ca.SX, p: ca.SX) -> ca.SX:
 
 
 def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Distance to the path, nearness of both lanes, heading and steering rate; without rate at the end.
+    """Distance to the path, nearness of both lanes, heading and steering rate (not at the end).
 
-    The path is the middle of the lane as far as lines are seen, else the model's path.
+    The path is a mean of the lane's middle and the model's path, weighted by the lines' probability.
     """
     x, y, heading, _ = ca.vertsplit(z)
     v, left_prob, right_prob, width = p[1], p[14], p[15], p[16]
@@ -48,11 +48,8 @@ def _residuals(z: ca.SX, rate: ca.SX, p: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def lateral_ocp(steer_rate_cost: float) -> Ocp:
-    """The optimal control problem of steering along the path.
-
-    Its parameters are curvature factor, speed, the coefficients of left lane, right lane and model's
-    path, the probabilities of both lanes, and the lane's width.
-    """
+    """Return the problem. Its parameters are curvature factor, speed, the coefficients of left lane, right
+    lane and model's path, the probabilities of both lanes, and the lane's width."""
     return Ocp(
         name="lateral_mpc",
         n_state=4,

@@ -1,4 +1,4 @@
-"""Longitudinal model-predictive control: following one lead vehicle.
+"""Longitudinal model-predictive control: follows one lead vehicle.
 
 The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
 """
@@ -15,11 +15,11 @@ NODE_STEPS = tuple(LONGITUDINAL_STEP * n for n, _ in INTERVALS)  # s
 FUTURE_NODE = 10  # 4 s ahead
 
 LEAD_DECAY = 1.5  # 1/s, rate at which a lead's acceleration fades
-LEAD_DECAY_FACTOR = 0.9  # each update while it lasts
-LEAD_STEADY_ACCEL = 0.5  # m/s^2, less counts as none
+LEAD_DECAY_FACTOR = 0.9  # per update, while the lead accelerates or brakes
+LEAD_STEADY_ACCEL = 0.5  # m/s^2; less is treated as zero
 LEAD_STOPPED_SPEED = 0.1  # m/s
-LEAD_JUMP = 2.5  # m between updates: a different car
-NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead that never matters
+LEAD_JUMP = 2.5  # m between updates; more means a different car
+NO_LEAD_GAP, NO_LEAD_SPEED = 50.0, 10.0  # m, m/s faster than the host: a lead without influence
 CRASH_GAP = -50.0  # m
 BACKWARDS_SPEED = -0.01  # m/s
 
@@ -28,23 +28,21 @@ class LongitudinalMpc:
     """Plans the host's speed behind one lead; one real-time iteration per update (20 Hz).
 
     Call `set_cur_state` with the plan's current speed and acceleration, then `update`. Results: `v_mpc`,
-    `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status` (the solution is
-    for a real lead and may compete for the plan), `new_lead` (the lead appeared or jumped in this update),
-    `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s to 1 s, then every 0.6 s), and
-    `resets` (the number of discarded solutions).
+    `a_mpc` (m/s, m/s^2, 0.2 s ahead), `v_mpc_future` (m/s, 4 s ahead), `prev_lead_status` (whether the
+    solution is for a real lead and may become the plan), `new_lead` (whether the lead appeared or jumped in
+    this update), `v_plan`, `a_plan`, `x_plan`, `x_lead_plan` (21 nodes, 0..10 s: every 0.2 s to 1 s, then
+    every 0.6 s), and `resets` (the number of discarded solutions).
 
-    A solution is discarded if it is not finite (the previous plan stays readable) or if, for a real lead, it
-    goes 50 m through the lead or backwards. The next one then starts from nothing, `v_mpc` and `a_mpc` are
-    the car's own, and the next lead is new.
+    A solution is discarded if it is not finite or if, for a real lead, it goes 50 m through the lead or
+    backwards. Then `v_mpc` and `a_mpc` are the car's, and the next update restarts with a new lead.
 
-    v >= 0 is required at all nodes except the first. The plan's own speed may be slightly negative, as in the
-    original at the end of a stop; jerk has no limit, so some jerk always meets the bounds and the problem is
-    always feasible. If the solver still fails, the previous jerk is kept (`unsolved` counts this), and the
-    rules above judge the result.
+    v >= 0 is required at all nodes except the first, where it may be slightly negative, as in the original at
+    the end of a stop. Jerk has no limit, so the problem is always feasible. If the solver still fails, the
+    previous jerk is kept (`unsolved` counts this), and the rules above judge the result.
     """
 
     def __init__(self, mpc_id: int, solver: Solver | None = None) -> None:
-        """`mpc_id` is 1 or 2, for the log. `solver` may be another instance's, which is stateless."""
+        """`mpc_id` is 1 or 2, for the log. Instances may share a `solver`, which is stateless."""
         self.mpc_id = mpc_id
         self.solver = solver or build_longitudinal()
         self._iteration = Iteration(self.solver)
@@ -62,15 +60,14 @@ class LongitudinalMpc:
 
     @property
     def unsolved(self) -> int:
-        """Number of updates in which the solver failed and the previous jerk was kept."""
         return self._iteration.unsolved
 
     def set_cur_state(self, v: float, a: float) -> None:
-        """The plan's start: speed (m/s) and acceleration (m/s^2)."""
+        """Set the plan's start: speed (m/s) and acceleration (m/s^2)."""
         self._v_start, self._a_start = v, a
 
     def update(self, v_ego: float, a_ego: float, lead: LeadData | None) -> None:
-        """Plan for `lead` (None or status False: no lead). `v_ego`, `a_ego`: the car's own."""
+        """Plan for `lead` (None or status False: no lead). `v_ego` and `a_ego` are the car's."""
         self.new_lead = False
         if lead is not None and lead.status:
             x_lead, v_lead, a_lead, decay = self._follow(lead)
@@ -78,7 +75,7 @@ class LongitudinalMpc:
             self.prev_lead_status = False
             x_lead, v_lead, a_lead, decay = NO_LEAD_GAP, v_ego + NO_LEAD_SPEED, 0.0, LEAD_DECAY
         start = (0.0, self._v_start, self._a_start, x_lead, v_lead, a_lead)
-        self._iteration.guess[:6] = array("d", start)  # the original linearises the first node there
+        self._iteration.guess[:6] = array("d", start)  # the original linearises here too
         finite = self._iteration.run(start, (decay,))
         if finite:
             self._publish(self._iteration.solution)
@@ -86,12 +83,12 @@ class LongitudinalMpc:
             self._discard(v_ego, a_ego)
 
     def _follow(self, lead: LeadData) -> tuple[float, float, float, float]:
-        """The lead's position, speed, acceleration and its decay for the plan."""
+        """The lead's position, speed, acceleration, and the decay of its acceleration."""
         x, v, a = lead.d_rel, max(0.0, lead.v_lead), lead.a_lead_k
         if v < LEAD_STOPPED_SPEED or -a / 2 > v:  # stopped, or soon will be
             v = a = 0.0
         self._decay = LEAD_DECAY if abs(a) < LEAD_STEADY_ACCEL else self._decay * LEAD_DECAY_FACTOR
-        decay = max(self._decay, -a / (v + 0.01))  # a braking lead stops; it does not reverse
+        decay = max(self._decay, -a / (v + 0.01))  # a braking lead stops but does not reverse
         if not self.prev_lead_status or abs(x - self._prev_x_lead) > LEAD_JUMP:
             self._simulate(x, v, a, decay)
             self.new_lead = True
@@ -100,7 +97,7 @@ class LongitudinalMpc:
         return x, v, a, decay
 
     def _simulate(self, x_lead: float, v_lead: float, a_lead: float, decay: float) -> None:
-        """First guess for a new lead: the host brakes evenly to the lead's speed over the gap."""
+        """Guess a first plan for a new lead: the host brakes evenly to the lead's speed over the gap."""
         x, v, a = 0.0, self.v_mpc, 0.0
         room = 2 * x_lead + 0.01
         if v > v_lead and room != 0.0:
@@ -118,7 +115,6 @@ class LongitudinalMpc:
         self._iteration.restart(nodes)
 
     def _publish(self, z: array) -> None:
-        """Extract the results from the trajectory `z`."""
         end = 6 * N_NODES
         self.x_plan, self.v_plan, self.a_plan = z[0:end:6], z[1:end:6], z[2:end:6]
         self.x_lead_plan = z[3:end:6]
@@ -126,12 +122,10 @@ class LongitudinalMpc:
         self.v_mpc_future = self.v_plan[FUTURE_NODE]
 
     def _runs_into_lead(self) -> bool:
-        """The plan goes through the lead, or backwards."""
         gap = min(map(sub, self.x_lead_plan, self.x_plan))
         return gap < CRASH_GAP or min(self.v_plan) < BACKWARDS_SPEED
 
     def _discard(self, v_ego: float, a_ego: float) -> None:
-        """Discard the solution and restart from the car's own speed."""
         self.resets += 1
         self._iteration.restart()
         self.v_mpc, self.a_mpc = v_ego, a_ego

@@ -1,4 +1,4 @@
-"""The longitudinal optimal control problem: to follow one lead vehicle.
+"""The longitudinal optimal control problem: follow one lead vehicle.
 
 Its terms and their constants are those of openpilot v0.4.2.
 """
@@ -13,7 +13,7 @@ from selfdrive.controls.lib.mpc_solver import Ocp
 COST_TTC, COST_DISTANCE, COST_ACCELERATION, COST_JERK = 5.0, 0.1, 10.0, 20.0
 TIME_GAP = 1.8  # s
 STANDSTILL_GAP = 4.0  # m
-BRAKING = 2 * 9.81  # m/s^2, twice the deceleration assumed of both cars
+BRAKING = 2 * 9.81  # m/s^2, twice the assumed deceleration of both cars
 
 
 def _ode(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> ca.SX:
@@ -22,7 +22,7 @@ def _ode(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> ca.SX:
 
 
 def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Danger of a collision, error of the gap, acceleration and jerk; without jerk at the end."""
+    """Danger of a collision, error of the gap, acceleration and jerk (not at the end)."""
     x, v, a, x_lead, v_lead, _ = ca.vertsplit(z)
     wanted = STANDSTILL_GAP + TIME_GAP * (2 * v - v_lead) + (v * v - v_lead * v_lead) / BRAKING
     lack = wanted - (x_lead - x)
@@ -33,7 +33,7 @@ def _residuals(z: ca.SX, jerk: ca.SX, decay: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def long_ocp() -> Ocp:
-    """The optimal control problem of following a lead; its parameter is the lead's decay in 1/s."""
+    """Return the problem; its parameter is the decay of the lead's acceleration in 1/s."""
     return Ocp(
         name="long_mpc",
         n_state=6,

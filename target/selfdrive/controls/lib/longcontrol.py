@@ -7,9 +7,9 @@ from selfdrive.controls.lib.pid import PIController
 from selfdrive.messages import CarState, Plan
 
 OFF = "off"
-PID = "pid"  # following the target in closed loop
-STOPPING = "stopping"  # the loop works badly near standstill: brake open loop
-STARTING = "starting"  # release the brake open loop before the loop takes over
+PID = "pid"  # closed loop
+STOPPING = "stopping"  # open-loop braking, because the closed loop works badly near standstill
+STARTING = "starting"  # open-loop release of the brake
 
 MIN_CAN_SPEED = 0.3  # m/s, below this the car reports 0
 STOPPING_EGO_SPEED = 0.5  # m/s
@@ -18,10 +18,10 @@ STARTING_TARGET_SPEED = 0.5  # m/s
 STOPPING_BRAKE_RATE = 0.2  # 1/s
 STOPPING_BRAKE = 0.5  # enough to hold the car
 STARTING_BRAKE_RATE = 0.8  # 1/s
-STARTED_BRAKE = 0.2  # at this brake the loop takes over
+STARTED_BRAKE = 0.2  # below this brake, the closed loop takes over
 
-CREEP_SPEED = 2.3  # m/s, below it an idling car pushes forward
-CREEP_BRAKE = 0.15  # brake that holds it at rest
+CREEP_SPEED = 2.3  # m/s; below this, an idling car creeps forward
+CREEP_BRAKE = 0.15  # brake that holds an idling car at rest
 
 
 class LongControl:
@@ -35,12 +35,12 @@ class LongControl:
         self.output = 0.0
 
     def reset(self, v_pid: float) -> None:
-        """Not in control: forget the loop's history and follow the car's speed (m/s)."""
+        """Reset to the car's speed (m/s), when not in control."""
         self._pid.reset()
         self.v_pid = v_pid
 
     def update(self, active: bool, car: CarState, plan: Plan) -> tuple[float, float]:
-        """One cycle; returns gas and brake, each in 0..1."""
+        """Run one cycle; return gas and brake, each in 0..1."""
         gas_max = interp(car.v_ego, *self._params.gas_max)
         brake_max = interp(car.v_ego, *self._params.brake_max)
         self.state = self._next_state(active, car, plan.v_target_future)
@@ -75,7 +75,7 @@ class LongControl:
         self.v_pid = plan.v_target
         self._pid.pos_limit = gas_max
         self._pid.neg_limit = -brake_max
-        v_ego = max(car.v_ego, MIN_CAN_SPEED)  # the car's reading jumps to 0 there
+        v_ego = max(car.v_ego, MIN_CAN_SPEED)  # below this the car reports 0
         self.output = self._pid.update(self.v_pid, v_ego, speed=v_ego, feedforward=plan.a_target)
 
     def _stop(self, car: CarState, gas_max: float, brake_max: float) -> None:
@@ -90,6 +90,6 @@ class LongControl:
         self.reset(car.v_ego)
 
     def _to_output(self, acceleration: float, speed: float) -> float:
-        """Acceleration (m/s^2) to output, with the brake that holds against creeping."""
+        """Convert acceleration (m/s^2) to output, including the brake that prevents creeping."""
         creep = (CREEP_SPEED - speed) / CREEP_SPEED * CREEP_BRAKE if speed < CREEP_SPEED else 0.0
         return acceleration / self._params.acceleration_per_output - creep

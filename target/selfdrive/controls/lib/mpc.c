@@ -1,7 +1,6 @@
-/* One iteration of either model-predictive controller, as `build_solver` makes it of CasADi's functions: the same
-   operations on the same doubles in the same order. mpc_parts.py writes what CasADi derives from the problems; the
-   rest is that of mpc_solver.py, matrix by matrix. The quadratic program goes to the DAQP that comes with CasADi,
-   whose `daqp_quadprog` is handed over.
+/* One iteration of either model-predictive controller, with the operations of `build_solver` on the same doubles in
+   the same order. mpc_parts.py generates what CasADi derives from the problems; the rest follows mpc_solver.py,
+   matrix by matrix. CasADi's DAQP solves the quadratic program; the address of its `daqp_quadprog` is an argument.
 
    Stands for: mpc_solver.py, horizon.py, lateral_ocp.py, long_ocp.py, ../../common/ordered.py.
 */
@@ -737,9 +736,9 @@ static void lateral_mpc_end(const double *zu, const double *p, double *r, double
 
 typedef struct {
     int nx, residuals, end_residuals, bounded, linear, shift;
-    int state[2]; /* that is bounded */
+    int state[2]; /* those with bounds */
     double low[2], high[2], control_bound;
-    double sixth; /* of the step of RK4, s */
+    double sixth; /* of the RK4 step, s */
     void (*rk4)(const double *, const double *, const double *, double *, double *, double *, double *);
     void (*stage)(const double *, const double *, double *, double *, double *, double *);
     void (*end)(const double *, const double *, double *, double *, double *, double *);
@@ -752,16 +751,16 @@ typedef struct {
 typedef double Matrix[STATES][STATES + 1];
 
 #define INLINE static inline __attribute__((always_inline))
-#define UNROLL _Pragma("GCC unroll 8") /* so that the compiler knows which terms there are */
+#define UNROLL _Pragma("GCC unroll 8") /* so that the compiler can omit absent terms */
 
-INLINE double larger(double a, double b) /* of a number and what may be none */
+INLINE double larger(double a, double b) /* b may be NaN */
 {
     return b > a ? b : a;
 }
 
-/* Which rows `r` of a column `j` of a step's derivative, by state and control, are not always 0: from `first` to
-   before `behind`. Others are left out, as 0 times infinity were no number. The longitudinal problem's states 3 to
-   5 are the lead's, which the host's have no part in. */
+/* Rows `r` of column `j` of a step's derivative, by state and control, that are not always 0: from `first` until
+   before `behind`. The others are left out, because 0 times infinity is NaN. The longitudinal problem's states 3 to
+   5 are the lead's and do not depend on the host's. */
 INLINE int first(const Model model, int j)
 {
     return model.linear && j >= 3 && j < 6 ? 3 : 0;
@@ -772,13 +771,13 @@ INLINE int behind(const Model model, int j)
     return j < model.nx ? j + 1 : model.linear ? 3 : model.nx;
 }
 
-INLINE int width(const Model model, int i) /* behind the last column of row `i` that is a state */
+INLINE int width(const Model model, int i) /* end of the state columns in row `i` */
 {
     return model.linear && i < 3 ? 3 : model.nx;
 }
 
-/* Steps of RK4: the next state, and its derivative by state and control; of the last step's derivative by the
-   state also `over`, by which `sixth` is multiplied in it.
+/* RK4 steps: the next state, and its derivative by state and control; `over` has the factors of `sixth` in the last
+   step's derivative by the state.
 
    CasADi multiplies constants first: c * (sixth * x) becomes (c * sixth) * x. */
 INLINE void integrate(
@@ -815,13 +814,13 @@ INLINE void integrate(
     }
 }
 
-/* Residuals of a node, and their derivative by its state and control. Of elements of that which are 0.1 * x also
-   x (`over`), of those that are 1 / x also x (`under`; -x where they are -1 / x). */
+/* Residuals of a node, and their derivative by its state and control. For elements 0.1 * x of the derivative, `over`
+   has x; for elements 1 / x and -1 / x, `under` has x and -x. */
 typedef struct {
     double r[RESIDUALS], c[RESIDUALS * (STATES + 1)], over[RESIDUALS * (STATES + 1)], under[RESIDUALS * (STATES + 1)];
 } Cost;
 
-/* A number times an element of the derivative: CasADi takes y / x for y * (1 / x). */
+/* A number times an element of the derivative: CasADi calculates y / x for y * (1 / x). */
 INLINE double by(const Model model, const Cost *cost, int k, int i, double y)
 {
     const int place = k * (model.nx + 1) + i, quotient = model.linear && k == 1 && (i == 0 || i == 3);
@@ -836,7 +835,7 @@ INLINE double weighed(const Model model, const Cost *cost, int k, int i, double 
 }
 
 /* Hessian (of a stage its upper half) and gradient of a cost by state and control, the gradient after a change of
-   the state. Only the last residual of a stage depends on the control: no other has a part in its derivatives, not even as 0 * NaN. */
+   the state. Only a stage's last residual depends on the control; the others are left out, because 0 * NaN is NaN. */
 INLINE void gauss_newton(
     const Model model, int stage, const Cost *cost, const double *weights, const double *change,
     double hess[STATES + 1][STATES + 1], double *slope)
@@ -871,7 +870,7 @@ INLINE void gauss_newton(
     }
 }
 
-/* `condense`: the program in the change of the controls. */
+/* `condense`: the quadratic program in the change of the controls. */
 INLINE void condense(
     const Model model, const double *weights, const double *old, const double *z0, const double *p, Condensed *to)
 {
@@ -915,7 +914,7 @@ INLINE void condense(
                     by[j] += constant ? to->derivative[k][r][j] * model.sixth * over[i * nx + r]
                                       : m[k][i][r] * to->derivative[k][r][j];
             }
-            to->states[k + 1][i] = following[i] + sum; /* CasADi takes z + (x - z) for x */
+            to->states[k + 1][i] = following[i] + sum; /* CasADi calculates z + (x - z) for x */
             change[k + 1][i] = to->states[k + 1][i] - zu[k + 1][i];
             by[k] = m[k][i][nx];
             memcpy(to->derivative[k + 1][i], by, sizeof by);
@@ -976,7 +975,7 @@ INLINE void condense(
     }
 }
 
-/* `_solve_program`: the minimiser and 1, or zeros and 0 where there is none. */
+/* `_solve_program`: the minimiser and 1, or zeros and 0 if there is none. */
 INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const double *u, double *x)
 {
     const int rows = N * model.bounded;
@@ -1024,7 +1023,7 @@ INLINE double solve(const Model model, Quadprog *quadprog, Condensed *of, const 
     return solved;
 }
 
-/* `build_solver`: what it is handed are the addresses of DAQP's function, weights, arguments and results. */
+/* `build_solver`: `call` has the addresses of DAQP's function, weights, arguments and results. */
 INLINE void iterate(const Model model, void **call)
 {
     const int nx = model.nx, end = nx * (N + 1);
@@ -1059,7 +1058,7 @@ INLINE void iterate(const Model model, void **call)
     flags[1] = square < LARGEST && sum < LARGEST_GRADIENT;
 }
 
-/* Whether DAQP is the one that is expected: min x^2 + y^2 - 2 x - 6 y where y <= 2 and x + y <= 10. */
+/* Whether DAQP is compatible: minimise x^2 + y^2 - 2 x - 6 y with y <= 2 and x + y <= 10. */
 int agrees(Quadprog *quadprog)
 {
     double h[4] = {2.0, 0.0, 0.0, 2.0}, f[2] = {-2.0, -6.0}, a[2] = {1.0, 1.0}, x[2] = {0}, lam[3] = {0};

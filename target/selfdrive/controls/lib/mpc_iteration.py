@@ -1,4 +1,4 @@
-"""Successive iterations of model-predictive control, with any solver."""
+"""Iterations of model-predictive control, with any solver."""
 
 from array import array
 from collections.abc import Callable, Sequence
@@ -9,16 +9,16 @@ class Buffers(Protocol):
     """The memory of a solver's arguments and results."""
 
     def set_arg(self, i: int, values: memoryview) -> None:
-        """Doubles that argument `i` is read from."""
+        """Set the doubles that argument `i` is read from."""
 
     def set_res(self, i: int, values: memoryview) -> None:
-        """Doubles that result `i` is written to."""
+        """Set the doubles that result `i` is written to."""
 
 
 class Solver(Protocol):
     """One iteration as a function with three arguments and three results (see `build_solver`).
 
-    The part of a CasADi function's interface that is used.
+    This is the part of a CasADi function's interface that is used.
     """
 
     def size1_in(self, i: int) -> int:
@@ -28,15 +28,15 @@ class Solver(Protocol):
         """Length of result `i`."""
 
     def buffer(self) -> tuple[Buffers, Callable[[], None]]:
-        """Buffers to set, and the function that solves with them."""
+        """Return the buffers to set, and the function that solves with them."""
 
 
 class Iteration:
-    """Runs a solver on its own buffers; holds the trajectory between iterations.
+    """Runs a solver on its own buffers and keeps the trajectory between iterations.
 
-    `guess` is the trajectory at which the next iteration linearises, `solution` the last computed one: the
-    states node by node, then the controls. Both are written in place. `unsolved` counts the finite iterations
-    that kept the controls.
+    The next iteration linearises at the trajectory `guess`; `solution` is the last one computed: the states
+    node by node, then the controls. Both are written in place. `unsolved` counts finite iterations without a
+    solution, which keep the controls.
     """
 
     def __init__(self, solver: Solver) -> None:
@@ -53,13 +53,13 @@ class Iteration:
         self.unsolved = 0
 
     def restart(self, nodes: Sequence[float] | None = None, control: float = 0.0) -> None:
-        """Reset the guess: the states of all nodes (None: zeros) and a constant control."""
+        """Reset the guess to the states of all nodes (None: zeros) and a constant control."""
         controls = array("d", [control]) * self._n_control
         states = array("d", nodes or bytes(8 * (len(self.guess) - self._n_control)))
         self.guess[:] = states + controls
 
     def run(self, start: Sequence[float], param: Sequence[float]) -> bool:
-        """One iteration from the state `start`; False if the solution is not finite."""
+        """Run one iteration from the state `start`; return False if the solution is not finite."""
         self._start[:] = array("d", start)
         self._param[:] = array("d", param)
         self._evaluate()

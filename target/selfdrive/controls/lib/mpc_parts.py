@@ -1,8 +1,8 @@
-"""Writes a part of `mpc.c`: `python -m selfdrive.controls.lib.mpc_parts`, after a change of a problem.
+"""Generates a part of `mpc.c`. Run `python -m selfdrive.controls.lib.mpc_parts` after changing a problem.
 
-The part is what CasADi derives from each optimal control problem, one statement per operation, in order: a
-step of RK4, the residuals of the stages and of the end, and their derivatives. With a new CasADi, the tests
-of `compiled_mpc` show whether the rest of `mpc.c` still has its bits.
+The part is what CasADi derives from each optimal control problem, one statement per operation, in order: an
+RK4 step, the residuals of stages and end, and their derivatives. With a new CasADi, the tests of
+`compiled_mpc` show whether the rest of `mpc.c` still gives the same bits.
 """
 
 from collections.abc import Iterator
@@ -34,7 +34,6 @@ OPERATIONS = {
 
 
 def parts() -> str:
-    """The C functions of both problems."""
     return "\n".join(text for ocp in (long_ocp(), lateral_ocp(0.0)) for text in _of(ocp))
 
 
@@ -56,7 +55,7 @@ def _of(ocp: Ocp) -> Iterator[str]:
 
 
 def _over(a: ca.SX, factor: float) -> ca.SX:
-    """The factors that `factor` multiplies in those elements of `a` that are such products."""
+    """The other factor of each element of `a` that is a product with `factor`."""
     of_product = ca.SX(a.shape[0], a.shape[1])
     for i, j in zip(*a.sparsity().get_triplet(), strict=True):
         element = a[i, j]
@@ -66,7 +65,7 @@ def _over(a: ca.SX, factor: float) -> ca.SX:
 
 
 def _under(c: ca.SX) -> ca.SX:
-    """The divisors of 1 in those elements of `c` that are such quotients."""
+    """The divisor of each element of `c` that is a quotient 1/x."""
     of_quotient = ca.SX(c.shape[0], c.shape[1])
     for i, j in zip(*c.sparsity().get_triplet(), strict=True):
         element = c[i, j]
@@ -78,10 +77,10 @@ def _under(c: ca.SX) -> ca.SX:
 
 
 def _function(name: str, of: ca.Function, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> str:
-    """A C function: matrices are row-major, and only elements that are not always 0 are written."""
+    """A C function. Matrices are row-major; elements that are always 0 are not written."""
     words = [f"const double *{word}" for word in inputs] + [f"double *{word}" for word in outputs]
     lines = [f"static void {name}({', '.join(words)})", "{"]
-    now: list[str] = [""] * of.sz_w()  # the current name of each place of the work vector
+    now: list[str] = [""] * of.sz_w()  # current variable of each place of the work vector
     for k in range(of.n_instructions()):
         operation, to, at = of.instruction_id(k), of.instruction_output(k), of.instruction_input(k)
         if operation == ca.OP_INPUT:
@@ -101,13 +100,11 @@ def _function(name: str, of: ca.Function, inputs: tuple[str, ...], outputs: tupl
 
 
 def with_parts(text: str) -> str:
-    """The text of `mpc.c` with its generated parts updated."""
     before, rest = text.split(BEGIN)
     return before + BEGIN + parts() + END + rest.split(END)[1]
 
 
 def main() -> None:
-    """The command."""
     C_FILE.write_text(with_parts(C_FILE.read_text()))
 
 

@@ -1,8 +1,8 @@
 """One real-time iteration of nonlinear model-predictive control, built with CasADi.
 
-The scheme is that of ACADO's generated code, which the original controller used: multiple shooting
-with RK4, Gauss-Newton Hessian, states eliminated (condensing), one quadratic program, full step. The
-program goes to DAQP, which is set up anew in every call: a built solver has no memory.
+The scheme is that of ACADO's generated code, which the original controller used: multiple shooting with RK4,
+Gauss-Newton Hessian, states eliminated (condensing), one quadratic program, full step. DAQP solves the
+program and is set up anew in every call, so a solver is stateless.
 """
 
 import math
@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP may miss them by 1e-6 of its scaled rows
+FEASIBILITY_TOL = 1e-3  # in the units of the bounds; DAQP's own tolerance is 1e-6 of its scaled rows
 STATIONARITY_TOL = 1e-6  # relative to the gradient
-LARGEST = 1e100  # square sum of a trajectory that still means something
+LARGEST = 1e100  # largest square sum of a meaningful trajectory
 LARGEST_GRADIENT = 1e300
 
 Bounds = tuple[tuple[int, float, float], ...]  # (index of the state, lowest, highest)
@@ -23,8 +23,8 @@ Bounds = tuple[tuple[int, float, float], ...]  # (index of the state, lowest, hi
 class Ocp:
     """An optimal control problem with one control: least squares over N intervals.
 
-    `ode(z, u, p)` makes the CasADi expression of the state's derivative, `residuals(z, u, p)` those of
-    the stage and of the terminal cost. `intervals` has (number of RK4 steps, factor on the weights).
+    `ode(z, u, p)` returns the CasADi expression of the state's derivative, `residuals(z, u, p)` those of the
+    stage and terminal costs. `intervals` has (number of RK4 steps, factor on the weights).
     """
 
     name: str
@@ -37,23 +37,21 @@ class Ocp:
     weights: tuple[float, ...]
     terminal_weights: tuple[float, ...]
     state_bounds: Bounds
-    control_bound: float = math.inf  # the same on both sides
+    control_bound: float = math.inf  # on both sides
     linear: bool = False  # the ode is linear in state and control
-    shift: bool = False  # start the next iteration one interval further on
+    shift: bool = False  # start the next iteration one interval later
 
     @property
     def n_control(self) -> int:
-        """Number of intervals, each with its control."""
         return len(self.intervals)
 
     @property
     def n_trajectory(self) -> int:
-        """Length of a trajectory: the states node by node, then the controls."""
         return self.n_state * (self.n_control + 1) + self.n_control
 
 
 def rk4(ocp: Ocp) -> ca.Function:
-    """One step of RK4: (state, control, p) -> (next state, its derivatives by state and by control)."""
+    """One RK4 step: (state, control, p) -> (next state, its derivatives by state and control)."""
     z, u, p, h = ca.SX.sym("z", ocp.n_state), ca.SX.sym("u"), ca.SX.sym("p", ocp.n_param), ocp.rk4_step
     k1 = ocp.ode(z, u, p)
     k2 = ocp.ode(z + h / 2 * k1, u, p)
@@ -64,7 +62,7 @@ def rk4(ocp: Ocp) -> ca.Function:
 
 
 def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
-    """`n_steps` of RK4: (state and control, p) -> (next state, its derivative by both)."""
+    """`n_steps` RK4 steps: (state and control, p) -> (next state, its derivative by both)."""
     zu, p = ca.SX.sym("zu", ocp.n_state + 1), ca.SX.sym("p", ocp.n_param)
     end, m = zu[:-1], ca.SX.eye(ocp.n_state + 1)[:-1, :]
     for _ in range(n_steps):
@@ -75,17 +73,17 @@ def _integrator(ocp: Ocp, step: ca.Function, n_steps: int) -> ca.Function:
 
 
 def _gauss_newton(r: ca.SX, zu: ca.SX, change: ca.SX, weights: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Hessian and gradient of a cost by state and control; the gradient after `change` of the state."""
+    """Hessian and gradient of a cost by state and control, the gradient after `change` of the state."""
     c = ca.jacobian(r, zu)
     cw = c.T @ ca.diag(weights)
     return cw @ c, cw @ (r + c[:, :-1] @ change)
 
 
 def _backward(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
-    """Costs from a node on, as Hessian and gradient by that node's state: at the end, and one node back.
+    """Hessian and gradient of the costs from a node on, by that node's state: at the end, and one node back.
 
-    End: (state, p, change of the state) -> (Hessian, gradient). One node back: (those of the next node,
-    derivative of the next state by state and control, state and control, p, change, factor on the
+    End: (state, p, change of the state) -> (Hessian, gradient). One node back: (Hessian and gradient of the
+    next node, derivative of the next state by state and control, state and control, p, change, factor on the
     weights) -> (Hessian, gradient, second derivatives by control and all, derivative by the control).
     """
     nx = ocp.n_state
@@ -106,7 +104,6 @@ def _backward(ocp: Ocp) -> tuple[ca.Function, ca.Function]:
 def _linearise(
     ocp: Ocp, integrators: dict[int, ca.Function], zu: list[ca.SX], p: ca.SX
 ) -> list[tuple[ca.SX, ca.SX]]:
-    """Next state and its derivative by state and control, for each interval."""
     kinds = [n for n, _ in ocp.intervals]
     if not ocp.linear:
         return [integrators[n](zu_k, p) for n, zu_k in zip(kinds, zu, strict=True)]
@@ -121,11 +118,11 @@ def integrators_of(ocp: Ocp) -> dict[int, ca.Function]:
 
 
 def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
-    """(trajectory, first state, p) -> the program in the change of the controls.
+    """(trajectory, first state, p) -> the quadratic program in the change of the controls.
 
-    Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their
-    derivative by all controls. A column of the Hessian is made of that derivative at its node and of
-    the second derivatives of all costs from there on: no large matrices are ever multiplied.
+    Returns its Hessian and gradient, the states of all nodes for unchanged controls, and their derivative by
+    all controls. A column of the Hessian is calculated from that derivative at its node and the second
+    derivatives of all later costs, which avoids products of large matrices.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0, p = ca.SX.sym("old", ocp.n_trajectory), ca.SX.sym("z0", nx), ca.SX.sym("p", ocp.n_param)
@@ -151,12 +148,12 @@ def condense(ocp: Ocp, integrators: dict[int, ca.Function]) -> ca.Function:
     states = ca.vertcat(*z) + ca.vertcat(*change)
     derivative = ca.vertcat(*(ca.horzcat(e, ca.SX(nx, n - k)) for k, e in enumerate(sensitivity)))
     outputs = [ca.triu2symm(ca.horzcat(*columns[::-1])), ca.vertcat(*gradient[::-1]), states, derivative]
-    # each intermediate value in a place of its own: sharing places saves memory but costs a tenth of the time
+    # no shared places for intermediate values: sharing saves memory but costs a tenth of the time
     return ca.Function("condense", [old, z0, p], outputs, {"live_variables": False})
 
 
 def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
-    """The trajectory moved on by one interval; the last control is held, through the last interval."""
+    """The trajectory shifted by one interval; the last control is held through the last interval."""
     end = ocp.n_state * (ocp.n_control + 1)
     last = ca.vertcat(new[end - ocp.n_state : end], new[-1])
     return ca.vertcat(new[ocp.n_state : end], integrate(last, p)[0], new[end + 1 :], new[-1])
@@ -165,10 +162,10 @@ def _shifted(ocp: Ocp, integrate: ca.Function, new: ca.MX, p: ca.MX) -> ca.MX:
 def _solve_program(
     name: str, hessian: ca.MX, gradient: ca.MX, rows: ca.MX, bounds: tuple[ca.MX, ca.MX, ca.MX, ca.MX]
 ) -> tuple[ca.MX, ca.MX]:
-    """Minimiser of the quadratic program and 1; or zeros and 0 where there is none.
+    """The minimiser of the quadratic program and 1, or zeros and 0 if there is none.
 
-    The plug-in says nothing of its success inside a graph, so the conditions of optimality are tested.
-    Its checks of the input would raise on NaN; without them NaN comes out as not solved.
+    CasADi's plug-in does not report success inside a graph, so the optimality conditions are tested here. Its
+    input checks would raise on NaN; without them, NaN ends up as not solved.
     """
     low, high, x_low, x_high = bounds
     options = {"error_on_fail": False, "inputs_check": False}
@@ -184,12 +181,11 @@ def _solve_program(
 
 
 def build_solver(ocp: Ocp) -> ca.Function:
-    """One iteration: (trajectory, first state, p) -> (new trajectory, next guess, (solved, finite)).
+    """Return one iteration: (trajectory, first state, p) -> (new trajectory, next guess, (solved, finite)).
 
-    `solved` is 0 when the program has no solution (bounds that cannot be met) or is too badly
-    conditioned to find it: the controls then stay as they were. `finite` is 0 when NaN or infinity
-    came in or came up: the trajectories mean nothing. Equal inputs give equal bytes, whatever was
-    solved before.
+    `solved` is 0 when the program has no solution (bounds that cannot be met) or is too badly conditioned;
+    the controls are then unchanged. `finite` is 0 for NaN or infinity in the input or the result; the
+    trajectories are then meaningless. Equal inputs give equal bytes in any order of calls.
     """
     n, nx = ocp.n_control, ocp.n_state
     old, z0 = ca.MX.sym("old", ocp.n_trajectory), ca.MX.sym("z0", nx)

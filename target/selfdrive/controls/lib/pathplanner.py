@@ -1,4 +1,4 @@
-"""The road ahead: lane lines, the model's path, and the path to follow between them."""
+"""The road ahead: lane lines, the model's path, and the path to follow."""
 
 from selfdrive.common.interp import interp
 from selfdrive.controls.lib.compiled_fit import build_fit
@@ -6,18 +6,18 @@ from selfdrive.controls.lib.lateral_mpc import Lanes
 from selfdrive.controls.lib.polynomial import ZERO, Poly, blend, shifted
 from selfdrive.messages import ModelData
 
-WIDTH_RATE = 0.005  # share of a new width that enters the estimate, per model message
+WIDTH_RATE = 0.005  # weight of a new width in the estimate, per model message
 CERTAINTY_RATE = 0.05
 USUAL_WIDTH = ((0.0, 31.0), (3.0, 3.8))  # m over m/s: roads for higher speeds are wider
-WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))  # trust in the right line over the width error in m
+WIDTH_DOUBT = ((0.3, 1.0), (1.0, 0.0))  # trust in the right line over the error of the width in m
 PATH_PROB = 1.0  # the model does not report the probability of its path
 MIN_LANE_PROB = 0.01
 
 
 class ModelFit:
-    """Cubics through the three lines of a model message.
+    """Fits cubics to the three lines of a model message.
 
-    Two readers request the same message, and fitting is slow, so the last result is cached.
+    Two readers request the same message and fitting is slow, so the last result is cached.
     """
 
     def __init__(self) -> None:
@@ -49,11 +49,10 @@ class PathPlanner:
 
     @property
     def lane_width(self) -> float:
-        """Estimated width of the lane in m."""
         return self.lanes.lane_width
 
     def update(self, v_ego: float, model: ModelData) -> None:
-        """Take a model message at the speed `v_ego` (m/s)."""
+        """Process a model message at the speed `v_ego` (m/s)."""
         left, right, path = self._fit.polys(model)
         left_prob = model.left_lane.prob
         width_seen = abs(left[3] - right[3])
@@ -69,7 +68,6 @@ class PathPlanner:
         return self._width_certainty * self._width_estimate + doubt * interp(v_ego, *USUAL_WIDTH)
 
     def _choose_path(self) -> None:
-        """Centre of the lane as far as lines are seen, weighted against the model's path."""
         lanes = self.lanes
         left_prob, right_prob = lanes.left_prob, lanes.right_prob
         if left_prob + right_prob > MIN_LANE_PROB:

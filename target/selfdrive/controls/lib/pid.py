@@ -1,11 +1,11 @@
-"""PI control with feedforward, anti-windup and saturation count."""
+"""PI control with feedforward, anti-windup and detection of saturation."""
 
 from collections.abc import Callable
 
 from selfdrive.common.interp import clip, interp
 from selfdrive.common.realtime import DT_CTRL
 
-UNWIND_RATE = 0.3  # 1/s, rate at which the integrator empties while the driver overrides
+UNWIND_RATE = 0.3  # 1/s, rate at which the integrator unwinds while the driver overrides
 SATURATION_TIME = 0.8  # s
 
 Table = tuple[tuple[float, ...], tuple[float, ...]]
@@ -14,8 +14,8 @@ Table = tuple[tuple[float, ...], tuple[float, ...]]
 class PIController:
     """PI controller at 100 Hz. Gains are tables over speed (m/s).
 
-    `convert(control, speed)` converts the sum of the terms to the actuator's unit before limits. `saturated`
-    becomes true after more than 0.8 s at a limit with an error above `min_error`.
+    `convert(control, speed)` converts the sum of the terms to the actuator's unit before limiting.
+    `saturated` becomes True after more than 0.8 s at a limit with an error above `min_error`.
     """
 
     def __init__(
@@ -35,7 +35,6 @@ class PIController:
         self.reset()
 
     def reset(self) -> None:
-        """Forget all history."""
         self.p = 0.0
         self.i = 0.0
         self.f = 0.0
@@ -52,7 +51,6 @@ class PIController:
         override: bool = False,
         check_saturation: bool = True,
     ) -> float:
-        """One cycle; returns the limited control."""
         error = setpoint - measured
         self.p = error * interp(speed, *self._kp)
         self.f = feedforward
@@ -69,7 +67,7 @@ class PIController:
         return self._convert(control, speed) if self._convert else control
 
     def _integrate(self, error: float, speed: float) -> None:
-        """Integrate, unless this would push further against a limit."""
+        """Integrate, unless that would push further into a limit."""
         integral = self.i + error * interp(speed, *self._ki) * DT_CTRL
         control = self._output(integral, speed)
         up_ok = error >= 0.0 and (control <= self.pos_limit or integral < 0.0)

@@ -6,25 +6,23 @@ ZERO: Poly = (0.0, 0.0, 0.0, 0.0)
 
 
 def value(poly: Poly, x: float) -> float:
-    """y at x."""
     a, b, c, d = poly
     return ((a * x + b) * x + c) * x + d
 
 
 def slope(poly: Poly, x: float) -> float:
-    """dy/dx at x."""
     a, b, c, _ = poly
     return (3.0 * a * x + 2.0 * b) * x + c
 
 
 def shifted(poly: Poly, dy: float) -> Poly:
-    """The curve moved by `dy` to the left."""
+    """Return the curve moved to the left by `dy`."""
     a, b, c, d = poly
     return a, b, c, d + dy
 
 
 def blend(first: Poly, weight1: float, second: Poly, weight2: float) -> Poly:
-    """Weighted mean of two curves; zero if neither has weight."""
+    """Return the weighted mean of two curves; zero if both weights are zero."""
     total = weight1 + weight2
     if total <= 0.0:
         return ZERO

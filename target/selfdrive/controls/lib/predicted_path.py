@@ -1,4 +1,4 @@
-"""The predicted path, relative to which radar tracks are placed."""
+"""The predicted path, from which the lateral distance of radar tracks is measured."""
 
 from collections.abc import Callable
 from math import asin, copysign, hypot, tan
@@ -6,14 +6,13 @@ from math import asin, copysign, hypot, tan
 from selfdrive.common.interp import clip
 from selfdrive.controls.lib.polynomial import Poly, slope, value
 
-REACH = 140.0  # m, no path is known further ahead
+REACH = 140.0  # m; no path is known further ahead
 NEAREST_STEPS = 3
 
 Curve = Callable[[float], tuple[float, float]]  # x in m to y and dy/dx
 
 
 def model_curve(poly: Poly) -> Curve:
-    """The path to follow."""
     return lambda x: (value(poly, x), slope(poly, x))
 
 
@@ -21,7 +20,7 @@ def steering_curve(curvature: float) -> Curve:
     """The circle (curvature in 1/m) that the steering wheel describes."""
 
     def curve(x: float) -> tuple[float, float]:
-        # clipping keeps sharp turns on the circle
+        # limits how sharp a turn can be
         angle = asin(clip(x * curvature, -0.999, 0.999))
         return x * tan(angle / 2.0), tan(angle)
 
@@ -29,9 +28,9 @@ def steering_curve(curvature: float) -> Curve:
 
 
 def distance_to(curve: Curve, x: float, y: float) -> float:
-    """Distance in m of the point (x, y) from the curve, positive on its left.
+    """Return the distance in m of the point (x, y) from the curve, positive on its left.
 
-    Gauss-Newton steps from abeam find the nearest point; on a straight line the first is exact.
+    Gauss-Newton steps from abeam find the nearest point; on a straight line the first step is exact.
     """
     y_abeam, steep = curve(clip(x, 0.0, REACH))
     near, y_near = clip(x, 0.0, REACH), y_abeam

@@ -11,9 +11,9 @@ from selfdrive.messages import LeadData
 
 LEAD_GAINS = (0.1988689, 0.28555364)  # of the lead speed's Kalman filter at 20 Hz
 
-STATIONARY_SPEED = 4.0  # m/s, slower objects may be stationary
+STATIONARY_SPEED = 4.0  # m/s; slower objects may be stationary
 ONCOMING_SPEED = -3.9  # m/s
-STATIONARY_MIN_EGO = 4.0  # m/s, below this no object is called stationary
+STATIONARY_MIN_EGO = 4.0  # m/s; below this, no object is treated as stationary
 
 LAT_FILTER = 2.0 * pi * 0.2 * DT_MDL / (1.0 + 2.0 * pi * 0.2 * DT_MDL)  # low pass of 0.2 Hz
 A_REL_FILTER = 2.0 * pi * 0.5 * DT_MDL / (1.0 + 2.0 * pi * 0.5 * DT_MDL)  # low pass of 0.5 Hz
@@ -22,7 +22,7 @@ A_REL_MAX = 10.0  # m/s^2
 CLUSTER_DISTANCE = 2.5
 LANE_HALF = 1.5  # m from the path; nearer objects are ahead of the car
 CUT_IN_MAX = 1.0  # m of correction for lateral speed
-SECOND_GAP = 8.0  # m; closer and as fast as the first lead: the same vehicle's other axle
+SECOND_GAP = 8.0  # m; closer and as fast as the first lead: the same vehicle
 SECOND_SPEED = 1.0  # m/s
 
 FUSIONS_FOR_MOVING = 3
@@ -57,10 +57,10 @@ class Track:
     def update(
         self, d_rel: float, y_rel: float, v_rel: float, d_path: float, v_ego: float, driver_steers: bool
     ) -> None:
-        """A new measurement; `v_ego` is the car's speed at that time."""
+        """Add a measurement; `v_ego` is the car's speed at that time."""
         a_rel = clip((v_rel - self.v_rel) / DT_MDL, -A_REL_MAX, A_REL_MAX)
         self.a_rel += A_REL_FILTER * (a_rel - self.a_rel)
-        # while the driver steers, the path distance says nothing about the object
+        # while the driver steers, the distance from the path says nothing about the object
         v_lat = 0.0 if driver_steers else (d_path - self.d_path) / DT_MDL
         self.v_lat += LAT_FILTER * (v_lat - self.v_lat)
         self.filter.update(v_rel + v_ego)
@@ -72,21 +72,21 @@ class Track:
         self.v_rel = v_rel
         self.d_path = d_path
         self.v_lead = v_rel + v_ego
-        # an object that has moved never counts as stationary again
+        # an object that has moved is never treated as stationary again
         self.stationary = (
             self.stationary and v_ego > STATIONARY_MIN_EGO and abs(self.v_lead) < STATIONARY_SPEED
         )
         self.oncoming = self.v_lead < ONCOMING_SPEED
 
     def fuse(self) -> None:
-        """The camera sees the same object; an object seen often enough is not stationary."""
+        """Note that the camera sees the same object; one seen often enough is not stationary."""
         self.fusions += 1
         if self.fusions >= FUSIONS_FOR_MOVING:
             self.stationary = False
 
 
 class Cluster:
-    """Tracks taken for one vehicle; values are means."""
+    """Tracks treated as one vehicle; values are means."""
 
     __slots__ = ("_tracks", "d_path", "d_rel", "v_lat", "v_rel")
 
@@ -103,21 +103,20 @@ class Cluster:
         return total(values) / len(self._tracks)
 
     def is_lead(self, v_ego: float) -> bool:
-        """Whether it drives ahead of the car or is about to cut in."""
+        """Return whether it drives ahead of the car or is about to cut in."""
         if all(t.stationary for t in self._tracks) or all(t.oncoming for t in self._tracks):
             return False
-        # lateral speed counts more for closer vehicles; far ahead the path is uncertain
+        # lateral speed has more weight for closer vehicles, because the path is uncertain far ahead
         horizon = interp(self.d_rel, (10.0, 40.0 + v_ego / 1.2), (1.0, 0.0))
         correction = clip(horizon * self.v_lat, -CUT_IN_MAX, CUT_IN_MAX)
         moved = self.d_path + correction
         return abs(clip(moved, min(0.0, self.d_path), max(0.0, self.d_path))) < LANE_HALF
 
     def is_apart(self, first: "Cluster") -> bool:
-        """Whether it is a different vehicle than the first lead."""
         return self.d_rel - first.d_rel > SECOND_GAP or abs(self.v_rel - first.v_rel) > SECOND_SPEED
 
     def lead_data(self, radar_offset: float) -> LeadData:
-        """The message, with the distance from the bumper reference."""
+        """Return the message; its distance is from the bumper reference."""
         mean, tracks = self._mean, self._tracks
         return LeadData(
             status=True,
@@ -135,9 +134,9 @@ class Cluster:
 
 
 def cluster_tracks(tracks: Sequence[Track]) -> list[Cluster]:
-    """Centroid linkage on (distance, twice the lateral position, speed) up to a distance of 2.5.
+    """Cluster by centroid linkage on (distance, twice the lateral position, speed) up to a distance of 2.5.
 
-    Lateral positions count double because the radar measures them badly.
+    Lateral positions have double weight because the radar measures them badly.
     """
     groups = [((t.d_rel, 2.0 * t.y_rel, t.v_rel), [t]) for t in tracks]
     while len(groups) > 1:

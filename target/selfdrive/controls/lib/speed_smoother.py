@@ -1,4 +1,4 @@
-"""Reaches a speed target within acceleration and jerk limits."""
+"""Reaches a target speed within acceleration and jerk limits."""
 
 from math import sqrt
 from typing import NamedTuple
@@ -16,7 +16,7 @@ class Limits(NamedTuple):
 
 
 def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float) -> tuple[float, float]:
-    """Speed and acceleration `dt` s from now, on the fastest way from (v, a) to (v_target, 0)."""
+    """Return speed and acceleration `dt` s from now, on the fastest way from (v, a) to (v_target, 0)."""
     a_min, a_max, j_min, j_max = limits
     dv = v_target - v
     if dv > 0.0 and a < 0.0:
@@ -34,7 +34,7 @@ def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float)
 
     # speed still gained if acceleration returns to zero immediately
     dv_settle = -0.5 * a * a / (j_min if a >= 0.0 else j_max)
-    if dv < dv_settle:  # slowing down: speeding up with all signs reversed
+    if dv < dv_settle:  # to slow down, speed up with all signs reversed
         gained, a = _raise(-dv, -a, -a_min, -j_max, -j_min, dt)
         return v - gained, -a
     gained, a = _raise(dv, a, a_max, j_min, j_max, dt)
@@ -42,7 +42,7 @@ def smooth_speed(v: float, a: float, v_target: float, limits: Limits, dt: float)
 
 
 def _raise(dv: float, a: float, a_max: float, j_min: float, j_max: float, dt: float) -> tuple[float, float]:
-    """Speed gained and acceleration after `dt` of jerk up, hold, jerk down towards a gain of `dv`."""
+    """Speed gained and acceleration after `dt` of jerk up, hold, jerk down, to gain `dv` in total."""
     # the small term keeps the root's argument non-negative
     a_peak = sqrt((0.5 * a * a / j_max + dv + 1e-9) / (0.5 / j_max - 0.5 / j_min))
     if a_peak > a_max:

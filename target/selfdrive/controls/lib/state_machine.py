@@ -1,4 +1,4 @@
-"""The control state: how events engage and disengage."""
+"""The control state: how events engage and disengage the controller."""
 
 from collections.abc import Sequence
 
@@ -32,16 +32,15 @@ class StateMachine:
 
     @property
     def enabled(self) -> bool:
-        """Engaged, perhaps still waiting for the driver's foot."""
+        """Engaged, perhaps still waiting for the driver to release a pedal."""
         return self.state != DISABLED
 
     @property
     def active(self) -> bool:
-        """Actuators are controlled."""
         return self.state == ENABLED or self.state == SOFT_DISABLING
 
     def update(self, events: Sequence[Event], alerts: AlertManager, t: float) -> bool:
-        """Advance one cycle at time `t` (s) and raise the alerts of the transition; True if just engaged."""
+        """Advance to time `t` (s) and raise the transition's alerts; return True if just engaged."""
         self._cycles_left = max(0, self._cycles_left - 1)
         if not events and self.state in (DISABLED, ENABLED):
             return False  # the usual case
@@ -55,7 +54,7 @@ class StateMachine:
             self._soften(events, alerts, t)
         elif self.state == SOFT_DISABLING:
             self._harden(events)
-        elif has_kind(events, SOFT_DISABLE):  # pre-enabled: no gradual hand-over needed
+        elif has_kind(events, SOFT_DISABLE):  # the usual case
             self._disable(names_of_kind(events, SOFT_DISABLE), alerts, t)
         elif not has_kind(events, PRE_ENABLE):
             self.state = ENABLED
@@ -79,7 +78,6 @@ class StateMachine:
             alerts.add(name, t)
 
     def _soften(self, events: Sequence[Event], alerts: AlertManager, t: float) -> None:
-        """Enabled: a soft reason to disengage starts the hand-over time."""
         names = names_of_kind(events, SOFT_DISABLE)
         for name in names:
             alerts.add(name, t)
@@ -88,7 +86,7 @@ class StateMachine:
             self._cycles_left = SOFT_DISABLE_CYCLES
 
     def _harden(self, events: Sequence[Event]) -> None:
-        """Soft disabling: return if the reason is gone, disengage if the time is up."""
+        """Return to ENABLED if the reason is gone; disengage if the time is up."""
         if not has_kind(events, SOFT_DISABLE):
             self.state = ENABLED
         elif self._cycles_left == 0:

@@ -1,4 +1,4 @@
-"""Steady-state bicycle model: from steering angle to curvature and back.
+"""Steady-state bicycle model: converts between steering angle and curvature.
 
 Source: M. Guiggiani, The Science of Vehicle Dynamics (2014), steady-state cornering.
 """
@@ -19,13 +19,11 @@ class VehicleModel:
         self.slip_factor = params.mass * balance / (params.wheelbase**2 * stiff_front * stiff_rear)
 
     def curvature_factor(self, v_ego: float) -> float:
-        """Curvature for one radian at the road wheels (1/m)."""
+        """Return the curvature for one radian at the road wheels (1/m)."""
         return 1.0 / ((1.0 - self.slip_factor * v_ego * v_ego) * self.wheelbase)
 
     def curvature(self, steering_angle: float, v_ego: float) -> float:
-        """Curvature that a steering-wheel angle leads to."""
         return self.curvature_factor(v_ego) * steering_angle / self.steer_ratio
 
     def steering_angle(self, curvature: float, v_ego: float) -> float:
-        """Steering-wheel angle that a curvature needs."""
         return curvature * self.steer_ratio / self.curvature_factor(v_ego)

@@ -15,14 +15,14 @@ Q_DISTANCE = 0.5  # m^2, each cycle
 Q_RATE = 1.0  # (m/s)^2, each cycle
 
 MAX_DISTANCE = 4.0
-MAX_SPEED_DIFF = 10.0  # m/s, cameras estimate speed badly
+MAX_SPEED_DIFF = 10.0  # m/s; cameras estimate speed badly
 
 
 class VisionPoint:
-    """Distance and relative speed of the camera's lead; alone it never becomes a lead.
+    """Distance and relative speed of the camera's lead, which never becomes a lead alone.
 
-    The simulated camera measures from the bumper, as the original's did, while tracks are measured from the
-    camera, 2.7 m further back; the match is wide enough for both.
+    As in the original, the camera measures from the bumper but tracks are measured from the camera, 2.7 m
+    further back; the match is wide enough for both.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,6 @@ class VisionPoint:
         self.valid = False
 
     def update(self, lead: LeadVision) -> None:
-        """One radar cycle with the camera's newest lead."""
         variance = lead.std * lead.std
         self.valid = lead.prob > MIN_PROB
         if self.valid:
@@ -40,7 +39,7 @@ class VisionPoint:
             self._filter.restart(lead.d_rel, variance, RATE_VARIANCE)
 
     def best_match(self, tracks: Iterable[Track], path: Poly) -> Track | None:
-        """The track most likely to be the camera's lead, assumed on the path; None if none is near."""
+        """Return the track most likely to be the camera's lead, assumed on the path; None if none is near."""
         if not self.valid:
             return None
         d_rel, v_rel = self._filter.value, self._filter.rate

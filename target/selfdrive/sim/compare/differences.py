@@ -18,7 +18,7 @@ _NOTHING = Limits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crossing:
-    """An interval (s) with the difference outside the band; `worst` is its largest, at `at` s."""
+    """An interval (s) with the difference outside the band; `worst` is the largest difference, at `at` s."""
 
     begin: float
     end: float
@@ -40,7 +40,6 @@ class ChannelResult:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """The limits that are exceeded."""
         found = (
             ("rms", self.rms, self.limits.rms),
             ("max", abs(self.largest), self.limits.max),
@@ -51,7 +50,7 @@ class ChannelResult:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FigureResult:
-    """One key figure of both; `limit` None: not limited."""
+    """One key figure of run and reference; `limit` None: not limited."""
 
     name: str
     reference: figures.Value
@@ -60,18 +59,16 @@ class FigureResult:
 
     @property
     def difference(self) -> float:
-        """The distance of both values."""
         return figures.difference(self.name, self.reference, self.ours)
 
     @property
     def failed(self) -> bool:
-        """Whether the limit is exceeded."""
         return self.limit is not None and self.difference > self.limit + 1e-9
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Comparison:
-    """All channels and key figures of one reference."""
+    """The comparison of all channels and key figures with one reference."""
 
     name: str
     channels: tuple[ChannelResult, ...]
@@ -79,7 +76,6 @@ class Comparison:
 
     @property
     def good(self) -> bool:
-        """Whether everything is within tolerance."""
         return not any(result.failures for result in self.channels) and not any(
             result.failed for result in self.figures
         )
@@ -90,7 +86,7 @@ def compare(
 ) -> Comparison:
     """Compare a recorded trace (100 Hz) with its reference.
 
-    `free_road`: without a lead, its own speed is not compared. ConfigError if the two cover different times,
+    On a `free_road`, the lead's speed is not compared. Raises ConfigError if the two cover different times,
     or the reference lacks a limited channel.
     """
     ours = channels_of(trace)
@@ -121,7 +117,6 @@ def _same_time(reference: Reference, steps: int) -> None:
 
 
 def _complete(reference: Reference, tolerances: Tolerances) -> None:
-    """Every channel with a tolerance must be present."""
     needed = {name: (name,) for name in tolerances.channels}
     needed |= {name: figures.CHANNELS[name] for name in tolerances.figures}
     for limited, channels in needed.items():
@@ -140,7 +135,7 @@ def _complete(reference: Reference, tolerances: Tolerances) -> None:
 def _figures(
     reference: Reference, ours: dict[str, np.ndarray], limits: dict[str, float]
 ) -> tuple[FigureResult, ...]:
-    """Both from the reference's rows, except that our engagement uses every step."""
+    """Both figures use the reference's rows, except that our engagement uses every step."""
     theirs = figures.key_figures(reference.steps, reference.channels)
     rows = {name: values[reference.steps] for name, values in ours.items()}
     mine = figures.key_figures(reference.steps, rows)
@@ -183,7 +178,7 @@ def _both_see_a_lead(reference: Reference, ours: dict[str, np.ndarray]) -> np.nd
 def _differences(column: Column, theirs: np.ndarray, channel: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Ours at `steps` minus the reference: 0 or 1 for exclusive values, infinite if ours is NaN.
 
-    Only the headway may be infinite, at standstill; it is not compared then.
+    Only the headway may be infinite, at standstill; then it is not compared.
     """
     ours = channel[np.maximum(steps, 0)]
     if column.exclusive:
@@ -217,8 +212,8 @@ def crossings(seconds: np.ndarray, differences: np.ndarray, band: float) -> tupl
 def time_lag(steps: np.ndarray, reference: np.ndarray, channel: np.ndarray) -> float | None:
     """The channel's delay behind the reference (s, at most 1): the shift with the highest correlation.
 
-    None without enough variation. Among similarly good shifts, the smallest counts: a steady slope fits any
-    shift.
+    None without enough variation. Of similarly good shifts, the smallest is used, because a steady slope fits
+    any shift.
     """
     apart: dict[int, float] = {}  # 1 minus correlation, by shift
     for shift in sorted(range(-_LONGEST_LAG, _LONGEST_LAG + 1), key=abs):

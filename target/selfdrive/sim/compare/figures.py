@@ -23,7 +23,7 @@ CHANNELS = {  # the channels of each figure
     "max_brake": ("brake",),
 }
 
-_STANDSTILL = 0.3  # m/s; the headway is meaningless below
+_STANDSTILL = 0.3  # m/s; below this the headway is meaningless
 
 Value = float | tuple[float, ...] | None
 
@@ -62,7 +62,6 @@ def difference(name: str, reference: Value, ours: Value) -> float:
 
 
 def text(name: str, value: Value) -> str:
-    """A figure's value for display."""
     if value is None:
         return "never"
     if name == "engaged_s":

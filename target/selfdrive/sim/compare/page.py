@@ -40,7 +40,7 @@ path.hazard{stroke:var(--hazard);stroke-width:18}text.hazard{fill:var(--hazard)}
 .bad,span.hazard{color:var(--bad)}span.alert{color:var(--alert)}.good{color:var(--good)}
 """
 
-# Of each panel: title, unit, and lines of (label, channel).
+# For each panel: title, unit, and lines of (label, channel).
 _PANELS = (
     ("Distance", "m", (("to the lead", "d_rel"),)),
     ("Speed", "m/s", (("host", "v_ego"), ("lead", "v_lead"), ("set", "v_cruise"))),
@@ -60,7 +60,7 @@ _LEAD_ESTIMATES = ("lead_v_lead_k", "lead_a_lead_k")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Maneuver:
-    """A run, and its reference with the comparison if there is one."""
+    """A run, with its reference and comparison, if any."""
 
     run: Run
     reference: Reference | None
@@ -68,7 +68,6 @@ class Maneuver:
 
 
 def page(maneuvers: list[Maneuver], plant: str) -> str:
-    """The self-contained HTML page."""
     rows = "".join(_overview_row(one) for one in maneuvers)
     head = "".join(f"<th>{_TITLES[name]}</th>" for name in figures.FIGURES)
     return (
@@ -164,7 +163,6 @@ def _panels(one: Maneuver) -> list[Panel]:
 
 
 def _visible(channels: dict[str, np.ndarray], channel: str) -> np.ndarray:
-    """A channel, blank where it is meaningless: no set speed while off, no estimate without a lead."""
     values, condition = channels[channel], None
     if channel == "v_cruise":
         condition = channels.get("engaged")

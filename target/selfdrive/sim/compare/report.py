@@ -5,13 +5,13 @@ from math import isfinite
 from selfdrive.sim.compare import figures
 from selfdrive.sim.compare.differences import ChannelResult, Comparison, FigureResult
 
-_SMALLEST = 5e-5  # smaller differences are rounded to 0, and their time is meaningless
+_SMALLEST = 5e-5  # smaller differences are rounded to 0 and have no time
 
 _HEAD = f"  {'channel':<16}{'unit':<6}{'rms':>10}{'largest':>11}{'at [s]':>9}{'lag [s]':>9}  limits"
 
 
 def lines(comparison: Comparison, *, long: bool) -> list[str]:
-    """Key figures and limited channels; `long` adds every other channel and every crossing."""
+    """Key figures and limited channels; `long` adds all other channels and all crossings."""
     verdict = "within tolerance" if comparison.good else "BEYOND TOLERANCE"
     out = [f"{comparison.name}: {verdict}"]
     out += [f"  {figure_line(result)}" for result in comparison.figures]
@@ -24,7 +24,6 @@ def lines(comparison: Comparison, *, long: bool) -> list[str]:
 
 
 def figure_line(result: FigureResult) -> str:
-    """One key figure of both."""
     ours, theirs = figures.text(result.name, result.ours), figures.text(result.name, result.reference)
     limit = "" if result.limit is None else f", limit {result.limit:g}"
     apart = f"{result.difference:.3f}" if isfinite(result.difference) else "not comparable"

@@ -1,4 +1,4 @@
-"""Runs to compare or show: made from a scenario, or loaded from finished folders."""
+"""Runs to compare or plot, simulated or loaded from their folders."""
 
 import json
 import zipfile
@@ -13,12 +13,12 @@ from selfdrive.sim.run import simulate
 from selfdrive.sim.scenario import Scenario, load_scenario
 
 SCENARIOS = Path(__file__).parents[4] / "fault_library" / "scenarios"  # of the surrounding project
-NO_LEAD = "_nolead"  # suffix of the run's name if the lead was left out
+NO_LEAD = "_nolead"  # suffix of a run's name if the lead was left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Run:
-    """A finished run. `record` and `trace` as in record.json and trace.npz."""
+    """A finished run, with the contents of record.json and trace.npz."""
 
     name: str
     title: str
@@ -27,12 +27,11 @@ class Run:
 
     @property
     def free_road(self) -> bool:
-        """Whether there is no lead."""
         return self.record["no_lead"]
 
 
 def find(name: str, scenarios: Path) -> Scenario:
-    """The scenario of a run. ConfigError if it is missing or invalid."""
+    """The scenario of a run. Raises ConfigError if it is missing or invalid."""
     path = scenarios / f"{name.removesuffix(NO_LEAD)}.yaml"
     if not path.is_file():
         raise ConfigError(
@@ -48,13 +47,12 @@ def find(name: str, scenarios: Path) -> Scenario:
 
 
 def drive(name: str, scenario: Scenario) -> Run:
-    """Run a scenario from its start to its end."""
     result = simulate(scenario, seed=0)
     return Run(name=name, title=scenario.title, record=result.record, trace=result.trace)
 
 
 def load(folder: Path, plant: str) -> Run:
-    """Load a finished run's folder. ConfigError if it is not one, or belongs to another run or plant."""
+    """Load a finished run's folder. Raises ConfigError if it is not one, or of a different run or plant."""
     try:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         with np.load(folder / "trace.npz", allow_pickle=False) as arrays:

@@ -7,15 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-# In tenths of a pixel, so that integers are fine enough.
+# In tenths of a pixel, to use integers.
 _WIDTH, _HEIGHT = 3600, 2000
 _LEFT, _RIGHT, _TOP, _BOTTOM = 380, 3540, 150, 1750
-_SLACK = 2.5  # allowed distance of a line from its points
+_SLACK = 2.5  # largest distance of a line from its points
 _TICKS = 4
 
 
 class Line(NamedTuple):
-    """A line: its legend label, colour number in the panel, times (s) and values."""
+    """A line: legend label, colour number in the panel, times (s) and values."""
 
     label: str
     colour: int
@@ -58,7 +58,7 @@ def draw(panel: Panel, marks: tuple[Mark, ...], end: float) -> str:
 
 
 def simplify(points: np.ndarray, slack: float) -> np.ndarray:
-    """The rows of `points` (n, 2; x ascending) for a line that misses no point by more than `slack` in y."""
+    """The rows of `points` (n, 2; x ascending) for a line within `slack` in y of all points."""
     keep = {0, len(points) - 1}
     spans = [(0, len(points) - 1)]
     while spans:
@@ -77,7 +77,6 @@ def simplify(points: np.ndarray, slack: float) -> np.ndarray:
 
 
 def _path(x: np.ndarray, y: np.ndarray) -> str:
-    """Path data of the finite sections, as integers relative to the previous point."""
     finite = np.isfinite(y)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], finite.astype(int), [0]))))
     parts = []
@@ -91,7 +90,7 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
 
 
 def _scale(lines: tuple[Line, ...]) -> tuple[float, float, float]:
-    """Lowest and highest value of the axis and its tick distance; the range is at least 0.1."""
+    """Lowest and highest value of the axis, at least 0.1 apart, and its tick distance."""
     finite = np.concatenate([line.values[np.isfinite(line.values)] for line in lines] or [np.zeros(1)])
     if not finite.size:
         finite = np.zeros(1)

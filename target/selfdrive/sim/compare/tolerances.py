@@ -32,7 +32,7 @@ class Limits:
 
     @property
     def band(self) -> float | None:
-        """The smallest single difference worth listing."""
+        """The smallest difference worth listing."""
         return self.rms if self.max is None else self.max
 
 
@@ -45,7 +45,7 @@ class Tolerances:
 
 
 def load_tolerances(path: Path) -> Tolerances:
-    """Read the table. ConfigError for anything a user can fix."""
+    """Read the table. Raises ConfigError if it is invalid."""
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:

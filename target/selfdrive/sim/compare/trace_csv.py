@@ -1,4 +1,4 @@
-"""Reference traces as CSV: a header, then one row for each time; cells without a published value are empty.
+"""Reference traces as CSV: a header, then a row for each time; cells without a published value are empty.
 
 Row `time` = t is the state after the simulation step that began at t, as in trace.npz. Every column maps to a
 recorder channel. 20 Hz is usual; any multiple of 10 ms is accepted.
@@ -24,18 +24,17 @@ _FCW_BIT = 1 << COUNTED_ALERTS.index("fcw")
 
 
 class Column(NamedTuple):
-    """One column. `factor` converts its numbers to SI; `words` are the names that it may hold instead."""
+    """One column. `factor` converts its numbers to SI; `words` are the names that it may contain instead."""
 
     name: str
     channel: str
     unit: str = "-"
     factor: float = 1.0
     words: tuple[str, ...] = ()
-    published: bool = False  # a controller message, visible up to a control cycle later
+    published: bool = False  # from a controller message, visible up to a control cycle later
 
     @property
     def exclusive(self) -> bool:
-        """Whether values are only equal or not, without a distance."""
         return self.channel in ("engaged", "fcw", "lead_status") or bool(self.words)
 
 
@@ -68,14 +67,15 @@ COLUMNS = (
     Column("cum_path", "lateral_offset", "m"),
 )
 BY_CHANNEL = {column.channel: column for column in COLUMNS}
-UNCOMPARED = ("distance", "distance_lead", "alertText1", "alertText2")  # allowed in a file
+UNCOMPARED = ("distance", "distance_lead", "alertText1", "alertText2")  # allowed in a file, but ignored
 
 _BY_NAME = {column.name: column for column in COLUMNS}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reference:
-    """A reference trace: `steps` (row's step of 10 ms), `channels` (values in SI units, nan where empty)."""
+    """A reference trace: `steps` (each row's step of 10 ms), `channels` (values in SI units, NaN where
+    empty)."""
 
     name: str
     path: Path
@@ -84,16 +84,16 @@ class Reference:
 
 
 def channels_of(trace: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """A recorded trace's channels as floats, with `fcw` taken out of the alert bits."""
+    """The channels of a recorded trace as floats, with `fcw` extracted from the alert bits."""
     channels = {name: np.asarray(values, dtype=float) for name, values in trace.items()}
     channels["fcw"] = (np.asarray(trace["alert"], dtype=int) & _FCW_BIT > 0).astype(float)
     return channels
 
 
 def read_reference(path: Path) -> Reference:
-    """Read a file. ConfigError, with the line, if it is not such a trace."""
+    """Read a file. Raises ConfigError, with the line, if it is not such a trace."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:  # some files begin with a mark
+        with path.open(newline="", encoding="utf-8-sig") as file:  # some files begin with a byte order mark
             rows = csv.reader(file)
             names = _header(next(rows, []), path)
             lines = [(rows.line_num, row) for row in rows]
@@ -118,7 +118,7 @@ def read_reference(path: Path) -> Reference:
 
 
 def write_reference(path: Path, trace: dict[str, np.ndarray]) -> None:
-    """Write every fifth step of a recorded trace as a reference. ConfigError if it cannot be written."""
+    """Write every fifth step of a recorded trace as a reference. Raises ConfigError if that fails."""
     channels = channels_of(trace)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

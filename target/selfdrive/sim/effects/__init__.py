@@ -1,9 +1,9 @@
-"""Weather, dirt and light that come between the road and the camera's picture.
+"""Weather, dirt and light between the road and the camera's picture.
 
-Only faults put these to use: a run without a fault never imports this package. Three presets: the paper's
-effects with its parameters (PaperRain, PaperFog, PaperSnow, PaperOcclusion, and the tone changes), those as
-its authors coded them (CodedRain, CodedFog, CodedSnow, CodedOcclusion, and the same tone changes), and
-physical ones in real units (Fog, Rain, Snow, LensMud, SunGlare, LowLight).
+Only faults import this package. There are three presets: the paper's effects with its parameters (PaperRain,
+PaperFog, PaperSnow, PaperOcclusion, and the tone changes), those as its authors coded them (CodedRain,
+CodedFog, CodedSnow, CodedOcclusion, and the same tone changes), and physical ones in real units (Fog, Rain,
+Snow, LensMud, SunGlare, LowLight).
 """
 
 from selfdrive.sim.effects.air import Fog

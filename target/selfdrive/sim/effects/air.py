@@ -1,8 +1,8 @@
-"""Light on its way through air: what is left of it, and the airlight that takes its place.
+"""Light on its way through air: attenuation and airlight.
 
-Koschmieder's law: over a distance d through air of extinction b a share exp(-b * d) of an object's light
-arrives, and the rest is replaced by airlight, the level of the horizon. Visibility is the distance over
-which contrast falls to 5 %, so b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
+Koschmieder's law: after a distance d through air of extinction b, a share exp(-b * d) of an object's light is
+left; airlight, with the level of the horizon, replaces the rest. At the visibility distance, 5 % of the
+contrast is left: b = -ln(0.05) / visibility (meteorological optical range, WMO No. 8).
 """
 
 from math import cos, exp, log, sin
@@ -16,18 +16,17 @@ from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
 THRESHOLD = 0.05
-LAYER = 100.0  # m: above the road there is clear sky again
+LAYER = 100.0  # m; above this height, the sky is clear
 
 
 def extinction(visibility: float) -> float:
-    """Extinction coefficient (1/m) of air with this visibility (m)."""
     return -log(THRESHOLD) / visibility
 
 
 def ways(camera: CameraModel) -> np.ndarray:
-    """Way of each pixel's light (m) through the layer of air: from the road, or from the layer's top.
+    """Path of each pixel's light (m) through the layer of air, from the road or from the layer's top.
 
-    Float32 (rows, width); infinite at the horizon. The road is flat, and nothing stands on it.
+    Float32 (rows, width); infinite at the horizon. The road is flat and empty.
     """
     right = (np.arange(camera.width) - camera.cx) / camera.fx
     down = ((np.arange(camera.rows) - camera.cy) / camera.fy)[:, None]
@@ -38,20 +37,21 @@ def ways(camera: CameraModel) -> np.ndarray:
 
 
 def clearness(coefficient: float, camera: CameraModel) -> np.ndarray:
-    """Share of each pixel's light, float32, that air of this extinction coefficient (1/m) lets through."""
+    """Share of each pixel's light, float32, that air of this extinction coefficient (1/m) transmits."""
     return each(exp, np.float32(-coefficient) * ways(camera)).astype(np.float32)
 
 
 def airlight(picture: np.ndarray | Picture, camera: CameraModel) -> float:
-    """Grey level of the air: the mean above the horizon, or of the uppermost tenth where little is above."""
+    """Grey level of the air: the mean above the horizon, or of the top tenth of the rows if the horizon is
+    higher."""
     rows = max(int(camera.horizon), camera.rows // 10)
     return cv2.mean(picture[:rows, :])[0]
 
 
 def veiled(picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, air: float) -> np.ndarray:
-    """The picture through a veil that keeps its light, and particles that take of it; `air` takes its place.
+    """The picture after attenuation by a veil and by particles; `air` replaces the lost light.
 
-    All are uint8 of one shape, shares in parts of 255; `air` is a grey level.
+    Arrays are uint8 of the same shape, shares in units of 1/255; `air` is a grey level.
     """
     kept = cv2.multiply(veil, cv2.bitwise_not(taken), scale=1.0 / 255.0)
     lost = cv2.convertScaleAbs(kept, alpha=-air / 255.0, beta=air)  # air * (1 - kept / 255)
@@ -59,7 +59,7 @@ def veiled(picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, air: float)
 
 
 class Fog(Effect):
-    """Even fog of a given visibility."""
+    """Uniform fog of a given visibility."""
 
     UNIT, LEAST, MOST, MOVING = "m", 5.0, 20000.0, False
 

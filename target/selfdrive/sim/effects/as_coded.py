@@ -1,8 +1,7 @@
-"""Rain, fog, snow and occlusion as the paper's authors coded them, which is not what their text says.
+"""Rain, fog, snow and occlusion as the paper's authors coded them, which differs from their text.
 
-Every picture is drawn anew from the seed and its own number: streaks, flakes, droplets and blobs do not stay
-or move, they are elsewhere in the next picture. Contrast, brightness and blur are the ones in `tone`.
-Gaussians end at two sigma, as those of MATLAB do unless it is told otherwise.
+Every picture is drawn anew from the seed and its number, so streaks, flakes, droplets and blobs do not move
+but jump. Contrast, brightness and blur are those in `tone`. Gaussians end at two sigma, MATLAB's default.
 """
 
 from abc import abstractmethod
@@ -22,20 +21,20 @@ from selfdrive.sim.effects.scattered import Streak
 from selfdrive.sim.picture import Picture, Region, whole
 
 PICTURES_PER_SECOND = 20
-CANVAS = 2  # times the picture's size each way: streaks are drawn on it
-CROP = 264 / 480  # of the picture's rows: where in the canvas the picture begins
-STREAKS = 100  # of each pass for each level
-STREAK_GAINS = tuple(0.10 + 0.01 * k for k in range(1, 11))  # a pass for each
+CANVAS = 2  # multiple of the picture's size, each way, on which streaks are drawn
+CROP = 264 / 480  # of the picture's rows: top of the picture in the canvas
+STREAKS = 100  # per pass and level
+STREAK_GAINS = tuple(0.10 + 0.01 * k for k in range(1, 11))  # one pass each
 STREAK_LEVELS = np.array([round(WHITE * gain) for gain in STREAK_GAINS], np.uint8)
-STREAK_LENGTH, STREAK_LEAN = 32, radians(15.0)  # px; off the vertical
-DROPLETS = 15_000  # pixels for each level
+STREAK_LENGTH, STREAK_LEAN = 32, radians(15.0)  # px; from the vertical
+DROPLETS = 15_000  # pixels per level
 DROPLET_BLUR = 7.0  # px
-FLAKES = 250  # blocks in a layer
-FLAKE_REACH = 3  # px that a block of two by two reaches further when blurred
+FLAKES = 250  # blocks per layer
+FLAKE_REACH = 3  # px by which blurring enlarges a block of two by two
 FLAKE = 2 + 2 * FLAKE_REACH  # px
 BLOB_RADII = 5, 50  # px
 BLOB_BLUR = 7.0  # px
-COVERED = 150  # grey level of the blurred mask below which the mask is seen, not the road
+COVERED = 150  # grey level of the blurred mask; below it, the mask hides the road
 
 
 class _AsCoded(Effect):
@@ -49,7 +48,7 @@ class _AsCoded(Effect):
         return by
 
     def _prepare(self, random: np.random.Generator) -> None:
-        """Nothing is the same for all pictures."""
+        """Prepare nothing."""
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
         number = round(PICTURES_PER_SECOND * abs(scene.t))
@@ -60,7 +59,7 @@ class _AsCoded(Effect):
     def _drawn(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
     ) -> np.ndarray:
-        """The picture's region with what chance puts into it."""
+        """Return the picture's region with the random elements."""
 
     @property
     def _level(self) -> int:
@@ -68,7 +67,7 @@ class _AsCoded(Effect):
 
 
 class CodedRain(_AsCoded):
-    """Ten passes of streaks, each brighter than the last, on a blurred and darker picture."""
+    """Ten passes of streaks, each brighter than the one before, on a blurred and darkened picture."""
 
     def _build(self) -> str:
         self._blur = _gaussian(0.5 + self._level / 10.0)
@@ -90,7 +89,7 @@ class CodedRain(_AsCoded):
 
 
 class _Hazed(_AsCoded):
-    """White pixels in random places, blurred, added to a picture with less contrast."""
+    """Base of effects with the haze of CodedFog."""
 
     def _build(self) -> str:
         self._half_blur = _gaussian(DROPLET_BLUR / 2.0)
@@ -99,7 +98,6 @@ class _Hazed(_AsCoded):
     def _hazed(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
     ) -> np.ndarray:
-        """The picture's region behind the fog, which is blurred at half its size."""
         shape, blur = picture.shape, self._half_blur
         droplets = self._scattered.droplets(random, shape, DROPLETS * self._level)
         wide = _halved(region.around(2 * (blur.size // 2) + 2, shape), shape)
@@ -110,7 +108,7 @@ class _Hazed(_AsCoded):
 
 
 class CodedFog(_Hazed):
-    """The haze alone."""
+    """White pixels in random places, blurred, added to a picture with reduced contrast."""
 
     def _drawn(
         self, picture: np.ndarray | Picture, region: Region, random: np.random.Generator
@@ -119,7 +117,7 @@ class CodedFog(_Hazed):
 
 
 class CodedSnow(_Hazed):
-    """The fog, and in front of it one layer of flakes for each level, blurred ever more, then smeared."""
+    """The haze, plus one layer of flakes per level with increasing blur, smeared."""
 
     def _prepare(self, random: np.random.Generator) -> None:
         self._smear = motion_kernel(5, 75.0)
@@ -131,7 +129,7 @@ class CodedSnow(_Hazed):
         rows, columns = (size + 2 * FLAKE_REACH for size in picture.shape)
         places = random.integers(0, (rows - FLAKE) * columns, (self._level, FLAKES))
         wide = region.around(len(self._smear) // 2, picture.shape)
-        # Only flakes that begin in these rows are seen; one at a row's end goes on in the next.
+        # Only flakes that begin in these rows are visible; a flake at a row's end continues in the next row.
         first, end = max(wide.top + FLAKE_REACH - FLAKE, 0), wide.bottom + FLAKE_REACH
         light = self._scattered.flake_light(places, self._flakes[: self._level], columns, first, end)
         down, right = wide.top + FLAKE_REACH - first, wide.left + FLAKE_REACH
@@ -141,7 +139,7 @@ class CodedSnow(_Hazed):
 
 
 class CodedOcclusion(_AsCoded):
-    """One blob for each level in the picture's lower half: a black core, and a gray rim with a hard edge."""
+    """One blob per level in the lower half of the picture: a black core and a gray rim with a hard edge."""
 
     def _build(self) -> str:
         self._blur = _gaussian(BLOB_BLUR)
@@ -162,7 +160,7 @@ class CodedOcclusion(_AsCoded):
 
 
 def _halved(region: Region, shape: tuple[int, int]) -> Region:
-    """The region, or a little more, that is halved as the whole picture is: all of it if its size is odd."""
+    """The region, enlarged so that halving it equals halving the whole; all of it for odd sizes."""
     if shape[0] % 2 or shape[1] % 2:
         return whole(shape)
     top, bottom, left, right = region
@@ -170,17 +168,14 @@ def _halved(region: Region, shape: tuple[int, int]) -> Region:
 
 
 def _gaussian(sigma: float) -> Gaussian:
-    """A Gaussian that is cut at two sigma."""
     return build_gaussian(sigma, 2 * _reach(sigma) + 1)
 
 
 def _reach(sigma: float) -> int:
-    """How many pixels far such a Gaussian reaches."""
     return ceil(2.0 * sigma)
 
 
 def _streak() -> Streak:
-    """A streak's pixels, and where it ends."""
     way = np.rint(STREAK_LENGTH * np.array([-sin(STREAK_LEAN), cos(STREAK_LEAN)])).astype(np.int_)
     canvas = np.zeros((2 * STREAK_LENGTH, 2 * STREAK_LENGTH), np.uint8)
     cv2.line(canvas, (STREAK_LENGTH, 0), (STREAK_LENGTH + int(way[0]), int(way[1])), 1)
@@ -190,7 +185,7 @@ def _streak() -> Streak:
 
 def _flake(sigma: float) -> np.ndarray:
     """Grey levels (FLAKE x FLAKE, uint16) of a blurred white block."""
-    block = np.zeros((FLAKE + 2 * FLAKE_REACH,) * 2, np.uint8)  # a blur reflects what lies at a border
+    block = np.zeros((FLAKE + 2 * FLAKE_REACH,) * 2, np.uint8)  # blurring mirrors the picture at its border
     block[2 * FLAKE_REACH : -2 * FLAKE_REACH, 2 * FLAKE_REACH : -2 * FLAKE_REACH] = WHITE
     inside = slice(FLAKE_REACH, -FLAKE_REACH)
     return _gaussian(sigma)(block)[inside, inside].astype(np.uint16)

@@ -1,4 +1,4 @@
-"""Drawing thousands of soft specks and streaks at once, and tiles that repeat."""
+"""Draws thousands of soft specks and streaks at once; tiles that repeat."""
 
 from collections.abc import Callable
 
@@ -8,10 +8,10 @@ from selfdrive.sim.picture import Picture, Region
 
 
 def splat(picture: np.ndarray, columns: np.ndarray, rows: np.ndarray, weights: np.ndarray) -> None:
-    """Add to `picture`, float32 and contiguous, each point's weight, shared among four pixels.
+    """Add each point's weight to the four nearest pixels of `picture` (float32, contiguous).
 
-    Points are in pixels, whole numbers being pixel centres. Who lies beyond the border enters at the other
-    side, so that the picture's sum grows by that of the weights.
+    Points are in pixels; integers are pixel centres. Points beyond the border wrap around, so the picture's
+    sum grows by that of the weights.
     """
     height, width = picture.shape
     left, top = np.floor(columns), np.floor(rows)
@@ -30,9 +30,9 @@ def splat(picture: np.ndarray, columns: np.ndarray, rows: np.ndarray, weights: n
 def strokes(
     start: np.ndarray, end: np.ndarray, counts: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points evenly along n lines, `counts` (n,) of them on each: (share of the way, columns, rows).
+    """Points along n lines, evenly spaced, `counts` (n,) on each: (share of the way, columns, rows).
 
-    `start` and `end` are (2, n) px, columns then rows. The points of a line follow each other.
+    `start` and `end` are (2, n) px, columns then rows. Points are ordered by line.
     """
     lengths = counts.astype(np.float32)
     first = np.repeat((np.cumsum(counts) - counts).astype(np.float32), counts)
@@ -43,27 +43,27 @@ def strokes(
 
 
 def seamless(levels: np.ndarray, margin: int, change: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """A tile changed by a filter reaching `margin` pixels far, such that it still repeats seamlessly."""
+    """Apply a filter with a radius of `margin` pixels to a tile, so that it still repeats seamlessly."""
     return change(np.pad(levels, margin, mode="wrap"))[margin:-margin, margin:-margin]
 
 
 def filtered(
     picture: np.ndarray | Picture, region: Region, margin: int, change: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
-    """The region of a picture that is changed by a filter reaching at most `margin` pixels far."""
+    """Apply a filter with a radius of at most `margin` pixels to a region of a picture."""
     wide = region.around(margin, picture.shape)
     return change(picture[wide.part])[region.inside(wide)]
 
 
 class Tile:
-    """A grey picture that repeats in both directions and is seen through a window of its own size."""
+    """A grey picture that repeats in both directions, seen through a window of its own size."""
 
     def __init__(self, levels: np.ndarray) -> None:
         self._rows, self._width = levels.shape
         self._four = np.tile(levels, (2, 2))
 
     def moved(self, right: float, down: float, region: Region) -> np.ndarray:
-        """A region of the window after the tile's content moved by whole pixels nearest to these; a view, not
-        to be written."""
+        """A region of the window after moving the tile's content by the nearest whole pixels; a read-only
+        view."""
         left, top = -round(right) % self._width, -round(down) % self._rows
         return self._four[top + region.top : top + region.bottom, left + region.left : left + region.right]

@@ -1,4 +1,4 @@
-"""The Gaussian blur in C, where that was compiled and gives OpenCV's bits."""
+"""The Gaussian blur in compiled C, if available and identical to OpenCV."""
 
 import ctypes
 from functools import cache
@@ -11,12 +11,11 @@ from selfdrive.common import compiled
 from selfdrive.sim.effects.gaussian import Gaussian
 
 C_SOURCE = Path(__file__).with_name("gaussian.c")
-MOST_REACH = 32  # px of a kernel to either side
-ONE = 256  # the sum of a kernel's weights
+MOST_REACH = 32  # px, largest kernel radius
+ONE = 256  # sum of a kernel's weights
 
 
 def build_gaussian(sigma: float, size: int = 0) -> Gaussian:
-    """A Gaussian, compiled where it may be."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library, sigma, size):
         return Gaussian(sigma, size)
@@ -24,7 +23,7 @@ def build_gaussian(sigma: float, size: int = 0) -> Gaussian:
 
 
 class CompiledGaussian(Gaussian):
-    """Does what Gaussian does: `library` is `gaussian.c`, compiled."""
+    """Gaussian that calls `library`, compiled `gaussian.c`."""
 
     def __init__(self, library: compiled.Library, sigma: float, size: int) -> None:
         super().__init__(sigma, size)
@@ -36,10 +35,9 @@ class CompiledGaussian(Gaussian):
         self._kernel = weights(sigma, self.size)
 
     def __call__(self, picture: np.ndarray) -> np.ndarray:
-        """The blurred picture."""
         rows, columns = picture.shape
         reach = self.size // 2
-        if min(rows, columns) <= reach or reach > MOST_REACH:  # mirrored more than once, or no room
+        if min(rows, columns) <= reach or reach > MOST_REACH:  # mirrored more than once, or too large
             return super().__call__(picture)
         if picture.strides[1] != 1:
             picture = np.ascontiguousarray(picture)
@@ -51,9 +49,9 @@ class CompiledGaussian(Gaussian):
 
 
 def weights(sigma: float, size: int) -> np.ndarray:
-    """Weights, whole numbers with the sum ONE, as OpenCV rounds them: what one loses the next one gets.
+    """Integer weights with the sum ONE, rounded like OpenCV's: each passes its rounding error to the next.
 
-    From the edge of the kernel to its middle; the other half is the same.
+    From the kernel's edge to its middle; the other half is the same.
     """
     of_edge, lost, middle = [], 0.0, ONE
     for weight in cv2.getGaussianKernel(size, sigma, cv2.CV_64F)[: size // 2, 0].tolist():
@@ -66,7 +64,8 @@ def weights(sigma: float, size: int) -> np.ndarray:
 
 @cache
 def agrees(library: compiled.Library, sigma: float, size: int) -> bool:
-    """Whether compiled code has OpenCV's bits with this kernel: another version may round otherwise."""
+    """Whether compiled code gives OpenCV's bits with this kernel; other OpenCV versions may round
+    differently."""
     fast, plain = CompiledGaussian(library, sigma, size), Gaussian(sigma, size)
     noise = (np.arange(48 * 72) * 40503 % 65521 % 256).astype(np.uint8).reshape(48, 72)
     return all(np.array_equal(fast(one), plain(one)) for one in (noise, (noise > 127) * np.uint8(255)))

@@ -1,4 +1,4 @@
-"""Rain and snow in C, where that was compiled and gives OpenCV's bits."""
+"""Rain and snow in compiled C, if available and identical to OpenCV."""
 
 import ctypes
 from collections.abc import Callable
@@ -22,13 +22,13 @@ C_SOURCE = Path(__file__).with_name("precipitation.c")
 AREA = 0.25 * np.pi
 PROBE = CameraModel(width=88, rows=64)
 ALL = whole((PROBE.rows, PROBE.width))
-AIRS = 93.75, 126.25, 11.9, 21.25  # levels of air at which a fused sum tells
+AIRS = 93.75, 126.25, 11.9, 21.25  # air levels at which fused sums give different bits
 
 _POINTER, _LONG, _FLOAT = ctypes.c_void_p, ctypes.c_long, ctypes.c_float
 
 
 class Parts(NamedTuple):
-    """What precipitation is made with."""
+    """The implementations that precipitation uses."""
 
     particles: Callable[..., Particles]
     cover: Callable[[CameraModel], Cover]
@@ -40,9 +40,9 @@ PLAIN = Parts(Particles, Cover, veiled, shrunk)
 
 
 def build_parts(camera: CameraModel) -> tuple[Parts, str]:
-    """The parts for a camera, in C where they may be, and which compiled code they calculate with, if any."""
+    """The parts for a camera, in C if possible, and the compiled code that they use, if any."""
     library = compiled.library(C_SOURCE)
-    # NumPy's numbers, unlike Python's, would have arrays calculated in double precision.
+    # NumPy's scalars, unlike Python's, change arrays to double precision.
     numbers = all(type(number) in (int, float) for number in astuple(camera))
     if library is None or not numbers or not agrees(library):
         return PLAIN, ""
@@ -54,8 +54,7 @@ def _compiled(library: compiled.Library) -> Parts:
 
 
 class CompiledParticles(Particles):
-    """Does what Particles does: `library` is `precipitation.c`, compiled. Its streaks are there until the
-    next ones are asked for."""
+    """Particles that calls `library`, compiled `precipitation.c`. The next call overwrites its streaks."""
 
     def __init__(self, library: compiled.Library, *of) -> None:
         super().__init__(*of)
@@ -71,7 +70,6 @@ class CompiledParticles(Particles):
         self._places = [array.ctypes.data for array in self._arrays]
 
     def streaks(self, scene: Scene, exposure: float) -> Streaks:
-        """The streaks of all particles in view in `exposure` seconds from the scene's moment."""
         camera, lean, upright = self._camera, sin(self._camera.pitch), cos(self._camera.pitch)
         tall, v_ego = camera.rows / camera.fy, float(scene.v_ego)
         numbers = (
@@ -89,18 +87,17 @@ class CompiledParticles(Particles):
 
 
 class CompiledCover(Cover):
-    """Does what Cover does, likewise."""
+    """Cover in compiled C."""
 
     def __init__(self, library: compiled.Library, camera: CameraModel) -> None:
         super().__init__(camera)
         self._taken = library.code.taken
         self._taken.argtypes = [*[_POINTER] * 3, _LONG, *[_POINTER] * 3, _FLOAT, _POINTER, _LONG, _POINTER]
         self._taken.restype = _LONG
-        # Places of grids: columns, then rows.
+        # Positions of the grids: columns, then rows.
         self._first, self._last = (np.ascontiguousarray(ends.T) for ends in (self._corners, self._ends))
 
     def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
-        """Shares in parts of 255, uint8, in a region of the picture."""
         start, end, width = map(np.ascontiguousarray, streaks)
         seen = np.array(windows(region, self._sizes), np.int_)
         out = np.empty(region.shape, np.uint8)
@@ -115,7 +112,7 @@ class CompiledCover(Cover):
 def _veiled(
     library: compiled.Library, picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, light: float
 ) -> np.ndarray:
-    """Does what `veiled` does, likewise."""
+    """`veiled` in compiled C."""
     code = library.code.veiled
     code.argtypes = [_POINTER, _LONG, _POINTER, _LONG, _POINTER, _LONG, _LONG, _FLOAT, _FLOAT, _POINTER]
     code.restype = None
@@ -127,7 +124,7 @@ def _veiled(
 
 
 def _shrunk(library: compiled.Library, picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Does what `shrunk` does, likewise."""
+    """`shrunk` in compiled C."""
     columns, rows = size
     if picture.shape != (COARSE * rows, COARSE * columns):
         return shrunk(picture, size)
@@ -141,13 +138,12 @@ def _shrunk(library: compiled.Library, picture: np.ndarray, size: tuple[int, int
 
 
 def _rows(picture: np.ndarray) -> np.ndarray:
-    """The picture with the pixels of a row next to each other."""
     return picture if picture.strides[1] == 1 else np.ascontiguousarray(picture)
 
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code has OpenCV's bits: one without fused sums, for instance, calculates otherwise."""
+    """Whether compiled code gives OpenCV's bits, which a version without fused sums does not."""
     number = np.arange(120)
     places = np.stack([number * 37 % 92 - 2.0, number * 53 % 68 - 2.0]).astype(np.float32)
     ways = np.stack([number % 7 * 0.83 - 2.4, number % 5 * 1.37]).astype(np.float32)

@@ -1,4 +1,4 @@
-"""Streaks, flakes and droplets in C, where that was compiled and draws NumPy's numbers."""
+"""Streaks, flakes and droplets in compiled C, if available and identical to NumPy."""
 
 import ctypes
 from collections.abc import Callable
@@ -13,13 +13,13 @@ from selfdrive.sim.effects import scattered
 from selfdrive.sim.effects.scattered import Streak
 
 C_SOURCE = Path(__file__).with_name("scattered.c")
-PROBE, COUNT = (300, 700), 5000  # a shape and a number of droplets, among which some numbers are refused
+PROBE, COUNT = (300, 700), 5000  # a shape and a number of droplets for which random numbers are rejected
 
 _POINTER, _LONG = ctypes.c_void_p, ctypes.c_long
 
 
 class Scattered(NamedTuple):
-    """The functions of `scattered`, or what does the same."""
+    """The functions of `scattered`, or compiled equivalents."""
 
     streak_light: Callable[..., np.ndarray]
     flake_light: Callable[..., np.ndarray]
@@ -30,7 +30,7 @@ PLAIN = Scattered(scattered.streak_light, scattered.flake_light, scattered.dropl
 
 
 def build_scattered() -> tuple[Scattered, str]:
-    """What scatters, in C where it may, and which compiled code it calculates with, if any."""
+    """The functions, in C if possible, and the compiled code that they use, if any."""
     library = compiled.library(C_SOURCE)
     if library is None or not agrees(library):
         return PLAIN, ""
@@ -88,10 +88,10 @@ def _droplets(
 
 @cache
 def agrees(library: compiled.Library) -> bool:
-    """Whether compiled code draws NumPy's numbers: another version may draw others."""
+    """Whether compiled code draws NumPy's random numbers, which may differ between versions."""
     seen = []
     for drawn in (scattered.droplets, partial(_droplets, library)):
         random = np.random.Generator(np.random.PCG64(11))
-        random.random(1, np.float32)  # uses half of a number
+        random.random(1, np.float32)  # uses half of a random number
         seen.append(drawn(random, PROBE, COUNT).tobytes())
     return seen[0] == seen[1]

@@ -1,7 +1,7 @@
-"""What an image effect is: a seeded, pure change of one grey picture of the camera.
+"""The base of image effects: seeded, pure changes of the camera's grey picture.
 
-Grey levels are taken as proportional to light, as machine-vision cameras deliver them, so that laws of
-optics hold for them as they stand.
+Grey levels are treated as proportional to light, as machine-vision cameras deliver them, so the laws of
+optics apply directly.
 """
 
 from abc import ABC, abstractmethod
@@ -19,7 +19,7 @@ WHITE = 255
 
 
 class Scene(Protocol):
-    """What an effect knows of the world; the simulator's ground truth is one."""
+    """The world as an effect sees it; the simulator's ground truth is one."""
 
     @property
     def t(self) -> float:
@@ -28,7 +28,7 @@ class Scene(Protocol):
 
     @property
     def position(self) -> float:
-        """Way driven along the road (m)."""
+        """Distance driven (m)."""
         ...
 
     @property
@@ -38,7 +38,7 @@ class Scene(Protocol):
 
 
 class Moment(NamedTuple):
-    """A scene that stays what it is."""
+    """A fixed scene."""
 
     t: float
     position: float
@@ -48,16 +48,16 @@ class Moment(NamedTuple):
 class Effect(ABC):
     """One effect at one amount, in `UNIT`, from `LEAST` to `MOST`, for one camera.
 
-    Everything random is drawn from the seed, in a stream of the effect's own: two effects with one seed are
-    independent of each other. Nothing is kept from picture to picture, so that pictures may be asked for in
-    any order, or not at all. Raises ConfigError for an amount out of range.
+    Random numbers come from the seed and the effect's own stream, so two effects with one seed are
+    independent. No state is kept between pictures, so any of them may be requested in any order. Raises
+    ConfigError for an amount out of range.
     """
 
     UNIT: ClassVar[str]
     LEAST: ClassVar[float]
     MOST: ClassVar[float]
-    WHOLE: ClassVar[bool] = False  # whether the amount counts something
-    MOVING: ClassVar[bool] = True  # False: pictures change alike at any moment
+    WHOLE: ClassVar[bool] = False  # whether the amount is an integer
+    MOVING: ClassVar[bool] = True  # False: the change is the same at any moment
 
     def __init__(self, amount: float, seed: int, camera: CameraModel) -> None:
         self._check(amount, seed)
@@ -69,7 +69,7 @@ class Effect(ABC):
         self._prepared = False
 
     def apply(self, picture: np.ndarray | Picture, scene: Scene) -> np.ndarray | Picture:
-        """The picture, uint8 (rows, width), as this effect shows it at that moment; a new one.
+        """Return the picture, uint8 (rows, width), changed by this effect at that moment.
 
         Raises ConfigError for a picture of another type or size than the camera's.
         """
@@ -81,39 +81,39 @@ class Effect(ABC):
         moment = Moment(scene.t, scene.position, scene.v_ego) if self.MOVING else None
         if not isinstance(picture, Picture):
             return self._seen(picture, whole(size), moment)
-        if not type(self).__module__.startswith(f"{__package__}."):  # nobody knows what it follows from
+        if not type(self).__module__.startswith(f"{__package__}."):  # no key for unknown code
             return self._seen(picture.pixels(), whole(size), moment)
         return picture.changed((self._key, moment), lambda region: self._seen(picture, region, moment))
 
     def ready(self) -> Self:
-        """Itself, with all made that is the same for all pictures."""
+        """Prepare everything that is the same for all pictures; return self."""
         if not self._prepared:
             self._prepare(np.random.Generator(np.random.PCG64([self.seed, *type(self).__name__.encode()])))
             self._prepared = True
         return self
 
     def _seen(self, picture: np.ndarray | Picture, region: Region, moment: Moment | None) -> np.ndarray:
-        """The changed region. What it takes is made only now, as pictures need not be looked at."""
+        """The changed region. Preparation happens only here, because many pictures are never examined."""
         return self.ready()._affect(picture, region, moment)
 
     @property
     def thickness(self) -> float:
-        """The amount's place between least and most, 0 to 1."""
+        """The amount's position between least and most, 0 to 1."""
         return (self.amount - self.LEAST) / (self.MOST - self.LEAST)
 
     def _build(self) -> str:
-        """Choose what it calculates with; says which compiled code that is, if any."""
+        """Choose the implementations; return the compiled code that they use, if any."""
         return ""
 
     @abstractmethod
     def _prepare(self, random: np.random.Generator) -> None:
-        """Make what is the same for all pictures."""
+        """Prepare what is the same for all pictures."""
 
     @abstractmethod
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Moment | None) -> np.ndarray:
-        """A region of the changed picture, a new array with the bits that the whole has there.
+        """Return a region of the changed picture, with the same bits as in the whole.
 
-        No more should be cut out of `picture` than this takes. `scene` is given to MOVING effects.
+        Use only the part of `picture` that is necessary. `scene` is None unless the effect is MOVING.
         """
 
     def _check(self, amount: float, seed: int) -> None:

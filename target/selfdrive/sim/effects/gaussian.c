@@ -1,6 +1,6 @@
 /* Stands for: gaussian.py.
- * A separable blur of bytes by whole numbers, whose sum is 256, as OpenCV calculates it. All sums fit sixteen bits:
- * those down the picture are kept as their high and their low bytes. */
+ * A separable blur of bytes with integer weights whose sum is 256, as in OpenCV. All sums fit into sixteen bits:
+ * vertical sums are stored as high and low bytes. */
 
 #include <stdint.h>
 #include <string.h>
@@ -12,7 +12,7 @@
 #define FAST
 #define IS_FAST 0
 #endif
-#ifndef IS_FAST /* a test may ask for either */
+#ifndef IS_FAST /* a test may ask for either version */
 #define IS_FAST __builtin_cpu_supports("avx2")
 #endif
 
@@ -24,13 +24,13 @@ typedef struct {
     long step, rows, columns;
 } Picture;
 
-/* How far rows are apart: an odd number of cache lines, so that rows do not drive each other out of the cache. */
+/* Distance between rows: an odd number of cache lines, so that rows do not evict each other from the cache. */
 INLINE long padded(long columns)
 {
     return ((columns + LINE - 1) / LINE | 1) * LINE;
 }
 
-/* Add `weight` times the numbers at both places. */
+/* Add `weight` times the numbers at both positions. */
 #define WEIGH(sums, weight, one, other)                                                                               \
     do {                                                                                                              \
         Lanes here, there;                                                                                            \
@@ -45,7 +45,7 @@ INLINE long padded(long columns)
         sums *= (weight);                                                                                             \
     } while (0)
 
-/* Sums along a row: their high and their low bytes. `wide` is for the row and `reach` more at either end. */
+/* Sums along a row, as high and low bytes. `wide` has space for the row and `reach` more at either end. */
 INLINE void along(const Picture *picture, long row, const uint16_t *kernel, long reach, uint16_t *wide, uint16_t *high,
                   uint16_t *low)
 {
@@ -112,8 +112,8 @@ static void blur_plain(const Picture *picture, const uint16_t *kernel, long reac
     blur(picture, kernel, reach, room, out);
 }
 
-/* Blur a picture larger than `reach`, at most MOST_REACH, whose rows are `step` apart, by a kernel, of which `kernel` has one half and the
- * middle. `room` is for 4 * reach + 4 rows, each longer than the picture's by 2 * reach + 64. */
+/* Blur a picture larger than `reach` (at most MOST_REACH), with rows `step` apart. `kernel` is one half of the
+ * kernel and its middle. `room` has space for 4 * reach + 4 rows, each longer than the picture's by 2 * reach + 64. */
 void gaussian(const uint8_t *pixels, long step, long rows, long columns, const uint16_t *kernel, long reach,
               uint16_t *room, uint8_t *out)
 {

@@ -1,4 +1,4 @@
-"""What sticks to the lens: it stays where it is in the picture, wherever the car drives."""
+"""Dirt on the lens, which stays in the same place in the picture."""
 
 import cv2
 import numpy as np
@@ -6,16 +6,16 @@ import numpy as np
 from selfdrive.sim.effects.effect import Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-MUD_LEVEL = 45.0  # grey level of mud against the light
-CLODS = 24.0, 8.0, 3.0  # px: sizes of its clods in a picture 640 wide
-EDGE = 2.5  # px: blur of mud's edge, which is far out of focus
+MUD_LEVEL = 45.0  # grey level of mud against light
+CLODS = 24.0, 8.0, 3.0  # px, clod sizes in a picture 640 wide
+EDGE = 2.5  # px, blur of the mud's edge, which is out of focus
 BLOB_LEVEL = 20.0
 BLOB_RADII = 5.0, 50.0  # px
 BLOB_BLUR = 7.0  # px
 
 
 class _OnLens(Effect):
-    """Something that covers a share of each pixel, the same in all pictures."""
+    """Dirt that covers a share of each pixel, the same in all pictures."""
 
     MOVING = False
 
@@ -29,10 +29,10 @@ class _OnLens(Effect):
 
 
 class PaperOcclusion(_OnLens):
-    """Dark, blurred, round blobs in random places below the horizon, as many as the amount says, of 5 to 50
-    pixels' radius.
+    """Dark, blurred, round blobs in random places below the horizon, with radii of 5 to 50 pixels; the amount
+    is their number.
 
-    The paper's text puts them anywhere; on the sky they would hide nothing that counts.
+    The paper's text allows any place, but blobs on the sky would hide nothing of importance.
     """
 
     UNIT, LEAST, MOST, WHOLE = "blobs", 1, 10, True
@@ -40,7 +40,7 @@ class PaperOcclusion(_OnLens):
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width
         share = np.zeros((rows, columns), dtype=np.float32)
-        # As many numbers for any amount: more blobs hold all of fewer.
+        # The same random numbers for any amount, so that more blobs include fewer.
         blobs = random.uniform(size=(self.MOST, 3))[: int(self.amount)]
         for column, row, size in blobs:
             radius = BLOB_RADII[0] + size * (BLOB_RADII[1] - BLOB_RADII[0])
@@ -51,7 +51,7 @@ class PaperOcclusion(_OnLens):
 
 
 class LensMud(_OnLens):
-    """Clods and spatters of mud over a share of the picture; more mud holds all of less."""
+    """Clods and spatters of mud over a share of the picture; more mud includes less."""
 
     UNIT, LEAST, MOST = "of the picture", 0.0, 0.95
 
@@ -61,14 +61,13 @@ class LensMud(_OnLens):
         for size in CLODS:
             sigma = size * columns / 640.0
             noise = random.standard_normal((rows, columns), dtype=np.float32)
-            # Blurred white noise loses this factor in deviation: each size counts by its own.
+            # Blurring white noise reduces its deviation by this factor, so that each size has its own weight.
             field += np.sqrt(size) * 2.0 * np.sqrt(np.pi) * sigma * cv2.GaussianBlur(noise, (0, 0), sigma)
         texture = random.standard_normal((rows, columns), dtype=np.float32)
         texture = MUD_LEVEL + 25.0 * cv2.GaussianBlur(texture, (0, 0), 1.5)
         self._cover(self._covered(field), np.clip(texture, 0.0, 255.0))
 
     def _covered(self, field: np.ndarray) -> np.ndarray:
-        """Covered share of each pixel: mud lies where the field is highest."""
         threshold = np.quantile(field, 1.0 - self.amount)
         mud = (field > threshold).astype(np.float32)
         return cv2.GaussianBlur(mud, (0, 0), EDGE)

@@ -1,4 +1,4 @@
-"""The amounts that levels 1 to 10 of each effect stand for, mild to strong, in pages and benchmarks."""
+"""Amounts of levels 1 to 10 of each effect, from mild to strong, for pages and benchmarks."""
 
 from selfdrive.sim import effects
 from selfdrive.sim.effects.effect import Effect

@@ -1,4 +1,4 @@
-"""Too much light and too little: the sun low ahead, and dusk on a small sensor."""
+"""Too much light and too little: low sun ahead, and dusk on a small sensor."""
 
 from math import acos, cos, exp, log, pi, radians, sin, sqrt
 
@@ -10,15 +10,15 @@ from selfdrive.common.camera_model import CameraModel
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-WHITE_REFLECTANCE = 0.32  # of what daylight's exposure shows as white: asphalt of 0.12 is of level 95
+WHITE_REFLECTANCE = 0.32  # reflectance shown as white in daylight; asphalt of 0.12 has level 95
 SUN_HEIGHT = radians(6.0), radians(12.0)  # drawn between
 SUN_SIDE = radians(8.0)  # at most, to either side
 SUN_RADIUS = radians(0.27)
-ASPHALT_SLOPES = 0.25  # rms slope of its facets
-MIRROR = 0.04  # reflectance at right angles, of a refractive index of 1.5
-POLISHED = 0.004  # share of a dry road's surface that mirrors; of the order of the CIE's road table R3
+ASPHALT_SLOPES = 0.25  # rms slope of surface facets
+MIRROR = 0.04  # reflectance at normal incidence, for a refractive index of 1.5
+POLISHED = 0.004  # share of a dry road's surface that mirrors; similar to the CIE's road table R3
 
-ELECTRONS = 14.0  # that white light of one lux frees in a pixel in the longest exposure (10 ms)
+ELECTRONS = 14.0  # freed in a pixel by white light of 1 lux in the longest exposure (10 ms)
 FULL_WELL = 10000.0
 LARGEST_GAIN = 64.0  # 36 dB
 READ_NOISE = 5.0  # electrons
@@ -28,9 +28,9 @@ QUANTILES = 256
 class SunGlare(Effect):
     """The low sun ahead: light scattered in lens and windscreen, and mirrored by the road.
 
-    The amount is how much the glass scatters, as a multiple of Stiles' and Holladay's law for glare,
-    10 * illuminance / angle^2 (cd/m^2, lux, degrees). Light of sun and sky after the Illuminating
-    Engineering Society's clear sky. Where the sun stands is drawn from the seed.
+    The amount is the scattering of the glass, as a multiple of Stiles and Holladay's law for glare, 10 *
+    illuminance / angle^2 (cd/m^2, lux, degrees). Light of sun and sky follow the Illuminating Engineering
+    Society's clear sky. The sun's position is drawn from the seed.
     """
 
     UNIT, LEAST, MOST, MOVING = "times a clear eye", 0.0, 10.0, False
@@ -64,9 +64,9 @@ def level_rays(camera: CameraModel) -> np.ndarray:
 
 
 def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
-    """Luminance (cd/m^2) of the sun's mirror image in rough asphalt for each lux of its beam.
+    """Luminance (cd/m^2) of the sun's reflection in rough asphalt per lux of its beam.
 
-    Facets with Beckmann's distribution of slopes, Fresnel's reflectance after Schlick; 0 above the horizon.
+    Facets with Beckmann's distribution of slopes, Fresnel reflectance after Schlick; 0 above the horizon.
     """
     down = np.maximum(rays[..., 1], 0.02)
     half = sun - rays
@@ -76,7 +76,7 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
     slope = (1.0 / upright**2 - 1.0) / ASPHALT_SLOPES**2
     facets = each(exp, -slope) / (pi * ASPHALT_SLOPES**2 * (upright * upright) ** 2)
     mirror = MIRROR + (1.0 - MIRROR) * (1.0 - across) * ((1.0 - across) ** 2) ** 2
-    # A rough surface shadows itself where it is seen or lit at a flat angle.
+    # Rough surfaces shadow themselves at flat angles of view or light.
     shadow = np.minimum(1.0, 2.0 * upright * np.minimum(down, -sun[1]) / np.maximum(across, 1e-3))
     return np.where(rays[..., 1] > 0.0, POLISHED * mirror * facets * shadow / (4.0 * down), 0.0)
 
@@ -84,15 +84,15 @@ def mirrored(rays: np.ndarray, sun: np.ndarray) -> np.ndarray:
 class LowLight(Effect):
     """Little light on the road, in lux: long exposure, then gain, then darkness, and the sensor's noise.
 
-    Each pixel's electrons are Poisson's (shot noise), reading them adds a Gaussian. Noise differs from
-    picture to picture; that of one moment is always the same.
+    Each pixel's electrons have a Poisson distribution (shot noise); reading adds Gaussian noise. Noise
+    differs between pictures but is the same for the same moment.
     """
 
     UNIT, LEAST, MOST = "lux", 0.05, 100000.0
 
     def _prepare(self, random: np.random.Generator) -> None:
         white = min(FULL_WELL, ELECTRONS * self.amount)
-        shown = max(white, FULL_WELL / LARGEST_GAIN)  # electrons of what is shown as white
+        shown = max(white, FULL_WELL / LARGEST_GAIN)  # electrons for white
         self._table = np.stack([_noisy(white * level / WHITE, shown) for level in range(WHITE + 1)]).ravel()
         rows, columns = self.camera.rows, self.camera.width
         self._chance = random.integers(0, QUANTILES, size=(2 * rows, 2 * columns), dtype=np.uint16)
@@ -110,10 +110,10 @@ class LowLight(Effect):
 
 
 def _noisy(electrons: float, shown: float) -> np.ndarray:
-    """Levels of a pixel with this many electrons on average, one for each quantile of its noise, uint8."""
+    """Grey levels (uint8) of a pixel with this mean number of electrons, one per quantile of its noise."""
     reach = 8.0 * sqrt(electrons) + 10.0
     numbers = np.arange(max(0, int(electrons - reach)), int(electrons + reach))
-    # Poisson's chances from the ratio of neighbours, relative to the first.
+    # Poisson probabilities by the ratio of neighbours, relative to the first.
     steps = each(log, max(electrons, 1e-9) / np.maximum(numbers[1:], 1))
     chance = np.concatenate([[0.0], np.cumsum(steps)])
     chance = each(exp, chance - chance.max())
@@ -127,7 +127,6 @@ def _noisy(electrons: float, shown: float) -> np.ndarray:
 
 
 def _spread(chances: np.ndarray, by: np.ndarray) -> np.ndarray:
-    """Chances of the sum of two numbers with these chances each."""
     summed = np.zeros(chances.size + by.size - 1)
     for k, share in enumerate(by.tolist()):
         summed[k : k + chances.size] += share * chances

@@ -26,17 +26,17 @@ from selfdrive.visiond.paper_detector import PaperDetector
 from selfdrive.visiond.robust_detector import RobustDetector
 
 SEEDS = 1, 2, 3, 4, 5
-PICTURES = 6  # for each seed
+PICTURES = 6  # per seed
 STEP, SPEED = 0.05, 26.82  # s, m/s
 DETECTORS: dict[str, tuple[type, tuple[int, int, int], int]] = {  # with colour (BGR) and width (px)
     "paper": (PaperDetector, (60, 60, 255), 7),
     "robust": (RobustDetector, (255, 200, 0), 2),
     "as_coded": (CodedDetector, (80, 220, 80), 1),
 }
-AHEAD, ERROR = 10.0, 0.3  # m: a line counts as found where it is no further off than this
+AHEAD, ERROR = 10.0, 0.3  # m: a line is found if it is at most this far off
 SMALL, TITLE = (320, 240), 20  # px
-GREY = 100  # level of the picture on which is measured how much an effect covers
-REAL = "real-frames.csv"  # in the folder of pictures: what `selfdrive.visiond.under_effects` counted
+GREY = 100  # grey level of the picture in which coverage is measured
+REAL = "real-frames.csv"  # in the folder of pictures; counted by `selfdrive.visiond.under_effects`
 TEXT = """\
 # Image effects
 
@@ -112,17 +112,17 @@ PRESETS = (
 
 
 class Row(NamedTuple):
-    """One level's measures."""
+    """One level's measurements."""
 
     amount: float
     severity: Severity
     covered: float
-    found: tuple[float, ...]  # share of pictures, for each detector
+    found: tuple[float, ...]  # share of pictures, per detector
     picture: np.ndarray  # the last one, in colour, with lines
 
 
 class Studio:
-    """A piece of road, driven along again and again under different effects."""
+    """A piece of road that is driven repeatedly, under different effects."""
 
     def __init__(self) -> None:
         self.model = CameraModel()
@@ -133,16 +133,14 @@ class Studio:
         self._truth = renderer.truth()
 
     def clean(self) -> Severity:
-        """The measures of clean pictures."""
         return _mean([self._gauge.measure(clean, clean) for clean in self._clean])
 
     def take(self, kind: type[Effect], amount: float) -> Row:
-        """Drives once for each seed under this effect."""
         measures: list[Severity] = []
         found: list[list[bool]] = []
         shown, covered = np.empty(0), []
         grey = np.full_like(self._clean[0], GREY)
-        for seed in reversed(SEEDS):  # what is shown is of the first one
+        for seed in reversed(SEEDS):  # the first seed's picture is shown
             effect = kind(amount, seed, self.model)
             seen = [effect.apply(*pair) for pair in zip(self._clean, self._moments, strict=True)]
             measures += [self._gauge.measure(*pair) for pair in zip(self._clean, seen, strict=True)]
@@ -174,7 +172,7 @@ def _mean(measures: list[Severity]) -> Severity:
 def draw_lines(
     shown: np.ndarray, model: CameraModel, lines: LaneLines, colour: tuple[int, int, int], width: int
 ) -> None:
-    """Draws the lines that were seen, from 4 to 40 m ahead, into a BGR picture."""
+    """Draw the detected lines, from 4 to 40 m ahead, into a BGR picture."""
     for line in (lines.left, lines.right):
         if line.prob > 0.0:
             ends = [(x, line.y + line.slope * x) for x in (4.0, 40.0)]
@@ -183,13 +181,11 @@ def draw_lines(
 
 
 def strip(rows: list[Row], unit: str) -> np.ndarray:
-    """First, middle and last level side by side, with their amounts."""
     shown = sorted({0, (len(rows) - 1) // 2, len(rows) - 1})
     return np.hstack([panel(rows[k].picture, k + 1, rows[k].amount, unit) for k in shown])
 
 
 def panel(picture: np.ndarray, level: int, amount: float, unit: str) -> np.ndarray:
-    """A picture (grey, or BGR) made small, its level and amount above it."""
     small = cv2.resize(picture, SMALL, interpolation=cv2.INTER_AREA)
     title = np.zeros((TITLE, *small.shape[1:]), dtype=np.uint8)
     text, white = f"level {level}: {amount:g} {unit}", (255, 255, 255)
@@ -198,7 +194,7 @@ def panel(picture: np.ndarray, level: int, amount: float, unit: str) -> np.ndarr
 
 
 def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
-    """The levels' measures as Markdown; `real` are their lines of the table of real frames, or none."""
+    """The levels' measurements as Markdown; `real` are their rows of the table of real frames, if any."""
     names = ["covered", *(f"found by `{name}`" for name in DETECTORS)]
     missed = [head for head in (real[0] if real else ()) if head.startswith("missed_")]
     names += [f"missed on real frames by `{head.removeprefix('missed_')}`" for head in missed]
@@ -218,7 +214,6 @@ def table(rows: list[Row], unit: str, real: list[dict[str, str]]) -> str:
 
 
 def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> str:
-    """What is outside at each level, as Markdown."""
     heads = ("rain (mm/h)", "range (m)", "road covered", "fog: contrast left", "range (m)")
     heads += ("snow (mm/h)", "range (m)", "road covered", "occlusion: road covered")
     lines = [f"| level | {' | '.join(heads)} |", "|---|" + "---|" * len(heads)]
@@ -235,7 +230,6 @@ def stands_for(measured: dict[type[Effect], list[Row]], model: CameraModel) -> s
 
 
 def write(out: Path) -> None:
-    """Writes page and pictures into the folder `out`."""
     studio = Studio()
     folder = out / "image-effects"
     folder.mkdir(parents=True, exist_ok=True)
@@ -264,7 +258,7 @@ def write(out: Path) -> None:
 
 
 def _real(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
-    """The lines of an effect in the table of real frames, level by level; none without that table."""
+    """The rows of an effect in the table of real frames, by level; empty without that table."""
     path = folder / REAL
     if not path.exists():
         return []
@@ -273,7 +267,6 @@ def _real(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
 
 
 def main() -> None:
-    """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("docs/reference"), help="folder of reference pages")
     cv2.setNumThreads(1)

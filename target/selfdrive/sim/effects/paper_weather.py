@@ -1,12 +1,11 @@
-"""Rain, fog and snow as the paper makes them, by `thickness` from 1 to 10.
+"""Rain, fog and snow as in the paper, by `thickness` from 1 to 10.
 
-Numbers are from the paper's table of effects and its text. Where it gives a range, its mild end belongs to
-thickness 1 and its strong end to 10. What it leaves open is settled by what a level stands for, which
-`visibility` says: a streak is as long as a drop falls while the shutter is open, and there are as many flakes
-as a snowfall has that look as large as the text's blocks. Streaks and flakes lie in layers, the farther ones
-shorter and slower, that fall across the screen, faster the faster the car drives, and enter again at the
-other side. So no picture ever holds more or fewer of them, and the same drop is followed from picture to
-picture.
+Numbers are from the paper's table of effects and its text. Where it gives a range, thickness 1 is the mild
+end and 10 the strong end. What the paper leaves open follows from the weather in `visibility`: a streak is as
+long as a drop falls during the exposure, and there are as many flakes as a snowfall has that appear as large
+as the text's blocks. Streaks and flakes lie in layers, the farther ones shorter and slower. They fall across
+the screen, faster when the car drives faster, and wrap around, so their number is constant and each can be
+followed from picture to picture.
 """
 
 from math import cos, radians, sin
@@ -20,18 +19,18 @@ from selfdrive.sim.effects.compiled_gaussian import build_gaussian
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-HAZE = 0.9, 0.4  # share of the contrast that fog leaves, and the fog in which it snows
-STREAKS = 1000  # for each thickness: 10,000 at thickness 10
-# m: up to which distance a drop makes a streak; with it, levels 1 to 10 are light to violent rain
+HAZE = 0.9, 0.4  # remaining share of contrast in fog, and the density of the fog behind snow
+STREAKS = 1000  # per thickness: 10,000 at thickness 10
+# m: largest distance at which a drop makes a streak; with it, levels 1 to 10 are light to violent rain
 REACH = 2.2
-# Shares of the drops within reach that are nearer than those of a layer, far to near
+# For each layer, far to near: share of the drops within reach that are nearer
 NEARER = 0.9, 0.7, 0.5, 0.3, 0.1
-FALL, EXPOSURE = 6.0, 0.004  # m/s, s: of a drop of 1.6 mm (Atlas and others, 1973); under a dark sky
+FALL, EXPOSURE = 6.0, 0.004  # m/s of a drop of 1.6 mm (Atlas and others, 1973); s under a dark sky
 STREAK_LEAN = radians(8.0)
-RAIN_SPEED = 1.0 / EXPOSURE, 5.0  # lengths of a streak: in a second, and for each metre driven
-BLOCKS = 100  # of snow for each thickness; with it, levels 1 to 10 are light to heavy snow
+RAIN_SPEED = 1.0 / EXPOSURE, 5.0  # streak lengths per second, and per metre driven
+BLOCKS = 100  # of snow per thickness; with it, levels 1 to 10 are light to heavy snow
 FLAKE_SPEEDS = 1.0, 1.5, 2.0, 3.0, 4.0
-SNOW_SPEED = 40.0, 4.0  # px: in a second, and for each metre driven, times the above
+SNOW_SPEED = 40.0, 4.0  # px per second, and per metre driven, times the above
 FOG_SPEED = 6.0, 2.0  # px, likewise
 
 
@@ -42,13 +41,13 @@ class _PaperWeather(Effect):
         return mild + self.thickness * (strong - mild)
 
     def _count(self, each: int, layer: int, layers: int) -> int:
-        """How many, `each` for one of thickness, lie in that layer; over all layers the sum is exact."""
+        """Number in a layer, for `each` per thickness; the sum over all layers is exact."""
         total = round(each * self.amount)
         return (total - layer + layers - 1) // layers
 
 
 class PaperRain(_PaperWeather):
-    """1,000 streaks for each thickness on a background that loses contrast and sharpness."""
+    """1,000 streaks per thickness on a background with less contrast and sharpness."""
 
     def _build(self) -> str:
         self._blur = build_gaussian(self._between(0.5, 1.5))
@@ -66,10 +65,10 @@ class PaperRain(_PaperWeather):
             self._tiles.append(Tile(to_levels(alpha * smeared)))
 
     def _streaks(self, random: np.random.Generator, layer: int, length: float) -> np.ndarray:
-        """White streaks in random places. A falling drop wobbles: brightness varies along its streak."""
+        """White streaks in random places. Falling drops wobble, so brightness varies along a streak."""
         rows, columns = self.camera.rows, self.camera.width
         most = STREAKS * int(self.MOST)
-        # As many numbers for any thickness: more rain holds all streaks of less.
+        # The same random numbers for any thickness, so that more rain includes all streaks of less.
         count = self._count(STREAKS, layer, len(NEARER))
         column, row, phase, wobble = random.uniform(size=(4, most))[:, :count]
         start = np.stack([columns * column, rows * row])
@@ -95,11 +94,10 @@ class PaperRain(_PaperWeather):
 
 
 class PaperFog(_PaperWeather):
-    """Uniform noise, blurred to droplets, on a background that loses contrast."""
+    """Uniform noise, blurred to droplets, on a background with less contrast."""
 
     @property
     def contrast(self) -> float:
-        """What is left of the background's, 0.9 to 0.4."""
         return self._between(*HAZE)
 
     def _prepare(self, random: np.random.Generator) -> None:
@@ -112,7 +110,7 @@ class PaperFog(_PaperWeather):
 
 
 class PaperSnow(_PaperWeather):
-    """The fog's haze, and before it 100 falling white blocks of 2 x 2 pixels for each thickness."""
+    """The fog's haze, and in front of it 100 falling white blocks of 2 x 2 pixels per thickness."""
 
     def _prepare(self, random: np.random.Generator) -> None:
         rows, columns = self.camera.rows, self.camera.width
@@ -146,30 +144,28 @@ class PaperSnow(_PaperWeather):
 
 
 def haze(random: np.random.Generator, rows: int, columns: int, density: float, thickness: float) -> Tile:
-    """Noise of 0 to 255 in a share `density` of all pixels, blurred by 5 to 7 pixels; it repeats."""
+    """A repeating tile: noise of 0 to 255 in a share `density` of all pixels, blurred by 5 to 7 pixels."""
     there, level = random.uniform(size=(2, rows, columns)).astype(np.float32)
     noise = np.where(there < density, WHITE * level, 0.0).astype(np.float32)
     return Tile(to_levels(blurred_round(noise, 5.0 + 2.0 * thickness)))
 
 
 def hazed(picture: np.ndarray, droplets: Tile, contrast: float, scene: Scene, region: Region) -> np.ndarray:
-    """The picture's region with its contrast reduced, and the droplets, drifting slowly, added."""
+    """Reduce the contrast of the picture's region and add the slowly drifting droplets."""
     down = FOG_SPEED[0] * scene.t + FOG_SPEED[1] * scene.position
     return cv2.addWeighted(picture, contrast, droplets.moved(0.3 * down, down, region), 1.0, 0.0)
 
 
 def blurred_round(levels: np.ndarray, sigma: float) -> np.ndarray:
-    """A Gaussian blur of a tile that repeats."""
     return seamless(levels, int(4 * sigma) + 1, lambda wide: cv2.GaussianBlur(wide, (0, 0), sigma))
 
 
 def smeared_round(levels: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """A smear of a tile that repeats."""
     return seamless(levels, len(kernel), lambda wide: cv2.filter2D(wide, -1, kernel))
 
 
 def motion_kernel(length: int, degrees: float) -> np.ndarray:
-    """The smear of a point that moves `length` pixels, at this angle counter-clockwise from the row."""
+    """Kernel of a motion by `length` pixels, at this angle counter-clockwise from the row."""
     way = np.linspace(-0.5, 0.5, 16 * length) * (length - 1)
     middle = length // 2 + 1
     columns, rows = middle + way * cos(radians(degrees)), middle - way * sin(radians(degrees))
@@ -180,5 +176,4 @@ def motion_kernel(length: int, degrees: float) -> np.ndarray:
 
 
 def to_levels(levels: np.ndarray) -> np.ndarray:
-    """Rounded and limited to grey levels."""
     return np.clip(np.rint(levels), 0, WHITE).astype(np.uint8)

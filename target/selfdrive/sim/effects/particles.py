@@ -1,9 +1,9 @@
-"""Particles in the air ahead of the camera, each where the car's motion and its fall take it.
+"""Particles in the air ahead of the camera, moved by the car and their fall.
 
-A box of air that just holds what the camera sees up to its far end repeats in all three directions, in the
-camera's axes (x right, y down, z ahead along the optical axis). The car drives into it, the particles fall
-through it; who leaves at one side enters at the other. Places are kept as shares of the box. There may be
-several such boxes in one another, shallow ones for particles that are too small to be seen far away.
+A box of air, just large enough for the camera's view up to its far end, repeats in all three directions of
+the camera's axes (x right, y down, z ahead along the optical axis). Particles that leave at one side enter at
+the other. Positions are shares of the box. Boxes of different depths overlap: shallow ones hold particles too
+small to be visible far away.
 """
 
 from math import cos, inf, sin
@@ -17,23 +17,23 @@ from selfdrive.sim.effects.canvas import splat, strokes
 from selfdrive.sim.effects.effect import Scene
 from selfdrive.sim.picture import Region
 
-NEAREST = 0.25  # m: what is nearer to the lens is out of focus
-FAINTEST = 0.03  # share of a pixel's light: a streak that takes less is not seen
-SOFT = 1.5, 3.0  # px: particles wider than these are drawn on half the grid, on a quarter of it
-SPACING = 1.3  # px between the points that make a streak
+NEAREST = 0.25  # m; anything closer is out of focus
+FAINTEST = 0.03  # share of a pixel's light; streaks that take less are invisible
+SOFT = 1.5, 3.0  # px; wider particles are drawn at half, or a quarter, of the resolution
+SPACING = 1.3  # px between the points of a streak
 MARGIN = 2  # px around a grid
 
 
 class Box(NamedTuple):
     """n particles in a box of air."""
 
-    reach: float  # m: its depth
-    size: np.ndarray  # (n,) m: diameters
-    speed: np.ndarray  # (n,) m/s: speeds of fall
+    reach: float  # m, depth
+    size: np.ndarray  # (n,) m, diameters
+    speed: np.ndarray  # (n,) m/s, fall speeds
 
 
 class Streaks(NamedTuple):
-    """What n particles draw while the shutter is open; float32."""
+    """Streaks of n particles during the exposure; float32."""
 
     start: np.ndarray  # (2, n) px, columns then rows
     end: np.ndarray
@@ -55,9 +55,9 @@ class Particles:
         self._across = across * camera.width - camera.cx  # px at the far end
 
     def streaks(self, scene: Scene, exposure: float) -> Streaks:
-        """The streaks of all particles in view in `exposure` seconds from the scene's moment."""
+        """Streaks of all visible particles in `exposure` seconds from the scene's moment."""
         camera, lean, upright = self._camera, sin(self._camera.pitch), cos(self._camera.pitch)
-        # A car that drives on sees all come nearer and, as it looks down, sink.
+        # While the car drives, everything comes nearer and, as the camera looks down, moves down.
         ahead = self._moved(self._ahead, scene, 1.0, -upright, lean) * self._reach
         ahead = np.maximum(ahead, 1e-3)
         left = camera.cx + self._across * self._reach / ahead
@@ -73,15 +73,15 @@ class Particles:
         end = np.stack([later_left, camera.cy + camera.fy * later_down / later_ahead])
         width = camera.fx * self._size[seen] / ahead
         inside = (end[1] > -MARGIN) & (start[1] < camera.rows + MARGIN)
-        # A particle covers pi / 4 * width^2 pixels at a time, and its streak's all in turn.
+        # A particle covers pi / 4 * width^2 pixels at a time, spread over its streak.
         visible = 0.25 * np.pi * width**2 > FAINTEST * (_lengths(end - start) + 1.0)
         chosen = np.flatnonzero(inside & visible)
         return Streaks(start[:, chosen], end[:, chosen], width[chosen])
 
     def _moved(self, first: np.ndarray, scene: Scene, tall: float, along: float, fall: float) -> np.ndarray:
-        """Shares of boxes, `tall` times as long as their reach, after particles moved.
+        """Positions, as shares of boxes `tall` times as long as their reach, after particles moved.
 
-        They move by `along` for a metre driven and by `fall` for a metre fallen.
+        They move by `along` per metre driven and by `fall` per metre fallen.
         """
         moved = self._speed * float(fall / tall * scene.t) / self._reach
         moved += first
@@ -89,16 +89,16 @@ class Particles:
         return moved - np.floor(moved)
 
     def _driven(self, scene: Scene, tall: float, along: float) -> np.ndarray:
-        """Share of each box that driving moves its particles by, float32."""
-        driven = (along / tall * scene.position / self._reaches) % 1.0  # in full precision, however far
+        """Share of each box by which driving moves its particles, float32."""
+        driven = (along / tall * scene.position / self._reaches) % 1.0  # in double precision at any distance
         return driven.astype(np.float32)
 
 
 class Cover:
-    """The share of each pixel's light that streaks take; its memory is used again for each picture.
+    """The share of each pixel's light that streaks take; memory is reused between pictures.
 
-    Wide particles are drawn on coarser grids and enlarged, which makes them wide and soft. All grids lie on
-    one sheet, the coarse ones beside each other below the full one.
+    Wide particles are drawn on coarser grids and enlarged, which makes them soft. All grids are on one sheet,
+    the coarse ones side by side below the full one.
     """
 
     def __init__(self, camera: CameraModel) -> None:
@@ -110,7 +110,7 @@ class Cover:
         self._ends = self._corners + np.array(sizes, dtype=np.float32).T[::-1] - 1.0
 
     def taken(self, streaks: Streaks, region: Region) -> np.ndarray:
-        """Shares in parts of 255, uint8, in a region of the picture."""
+        """Shares in units of 1/255, uint8, in a region of the picture."""
         full, half, quarter = windows(region, self._sizes)
         grids = self._grids((full, half, quarter))
         for grid in grids:
@@ -121,24 +121,22 @@ class Cover:
         return cv2.add(cv2.convertScaleAbs(grids[0], alpha=255.0), coarse)
 
     def half(self, region: Region) -> np.ndarray:
-        """What the half grid has of a region, and the quarter one, after the last picture."""
+        """The half grid's values in a region, including the quarter grid's, after the last picture."""
         return self._grids(windows(region, self._sizes))[1]
 
     def _grids(self, seen: tuple[Region, ...]) -> list[np.ndarray]:
-        """Windows of the grids, on the sheet."""
         return [
             self._sheet[row + window.top : row + window.bottom, column + window.left : column + window.right]
             for (row, column), window in zip(self._places, seen, strict=True)
         ]
 
     def _draw(self, streaks: Streaks, windows: tuple[Region, ...]) -> None:
-        """Each streak as points on its grid, as far as they lie in that grid's window."""
         grid = np.searchsorted((*SOFT, inf), streaks.width)
         scale = np.float32([1.0, 2.0, 4.0])[grid]
         # Pixel k of a coarse grid has its centre at scale * k + (scale - 1) / 2 of the full one.
         corner = self._corners[:, grid] + MARGIN - 0.5
         start, end = ((place + 0.5) / scale + corner for place in (streaks.start, streaks.end))
-        # A point weighs on the pixels around it.
+        # A point affects the pixels around it.
         least = np.float32([(window.left - 1, window.top - 1) for window in windows]).T + self._corners
         most = np.float32([(window.right, window.bottom) for window in windows]).T + self._corners
         least, most = np.maximum(least, self._corners), np.minimum(most, self._ends)
@@ -157,26 +155,25 @@ class Cover:
 
 
 def windows(region: Region, sizes: list[tuple[int, int]]) -> tuple[Region, Region, Region]:
-    """The parts of the full, the half and the quarter grid, of these sizes, that make up a region."""
+    """The parts of the full, half and quarter grids (of these sizes) that determine a region."""
     full = Region(*(end + MARGIN for end in region))
     half = _seen_through(full, sizes[1])
     return full, half, _seen_through(half, sizes[2])
 
 
 def _seen_through(fine: Region, size: tuple[int, int]) -> Region:
-    """The part of a grid of this size that makes up that of the grid twice as fine."""
+    """The part of a grid of this size that determines `fine` in the grid of twice its resolution."""
     top, bottom, left, right = ((end + MARGIN) // 2 for end in fine)
     return Region(max(top - 1, 0), min(bottom + 2, size[0]), max(left - 1, 0), min(right + 2, size[1]))
 
 
 def _enlarged(coarse: np.ndarray, seen: Region, fine: Region) -> np.ndarray:
-    """The region `fine` of a grid from the region `seen` of one of half the size; both have their margins."""
+    """The region `fine` of a grid, from the region `seen` of the grid of half its size; both with margins."""
     twice = cv2.resize(coarse, None, fx=2.0, fy=2.0, interpolation=cv2.INTER_LINEAR)
     down, right = fine.top + MARGIN - 2 * seen.top, fine.left + MARGIN - 2 * seen.left
     return twice[down : down + fine.shape[0], right : right + fine.shape[1]]
 
 
 def _lengths(ways: np.ndarray) -> np.ndarray:
-    """Of ways (2, n)."""
     across, down = ways
     return np.sqrt(across * across + down * down)

@@ -1,6 +1,6 @@
 /* Stands for: air.py, canvas.py, particles.py, windscreen.py.
- * Rain and snow in single precision, sums in the same order, and OpenCV's roundings. Where OpenCV calculates
- * otherwise the two differ, and this is not to be used. */
+ * Rain and snow in single precision, with sums in the same order as in Python and OpenCV's rounding. This must not
+ * be used where OpenCV calculates differently. */
 
 #include <math.h>
 #include <stdint.h>
@@ -14,7 +14,7 @@
 #define FAST
 #define IS_FAST 0
 #endif
-#ifndef IS_FAST /* a test may ask for either */
+#ifndef IS_FAST /* a test may ask for either version */
 #define IS_FAST (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"))
 #endif
 
@@ -23,9 +23,9 @@ enum { MARGIN = 2, GRIDS = 3, BLOCK = 32 };
 
 /* --- Particles.streaks ------------------------------------------------------------------------------------ */
 
-/* What a picture asks for, and the camera; single precision, as the arrays that it meets. */
+/* The moment of a picture, and the camera; single precision, like the arrays used with them. */
 typedef struct {
-    float fall_ahead, fall_down; /* shares of a box of 1 m for each m/s of fall */
+    float fall_ahead, fall_down; /* shares of a box of 1 m per m/s of fall */
     float cx, cy, fx, fy, rows, width;
     float lean, upright, exposure;
     float driven_ahead, driven_down; /* m/s */
@@ -37,7 +37,7 @@ typedef struct {
     const float *reach, *size, *speed, *across, *down, *ahead;
 } Particles;
 
-INLINE float larger(float one, float other) /* as NumPy's maximum: what is no number stays */
+INLINE float larger(float one, float other) /* like NumPy's maximum: NaN is kept */
 {
     return one >= other || one != one ? one : other;
 }
@@ -47,7 +47,7 @@ INLINE float smaller(float one, float other)
     return one < other ? one : other;
 }
 
-/* Where a particle is in its box, as a share of it: it falls, and the car drives. */
+/* Position of a particle as a share of its box, after its fall and the car's motion. */
 INLINE float moved(float first, float speed, float reach, float fall, float driven)
 {
     float place = speed * fall / reach;
@@ -56,7 +56,7 @@ INLINE float moved(float first, float speed, float reach, float fall, float driv
     return place - floorf(place);
 }
 
-/* Distances ahead and columns of the particles `from` to `to` - 1, all of one box. */
+/* Distances ahead and columns of the particles `from` to `to` - 1, all in one box. */
 INLINE void places(const Particles *all, const Moment *m, float driven, long from, long to, float *ahead, float *left)
 {
     for (long i = from; i < to; i++) {
@@ -71,7 +71,7 @@ INLINE long seen_streaks(const float *of, long n, const long *counts, const floa
                          float *out)
 {
     Particles all = {of, of + n, of + 2 * n, of + 3 * n, of + 4 * n, of + 5 * n};
-    float *ahead = out + 3 * n, *left = out + 4 * n; /* overwritten behind what is read */
+    float *ahead = out + 3 * n, *left = out + 4 * n; /* overwritten after being read */
     long found = 0;
     for (long box = 0, from = 0; box < boxes; from += counts[box++])
         places(&all, m, driven[2 * box], from, from + counts[box], ahead, left);
@@ -116,8 +116,8 @@ static long streaks_plain(const float *of, long n, const long *counts, const flo
     return seen_streaks(of, n, counts, driven, boxes, m, out);
 }
 
-/* The streaks that n particles draw: start's and end's columns and rows, and widths, `out` five rows of n. Boxes
- * hold `counts` particles, and have passed by the shares `driven`, ahead and down. Returns how many there are. */
+/* The streaks of n particles: columns and rows of start and end, and widths; `out` has five rows of n. Boxes have
+ * `counts` particles and have moved by the shares `driven`, ahead and down. Returns the number of streaks. */
 long streaks(const float *of, long n, const long *counts, const float *driven, long boxes, const Moment *m, float *out)
 {
     return (IS_FAST ? streaks_fast : streaks_plain)(of, n, counts, driven, boxes, m, out);
@@ -133,7 +133,7 @@ typedef struct {
     float across, down;
 } Place;
 
-/* A streak on its grid: where its first point is, from each to the next, what a point weighs, and how many. */
+/* A streak on its grid: first point, distance between points, a point's weight, and number of points. */
 typedef struct {
     Place first, step, least, most;
     float share;
@@ -146,9 +146,9 @@ typedef struct {
 } Point;
 
 typedef struct {
-    Point *points; /* NULL where there is no memory */
+    Point *points; /* NULL if memory is exhausted */
     long count;
-    int grids; /* on which there are some, a bit for each */
+    int grids; /* those with streaks, one bit each */
 } Drawn;
 
 /* Add the streaks to the sheet. */
@@ -195,7 +195,7 @@ static Drawn draw(const float *start, const float *end, const float *widths, lon
             if (!(column >= stroke->least.across && column < stroke->most.across && row >= stroke->least.down &&
                   row < stroke->most.down))
                 continue;
-            long left = (long)column, top = (long)row; /* the floor of what is not negative */
+            long left = (long)column, top = (long)row; /* floor, because it is not negative */
             float right = column - (float)left, low = stroke->share * (row - (float)top), high = stroke->share - low;
             float high_right = high * right, low_right = low * right;
             points[drawn.count++] =
@@ -203,7 +203,7 @@ static Drawn draw(const float *start, const float *end, const float *widths, lon
         }
     }
     const long beside[4] = {0, 1, width, width + 1};
-    for (int corner = 0; corner < 4; corner++) /* the order of sums */
+    for (int corner = 0; corner < 4; corner++) /* in the order of the Python sums */
         for (long k = 0; k < drawn.count; k++)
             sheet[points[k].place + beside[corner]] += points[k].shares[corner];
     free(strokes);
@@ -211,7 +211,7 @@ static Drawn draw(const float *start, const float *end, const float *widths, lon
     return drawn;
 }
 
-/* Leave the first `size` numbers of the sheet, those of the full grid, black. */
+/* Clear the first `size` numbers of the sheet, which are those of the full grid. */
 static void wipe(const Drawn *drawn, float *sheet, long width, long size)
 {
     for (long k = 0; k < drawn->count; k++) {
@@ -226,7 +226,7 @@ INLINE long within(long place, long size)
     return place < 0 ? 0 : place < size ? place : size - 1;
 }
 
-/* A row of single-precision numbers, enlarged to twice as many. */
+/* Enlarge a row of single-precision numbers to twice its length. */
 INLINE void widened(const float *from, long size, float *to)
 {
     to[0] = from[0];
@@ -238,7 +238,7 @@ INLINE void widened(const float *from, long size, float *to)
     to[2 * size - 1] = from[size - 1];
 }
 
-/* The same of levels: the sums of four shares. */
+/* The same for levels: the sums of four shares. */
 INLINE void widened_levels(const uint8_t *from, long size, uint16_t *to)
 {
     to[0] = (uint16_t)(4 * from[0]);
@@ -255,13 +255,13 @@ INLINE uint8_t level_of(float share)
     return level >= 255.0f ? 255 : (uint8_t)(int)level;
 }
 
-/* Where the grid of a window lies on the sheet. */
+/* The window's position on the sheet. */
 INLINE float *on_sheet(float *sheet, long width, Place corner, Region window)
 {
     return sheet + ((long)corner.down + window.top) * width + (long)corner.across + window.left;
 }
 
-/* Add the quarter grid to the half one; `two` has room for two enlarged rows. */
+/* Add the quarter grid to the half grid; `two` has space for two enlarged rows. */
 INLINE void add_quarter(float *half, const float *quarter, long width, Region fine, Region seen, float *two)
 {
     long rows = seen.bottom - seen.top, size = seen.right - seen.left, columns = fine.right - fine.left;
@@ -285,7 +285,7 @@ INLINE void add_quarter(float *half, const float *quarter, long width, Region fi
     }
 }
 
-/* Levels of the full grid and of two rows of the half one; most are 0. */
+/* Levels from the full grid and two rows of the half grid; most are 0. */
 INLINE void add_block(const float *shares, const uint16_t *near, const uint16_t *far, long count, uint8_t *out)
 {
     int any = 0;
@@ -301,7 +301,7 @@ INLINE void add_block(const float *shares, const uint16_t *near, const uint16_t 
     }
 }
 
-/* Levels of the full grid and of the half one, enlarged. */
+/* Levels from the full grid and the enlarged half grid. */
 INLINE void add_up(const float *full, const float *half, long width, Region fine, Region seen, uint8_t *levels,
                    uint16_t *two, uint8_t *out)
 {
@@ -364,18 +364,18 @@ static void enlarge_plain(float *sheet, long width, const Region *windows, const
     enlarge(sheet, width, windows, corners, on, scratch, out);
 }
 
-/* Shares of light that n streaks take, in parts of 255, in the first of `windows`, of the full grid, the half and the
- * quarter one. These lie at `corners` of the sheet, up to `ends`. Returns 1 where there is no memory. */
+/* Shares of light that n streaks take, in units of 1/255, in the first of `windows`, which are on the full, half and
+ * quarter grids. The grids are at `corners` of the sheet, up to `ends`. Returns 1 if memory is exhausted. */
 long taken(const float *start, const float *end, const float *widths, long n, const Region *windows,
            const Place *corners, const Place *ends, float area, float *sheet, long width, uint8_t *out)
 {
-    for (int k = 1; k < GRIDS; k++) { /* the full grid was left black */
+    for (int k = 1; k < GRIDS; k++) { /* the full grid has been cleared */
         float *row = on_sheet(sheet, width, corners[k], windows[k]);
         for (long y = windows[k].top; y < windows[k].bottom; y++, row += width)
             memset(row, 0, (size_t)(windows[k].right - windows[k].left) * sizeof *row);
     }
     Drawn drawn = draw(start, end, widths, n, windows, corners, ends, area, sheet, width);
-    long columns = 1; /* enough for two rows of either enlarged grid, and one of levels */
+    long columns = 1; /* enough for two rows of either enlarged grid and one row of levels */
     for (int k = 1; k < GRIDS; k++)
         columns += windows[k].right - windows[k].left;
     float *scratch = malloc((size_t)(4 * columns) * sizeof *scratch);
@@ -390,7 +390,7 @@ long taken(const float *start, const float *end, const float *widths, long n, co
 
 /* --- veiled and Windscreen -------------------------------------------------------------------------------- */
 
-INLINE int share_of(int level, int share) /* rounded to the nearest; there is no tie */
+INLINE int share_of(int level, int share) /* rounded to nearest; there are no ties */
 {
     int twice = level * share + 127;
     return (twice + 1 + (twice >> 8)) >> 8;
@@ -420,8 +420,8 @@ static void veil_plain(const uint8_t *picture, long picture_step, const uint8_t 
     veil_rows(picture, picture_step, veil, veil_step, taken, rows, columns, slope, air, out);
 }
 
-/* A region of a picture through the veil and the streaks, which take light: airlight takes its place. Rows of
- * `picture` and `veil` are `picture_step` and `veil_step` apart. */
+/* A region of a picture after attenuation by veil and streaks; airlight replaces the lost light. Rows of `picture`
+ * and `veil` are `picture_step` and `veil_step` apart. */
 void veiled(const uint8_t *picture, long picture_step, const uint8_t *veil, long veil_step, const uint8_t *taken,
             long rows, long columns, float slope, float air, uint8_t *out)
 {
@@ -430,7 +430,7 @@ void veiled(const uint8_t *picture, long picture_step, const uint8_t *veil, long
 
 enum { COARSE = 8 };
 
-/* Means of 8 x 8 pixels; halves go to the even level. */
+/* Means of 8 x 8 pixels; halves round to the even level. */
 INLINE void mean_rows(const uint8_t *picture, long rows, long columns, uint16_t *sums, uint8_t *out)
 {
     for (long y = 0; y < rows; y++, out += columns) {
@@ -457,7 +457,7 @@ static void mean_plain(const uint8_t *picture, long rows, long columns, uint16_t
     mean_rows(picture, rows, columns, sums, out);
 }
 
-/* The picture made coarse, `rows` x `columns`; `sums` has room for a row of the picture. */
+/* The picture reduced to `rows` x `columns`; `sums` has space for a row of the picture. */
 void coarse(const uint8_t *picture, long rows, long columns, uint16_t *sums, uint8_t *out)
 {
     (IS_FAST ? mean_fast : mean_plain)(picture, rows, columns, sums, out);

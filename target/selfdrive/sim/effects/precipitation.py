@@ -1,9 +1,8 @@
-"""Rain and snow of a given rate, in mm of water an hour: single drops near the camera, a veil beyond.
+"""Rain and snow of a given rate, in mm of water per hour: single drops near the camera, a veil beyond.
 
-Drops and flakes glow with the light of the sky, which they throw into the camera from all sides (K. Garg and
-S. Nayar, 2007), so that they are seen before the road and vanish before the sky. Shutters are short in
-daylight: streaks are of some pixels and faint, and the veil of all that is too small or too far to be seen
-singly weighs as much.
+Drops and flakes scatter the sky's light from all directions into the camera (K. Garg and S. Nayar, 2007), so
+they are visible against the road but not against the sky. Exposures are short in daylight, so streaks are
+short and faint, and the veil of particles too small or too far away to be seen is just as important.
 """
 
 from abc import abstractmethod
@@ -21,15 +20,14 @@ from selfdrive.sim.effects.windscreen import BLUR, Windscreen
 from selfdrive.sim.picture import Picture, Region, whole
 
 EXPOSURE = 0.001  # s, under a grey sky
-ON_GLASS = 1000  # diameters to choose from
+ON_GLASS = 1000  # number of diameters to choose from
 
 
 class _Precipitation(Effect):
     """Particles whose numbers fall exponentially with their (melted) diameter.
 
-    `REACHES` says up to which distance (m) particles from a diameter (mm) on are drawn one by one; beyond,
-    one would take too little of a pixel's light to be seen. In dense air only the nearest `IN_BOX` are drawn,
-    of which a third is in view.
+    `REACHES` is the distance (m) up to which particles from a diameter (mm) on are drawn individually; beyond
+    it they would be invisible. In dense air only the nearest `IN_BOX` are drawn, of which a third is in view.
     """
 
     UNIT = "mm/h"
@@ -51,7 +49,6 @@ class _Precipitation(Effect):
         self._veil = np.rint(255.0 * clearness(self.extinction(), self.camera)).astype(np.uint8)
 
     def _box(self, random: np.random.Generator, least: float, most: float, reach: float) -> Box:
-        """A box of all particles with diameters (mm) from `least` to `most`."""
         density = self.density(least, most)
         across = self.camera.width / self.camera.fx * self.camera.rows / self.camera.fy
         reach = min(reach, (self.IN_BOX / (density * across)) ** (1.0 / 3.0))
@@ -64,7 +61,6 @@ class _Precipitation(Effect):
         return number / slope * (exp(-slope * least) - exp(-slope * most))
 
     def _diameters(self, random: np.random.Generator, least: float, most: float, count: int) -> np.ndarray:
-        """Diameters (mm) of so many of these particles."""
         _, slope = self._spectrum()
         few, many = exp(-slope * most), exp(-slope * least)
         return -each(log, few + (many - few) * random.uniform(size=count)) / slope
@@ -76,7 +72,7 @@ class _Precipitation(Effect):
 
     @abstractmethod
     def _spectrum(self) -> tuple[float, float]:
-        """N0 (per m^3 and mm) and slope (1/mm) of the numbers N0 * exp(-slope * diameter)."""
+        """N0 (per m^3 and mm) and slope (1/mm) of N0 * exp(-slope * diameter)."""
 
     @abstractmethod
     def largest(self) -> float:
@@ -84,17 +80,17 @@ class _Precipitation(Effect):
 
     @abstractmethod
     def flown(self, melted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Seen diameters (m) and speeds of fall (m/s)."""
+        """Visible diameters (m) and fall speeds (m/s)."""
 
     @abstractmethod
     def extinction(self) -> float:
-        """Extinction coefficient (1/m) of the air full of particles."""
+        """Extinction coefficient (1/m) of the air with its particles."""
 
 
 class Rain(_Precipitation):
-    """Rain in the air, and drops on the windscreen from wipe to wipe, once a second.
+    """Rain in the air, and drops on the windscreen, which is wiped once a second.
 
-    Drops after Marshall and Palmer (1948), their speeds of fall after Atlas and others (1973).
+    Drops after Marshall and Palmer (1948), fall speeds after Atlas and others (1973).
     """
 
     LEAST, MOST = 0.5, 200.0
@@ -113,7 +109,7 @@ class Rain(_Precipitation):
         super()._prepare(random)
 
     def _affect(self, picture: np.ndarray | Picture, region: Region, scene: Scene) -> np.ndarray:
-        everything = whole(picture.shape)  # of which each drop shows most
+        everything = whole(picture.shape)  # each drop shows most of it
         through = super()._affect(picture[everything.part], everything, scene)
         return self._glass.seen(through, region, scene)
 
@@ -127,14 +123,14 @@ class Rain(_Precipitation):
         return 0.001 * melted, 9.65 - 10.3 * each(exp, -0.6 * melted)
 
     def extinction(self) -> float:
-        # Attenuation of light by rain, as Halder and others (2019) use it for rendering.
+        # Attenuation of light by rain, as used by Halder and others (2019) for rendering.
         return 0.312e-3 * self.amount**0.67
 
 
 class Snow(_Precipitation):
-    """Dry snow: flakes after Gunn and Marshall (1958), their speeds after Langleben (1954).
+    """Dry snow: flakes after Gunn and Marshall (1958), fall speeds after Langleben (1954).
 
-    A flake is seen as large as its mass asks at a density falling with its size, 0.17 g/cm^3 at 1 mm
+    A flake's visible size follows from its mass and a density that falls with its size, 0.17 g/cm^3 at 1 mm
     (Holroyd, 1971).
     """
 

@@ -1,5 +1,5 @@
 /* Stands for: scattered.py.
- * What chance scatters over a picture, of NumPy's random numbers. */
+ * Randomly placed streaks, flakes and droplets, with NumPy's random numbers. */
 
 #include <stdint.h>
 #include <string.h>
@@ -8,10 +8,10 @@ typedef struct {
     long column, row;
 } Pixel;
 
-/* Add passes of `count` streaks each to a region of a canvas, as levels. `chances` are where streaks begin, as shares
- * of the canvas' `size`; the region begins at `first`. A streak goes over `length` pixels and ends at `way`, counted
- * from where it begins. A pass lights a pixel once. `light` and `passed` are black, and as large as the region and
- * `margin` around it. */
+/* Add passes of `count` streaks each to a region of a canvas, as levels. `chances` are the starts of streaks as
+ * shares of the canvas' `size`; the region begins at `first`. A streak has `length` pixels and ends at `way`
+ * relative to its start. A pass lights a pixel at most once. `light` and `passed` are initially zero, and as large
+ * as the region with a `margin` around it. */
 void streaks(const float *chances, long passes, long count, const Pixel *size, const Pixel *first, const Pixel *pixels,
              long length, const Pixel *way, const uint8_t *levels, long rows, long columns, long margin, uint8_t *light,
              uint8_t *passed)
@@ -35,8 +35,8 @@ void streaks(const float *chances, long passes, long count, const Pixel *size, c
         }
 }
 
-/* Add flakes, `size` x `size` levels, those of a layer alike, that begin at pixels `first` to `end` - 1 of rows of so
- * many columns. `places` are where they begin, `count` for each layer; `light` begins at pixel `first`. */
+/* Add flakes of `size` x `size` levels, equal within a layer, that begin at pixels `first` to `end` - 1, in rows of
+ * `columns` pixels. `places` are their starts, `count` per layer; `light` begins at pixel `first`. */
 void flakes(const int64_t *places, long layers, long count, const uint16_t *levels, long size, long columns, long first,
             long end, uint16_t *light)
 {
@@ -52,7 +52,8 @@ void flakes(const int64_t *places, long layers, long count, const uint16_t *leve
         }
 }
 
-/* M. O'Neill's generator PCG64 (XSL RR 128/64) as NumPy has it: four numbers at a time, as each step takes long. */
+/* M. O'Neill's generator PCG64 (XSL RR 128/64) as in NumPy: four numbers at a time, because each step has a long
+ * latency. */
 enum { AT_ONCE = 4 };
 typedef unsigned __int128 Wide;
 
@@ -63,9 +64,9 @@ static uint64_t output(Wide state)
     return mixed >> turn | mixed << (-turn & 63);
 }
 
-/* Make pixels white, `count` times one of `bound`, drawn as NumPy draws whole numbers (D. Lemire, 2019). `generator`
- * has the upper and the lower half of its state and of its increment; where `kept` is not negative it is a number of
- * 32 bits that comes first. */
+/* Make pixels white: `count` draws from `bound` pixels, as NumPy draws integers (D. Lemire, 2019). `generator` has
+ * the upper and lower halves of its state and of its increment. If `kept` is not negative, it is a 32-bit number
+ * that is used first. */
 void droplets(const uint64_t *generator, int64_t kept, long count, uint32_t bound, uint8_t *pixels)
 {
     const Wide by = (Wide)2549297995355413924u << 64 | 4865540595714422341u;
@@ -75,7 +76,7 @@ void droplets(const uint64_t *generator, int64_t kept, long count, uint32_t boun
         states[k] = (k ? states[k - 1] : states[0]) * by + increment;
         far = far * by, add = add * by + increment;
     }
-    const uint32_t threshold = -bound % bound; /* smaller remainders would favour some numbers */
+    const uint32_t threshold = -bound % bound; /* smaller remainders would bias the result */
     uint32_t numbers[2 * AT_ONCE + 1];
     while (count) {
         int made = 0;

@@ -1,4 +1,4 @@
-"""What chance scatters over a picture as coded: streaks, flakes and droplets, as the light that they add."""
+"""Light of randomly placed streaks, flakes and droplets, as coded by the paper's authors."""
 
 from typing import NamedTuple
 
@@ -9,7 +9,7 @@ WHITE = 255
 
 
 class Streak(NamedTuple):
-    """Pixels (n, 2) of a streak, column and row from where it begins, and where it ends; all int_."""
+    """Pixels (n, 2) of a streak, column and row relative to its start, and its end; all int_."""
 
     pixels: np.ndarray
     way: np.ndarray
@@ -18,10 +18,10 @@ class Streak(NamedTuple):
 def streak_light(
     chances: np.ndarray, streak: Streak, levels: np.ndarray, box: np.ndarray, shape: tuple[int, int]
 ) -> np.ndarray:
-    """Grey levels (uint8) of streaks in a region of that shape of a canvas.
+    """Grey levels (uint8) of streaks in a region, of that shape, of a canvas.
 
-    `chances` (passes, n, 2), float32, are where streaks begin, as shares of the canvas' columns and rows,
-    which `box` has, and then where in the canvas the region begins. Each pass adds its level (uint8).
+    `chances` (passes, n, 2), float32, are the starts of streaks as shares of the canvas' columns and rows.
+    `box` has the canvas' size, then the region's start. Each pass adds its level (uint8).
     """
     rows, columns = shape
     margin = reach(streak)
@@ -41,11 +41,11 @@ def streak_light(
 
 
 def flake_light(places: np.ndarray, flakes: np.ndarray, columns: int, first: int, end: int) -> np.ndarray:
-    """Summed grey levels (uint16) of flakes that begin in rows `first` to `end` - 1 of so many columns.
+    """Summed grey levels (uint16) of flakes that begin in rows `first` to `end` - 1, of `columns` columns.
 
-    `places` (layers, n) are numbers of pixels in row-major order; `flakes` (layers, size, size), uint16, are
-    the layers' flakes. A flake at a row's end goes on in the next. There are as many rows more below as a
-    flake has, and one.
+    `places` (layers, n) are row-major pixel numbers; `flakes` (layers, size, size), uint16, are the layers'
+    flakes. A flake at a row's end continues in the next row. The result has `size` + 1 additional rows at the
+    bottom.
     """
     layer, number = ((places >= first * columns) & (places < end * columns)).nonzero()
     size = flakes.shape[1]
@@ -57,12 +57,12 @@ def flake_light(places: np.ndarray, flakes: np.ndarray, columns: int, first: int
 
 
 def droplets(random: np.random.Generator, shape: tuple[int, int], count: int) -> np.ndarray:
-    """A black picture with white pixels in `count` random places. Draws the last numbers from `random`."""
+    """A black picture with white pixels in `count` random places. These must be the last numbers drawn from
+    `random`."""
     picture = np.zeros(shape, np.uint8)
     picture.reshape(-1)[random.integers(0, picture.size, count)] = WHITE
     return picture
 
 
 def reach(streak: Streak) -> int:
-    """How many pixels far a streak reaches."""
     return int(np.abs(streak.pixels).max()) + 1

@@ -1,4 +1,4 @@
-"""How much an effect spoils a picture of the road, measured beside the clean one and the road's geometry."""
+"""Measures how much an effect degrades a picture of the road, compared with the clean one."""
 
 from typing import NamedTuple
 
@@ -8,27 +8,27 @@ from skimage.metrics import peak_signal_noise_ratio
 
 from selfdrive.common.camera_model import CameraModel
 
-NEAR, FAR = 5.0, 30.0  # m: part of the road that is measured
-BESIDE = 0.35  # m: from a line's middle to bare road
-INNER = 0.5  # m: what is nearer to a line does not count as the lane's inside
-SAME = 0.5  # share of a mark's edge from which another edge looks like one
+NEAR, FAR = 5.0, 30.0  # m, measured part of the road
+BESIDE = 0.35  # m from a line's middle to bare road
+INNER = 0.5  # m; anything nearer to a line is not part of the lane's inside
+SAME = 0.5  # share of a mark's edge; at least this is treated as an edge like a mark's
 NOTICED = 8.0  # grey levels
-WEAKEST = 32.0  # Sobel's value for a step of 8 grey levels: what is below is no edge
+WEAKEST = 32.0  # Sobel value of a step of 8 grey levels; anything less is no edge
 
 
 class Severity(NamedTuple):
-    """What is left of a picture."""
+    """Remaining quality of a picture."""
 
-    psnr: float  # dB against the clean picture; infinite where they are equal
-    contrast: float  # grey levels between marks and the road beside them
-    false_edges: float  # share of the lane's inside where an edge is as strong as a mark's
+    psnr: float  # dB relative to the clean picture; infinite if equal
+    contrast: float  # grey levels, between marks and the road beside them
+    false_edges: float  # share of the lane's inside with an edge as strong as a mark's
 
 
 class RoadGauge:
     """Measures pictures of one straight lane."""
 
     def __init__(self, model: CameraModel, lines: tuple[tuple[float, float], tuple[float, float]]) -> None:
-        """`lines` are (y, slope) of the lane's left and right line in m; both painted all along."""
+        """`lines` are (y, slope) of the lane's left and right line in m; both are solid."""
         self._rows = np.arange(int(model.row(FAR)) + 1, min(int(model.row(NEAR)), model.rows - 1) + 1)
         scales = np.array([model.metres_per_pixel(row) for row in self._rows])
         self._columns = []
@@ -41,9 +41,8 @@ class RoadGauge:
         self._inside = (columns > left[:, None]) & (columns < right[:, None])
 
     def measure(self, clean: np.ndarray, seen: np.ndarray) -> Severity:
-        """Severity of what turned the `clean` picture into the `seen` one."""
         same, contrast = np.array_equal(clean, seen), self._contrast(seen)
-        # Marks' edges fade with their contrast; measured in the picture they would count what lies on them.
+        # Marks' edges fade with their contrast; measured in the picture, they would include dirt on them.
         mark_edge = self._mark_edge(clean) * contrast / self._contrast(clean)
         edges = self._edges(seen)[self._inside]
         return Severity(
@@ -53,8 +52,8 @@ class RoadGauge:
         )
 
     def covered(self, seen: np.ndarray) -> float:
-        """Share of the lane's inside that something covers in a picture of one grey level, `seen` through
-        an effect: where it differs from the median by what the eye notices. Right up to about a half."""
+        """Share of the lane's inside that is covered in a uniform grey picture `seen` through an effect:
+        where it noticeably differs from the median. Valid up to about one half."""
         levels = seen[self._rows][self._inside].astype(float)
         return float((np.abs(levels - np.median(levels)) >= NOTICED).mean())
 
@@ -82,7 +81,7 @@ class RoadGauge:
         return np.abs(cv2.Sobel(picture, cv2.CV_32F, 1, 0)[self._rows])
 
     def _levels(self, picture: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Levels at these columns, one a row, NaN beside the picture."""
+        """Levels at these columns, one per row, NaN outside the picture."""
         places = np.rint(columns).astype(int)
         inside = (places >= 0) & (places < picture.shape[1])
         levels = picture[self._rows, np.clip(places, 0, picture.shape[1] - 1)].astype(float)

@@ -1,4 +1,4 @@
-"""Contrast, brightness and blur, as the paper takes them from DeepTest (Tian and others, 2018)."""
+"""Contrast, brightness and blur, which the paper takes from DeepTest (Tian and others, 2018)."""
 
 import cv2
 import numpy as np
@@ -11,7 +11,7 @@ from selfdrive.sim.picture import Picture, Region
 
 
 class _Tone(Effect):
-    """A change of every grey level by itself."""
+    """Changes each grey level independently of its place."""
 
     MOVING = False
 
@@ -23,7 +23,7 @@ class _Tone(Effect):
 
 
 class Contrast(_Tone):
-    """Every level multiplied by a gain; what exceeds white is white. The paper's gains: 1.2 to 3.0."""
+    """Every level multiplied by a gain, limited to white. The paper's gains: 1.2 to 3.0."""
 
     UNIT, LEAST, MOST = "gain", 0.0, 10.0
 
@@ -53,10 +53,10 @@ class AveragingBlur(Effect):
 
 
 class _OddKernel(Effect):
-    """A blur whose kernel has a middle."""
+    """A blur whose kernel has a central pixel."""
 
     def _prepare(self, random: np.random.Generator) -> None:
-        """Nothing is the same for all pictures."""
+        """Prepare nothing."""
 
     def _check(self, amount: float, seed: int) -> None:
         super()._check(amount, seed)
@@ -66,7 +66,7 @@ class _OddKernel(Effect):
 
 
 class GaussianBlur(_OddKernel):
-    """A Gaussian in a square kernel, its width chosen by the kernel's. The paper's kernels: 3, 5, 7."""
+    """A Gaussian in a square kernel that determines its width. The paper's kernels: 3, 5, 7."""
 
     UNIT, LEAST, MOST, WHOLE, MOVING = "px", 1, 31, True, False
 

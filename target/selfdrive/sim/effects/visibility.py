@@ -1,14 +1,14 @@
-"""What a level of the paper's rain, fog, snow and occlusion stands for, in units of the weather.
+"""The weather that each level of the paper's rain, fog, snow and occlusion represents.
 
-The text counts streaks, blocks and blobs and gives contrasts; it does not say how bad a weather that is. This
-is settled here, once, from the numbers of drops and flakes before the camera:
+The text counts streaks, blocks and blobs and gives contrasts, but not how bad the weather is. Here this
+follows from the numbers of drops and flakes in front of the camera:
 
-* rain: a streak is a drop of 1 mm and more within `REACH`, at the rate at which so many of them are there
-  (J. Marshall and W. Palmer, 1948);
-* snow: a block of two pixels is a flake that looks as large or larger, likewise (K. Gunn and J. Marshall,
+* rain: a streak is a drop of at least 1 mm within `REACH`, at the rate with that many drops (J. Marshall and
+  W. Palmer, 1948);
+* snow: a block of two pixels is a flake that looks at least as large, likewise (K. Gunn and J. Marshall,
   1958; E. Holroyd, 1971);
-* fog: a contrast is what is left of it in the middle of the measured road, after H. Koschmieder (1924), where
-  5 % is left at the meteorological range;
+* fog: a contrast is what is left in the middle of the measured road, after H. Koschmieder (1924), where 5 %
+  is left at the meteorological range;
 * the range in rain and snow follows from their extinction (S. Halder and others, 2019; ITU-R P.1814).
 """
 
@@ -25,20 +25,20 @@ from selfdrive.sim.effects.precipitation import Rain, Snow
 from selfdrive.sim.effects.severity import FAR, NEAR
 
 LEFT = 0.05  # of the contrast, at the meteorological range
-DROP = 1.0  # mm: smaller ones make no streak
-BLOCK = 2.0  # px: smaller flakes make no block
+DROP = 1.0  # mm; smaller drops make no streak
+BLOCK = 2.0  # px; smaller flakes make no block
 SIZES, HALVINGS = 200, 40
 
 
 class Weather(NamedTuple):
-    """What is outside."""
+    """The weather outside."""
 
-    rate: float  # mm of water an hour; 0 without any
-    range: float  # m: the meteorological range
+    rate: float  # mm of water per hour; 0 without any
+    range: float  # m, meteorological range
 
 
 def rain(thickness: float, camera: CameraModel) -> Weather:
-    """The rain that has so many drops near the camera."""
+    """The rain with that number of drops near the camera."""
 
     def drops(rate: float) -> float:
         fall = Rain(rate, 0, camera)
@@ -49,7 +49,7 @@ def rain(thickness: float, camera: CameraModel) -> Weather:
 
 
 def snow(thickness: float, camera: CameraModel) -> Weather:
-    """The snowfall that has so many flakes that look as large as a block."""
+    """The snowfall with that number of flakes as large as a block."""
 
     def flakes(rate: float) -> float:
         fall = Snow(rate, 0, camera)
@@ -64,12 +64,11 @@ def snow(thickness: float, camera: CameraModel) -> Weather:
 
 
 def fog(contrast: float) -> Weather:
-    """The fog that leaves this share of the contrast of what lies in the middle of the measured road."""
+    """The fog in which this share of the contrast is left in the middle of the measured road."""
     return Weather(0.0, _range(-log(contrast) / (0.5 * (NEAR + FAR))))
 
 
 def _volume(reach: float, camera: CameraModel) -> float:
-    """What a camera sees up to there (m^3)."""
     across = camera.width / camera.fx * camera.rows / camera.fy
     return across * reach**3 / 3.0
 
@@ -79,7 +78,7 @@ def _range(extinction: float) -> float:
 
 
 def _where(count: Callable[[float], float], wanted: float, least: float, most: float) -> float:
-    """The rate at which a count that grows with it is as large as wanted, or the nearest one."""
+    """The rate at which an increasing count is nearest to `wanted`."""
     for _ in range(HALVINGS):
         middle = 0.5 * (least + most)
         least, most = (middle, most) if count(middle) < wanted else (least, middle)

@@ -1,4 +1,4 @@
-"""Rain drops on the windscreen in front of the camera: they stay where they land until the wiper comes by."""
+"""Rain drops on the windscreen, which stay where they land until the wiper passes."""
 
 from collections.abc import Callable
 from math import exp, tan
@@ -15,34 +15,35 @@ from selfdrive.sim.picture import Region
 
 DISTANCE = 0.05  # m from lens to glass
 RAKE = 0.52  # rad between glass and road
-SPREAD = 1.8  # diameter of a drop on the glass, in its diameters in the air
-FALL = 6.5  # m/s: of drops of some mm
-EDGE = 3.0  # px: a drop's edge is out of focus
-WIPE = 1.0  # s from wipe to wipe
-FASTEST = 40.0  # m/s: beyond, no more drops are kept ready
-SETS = 3  # drops of so many wipes, which then repeat
-COARSE = 8  # px of the picture to one of that which is seen through drops
-BLUR = 5.0  # of these: glass is out of focus, and so is what drops show
-WIDE = 0.9  # share of the picture that a drop shows, upside down, as a strong lens does
+SPREAD = 1.8  # a drop's diameter on the glass, relative to that in the air
+FALL = 6.5  # m/s, fall speed of drops of some mm
+EDGE = 3.0  # px, blur of a drop's edge, which is out of focus
+WIPE = 1.0  # s between wipes
+FASTEST = 40.0  # m/s; drops are prepared up to this speed
+SETS = 3  # number of wipes with different drops, after which they repeat
+COARSE = 8  # px of the picture per pixel of its reduced copy seen through drops
+BLUR = 5.0  # px of the reduced copy: glass and the view through drops are out of focus
+WIDE = 0.9  # share of the picture that a drop shows, upside down like a strong lens
 
 
 class Pixels(NamedTuple):
-    """Pixels of drops in the order in which these land; drop k has the ones from ends[k] to ends[k + 1]."""
+    """Pixels of drops in the order in which they land; drop k has those from ends[k] to ends[k + 1]."""
 
     places: np.ndarray  # in the picture
-    sources: np.ndarray  # which pixel of the coarse picture is seen there
+    sources: np.ndarray  # pixel of the reduced picture seen there
     shares: np.ndarray  # in 64ths, int16
     ends: np.ndarray
 
     @classmethod
     def of(cls, drops: list[np.ndarray]) -> "Pixels":
-        """From an array of places, sources and shares for each drop."""
+        """Combine an array of places, sources and shares for each drop."""
         places, sources, shares = np.concatenate(drops, axis=1)
         ends = np.concatenate([[0], np.cumsum([drop.shape[1] for drop in drops])])
         return cls(places, sources, shares.astype(np.int16), ends)
 
     def within(self, region: Region, columns: int) -> "Pixels":
-        """Those in a region of the picture, which has so many columns; their places are the region's."""
+        """Those in a region of the picture, which has `columns` columns; places are then relative to the
+        region."""
         row, column = np.divmod(self.places, columns)
         down, right = row - region.top, column - region.left
         rows, width = region.shape
@@ -51,15 +52,14 @@ class Pixels(NamedTuple):
         return Pixels((down * width + right)[there], self.sources[there], self.shares[there], ends)
 
     def first(self, drops: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Places, sources and shares of so many drops."""
         end = self.ends[min(drops, self.ends.size - 1)]
         return self.places[:end], self.sources[:end], self.shares[:end]
 
 
 class Windscreen:
-    """Drops of `diameters` (m, of those that land one after the other) landing on a car in rain.
+    """Drops of `diameters` (m, in order of landing) on a car in rain.
 
-    `density` is their number per m^3 of air. What drops show is made by `shrink` and `blur`.
+    `density` is their number per m^3 of air. `shrink` and `blur` make the picture that drops show.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class Windscreen:
         self._shrink, self._blur = shrink, blur
         self._size = camera.width // COARSE, camera.rows // COARSE
         area = DISTANCE**2 * camera.width / camera.fx * camera.rows / camera.fy
-        self._per_metre = density * area  # drops for each metre of air that moves at the glass
+        self._per_metre = density * area  # drops per metre of air that passes the glass
         most = int(self._per_metre * _speed(FASTEST) * WIPE) + 1
         self._region: Region | None = None
         self._start = random.uniform(0.0, WIPE)
@@ -83,7 +83,6 @@ class Windscreen:
         ]
 
     def seen(self, picture: np.ndarray, region: Region, scene: Scene) -> np.ndarray:
-        """The picture's region through the glass; a new array."""
         wipe, since = divmod(scene.t + self._start, WIPE)
         wholly, edges = self._landing(region, picture.shape[1])[int(wipe) % SETS]
         landed = int(self._per_metre * _speed(scene.v_ego) * since)
@@ -98,7 +97,7 @@ class Windscreen:
         return seen
 
     def _landing(self, region: Region, columns: int) -> list[tuple[Pixels, Pixels]]:
-        """The sets of drops in a region; kept, as all pictures of a run are asked for the same one."""
+        """The sets of drops in a region; cached, because a run always requests the same one."""
         if region != self._region:
             self._seen = [tuple(part.within(region, columns) for part in drops) for drops in self._sets]
             self._region = region
@@ -106,19 +105,18 @@ class Windscreen:
 
 
 def shrunk(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """The picture in so many columns and rows, each pixel the mean of what it stands for."""
+    """The picture reduced to `size` (columns, rows) by averaging."""
     return cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def _speed(v_ego: float) -> float:
-    """Speed (m/s) of drops against the glass, as if it stood upright."""
+    """Speed (m/s) of drops relative to the glass, as if it were upright."""
     return max(v_ego, 0.0) + FALL / tan(RAKE)
 
 
 def _landed(
     random: np.random.Generator, camera: CameraModel, diameters: np.ndarray, size: tuple[int, int]
 ) -> tuple[Pixels, Pixels]:
-    """Pixels that drops of these diameters cover wholly, and those at their edges."""
     free = np.ones((camera.rows, camera.width), dtype=bool)
     grid = np.arange(free.size).reshape(free.shape)
     middles = random.uniform(size=(diameters.size, 2)) * (camera.width, camera.rows)
@@ -140,11 +138,11 @@ def _landed(
 
 
 def _across(middle: float, radius: float, size: int) -> tuple[np.ndarray, slice]:
-    """Places in a drop, -1 to 1 and its edge, of the pixels it covers, and which of `size` these are."""
+    """Positions in a drop (-1 to 1 at its edges) of the pixels that it covers, and their slice of `size`."""
     first, end = max(int(middle - radius - EDGE), 0), min(int(middle + radius + EDGE) + 2, size)
     return (np.arange(first, end) - middle) / radius, slice(first, end)
 
 
 def _source(turned: np.ndarray, size: int) -> np.ndarray:
-    """Which of `size` pixels a drop shows at a place between -1 and 1 of its own: from the other end."""
+    """Which of `size` pixels a drop shows at a position between -1 and 1: from the opposite end."""
     return np.clip(np.rint(0.5 * size * (1.0 - WIDE * turned)), 0, size - 1).astype(np.intp)

@@ -1,1 +1,1 @@
-"""Films of runs: camera frames and the controller's view of them, and a viewer."""
+"""Films of runs: camera frames with the controller's view of them, and a viewer."""

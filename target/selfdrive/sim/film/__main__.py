@@ -21,7 +21,6 @@ EXIT_INPUT = 2
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit code."""
     options = _parse(arguments)
     cv2.setNumThreads(1)
     try:

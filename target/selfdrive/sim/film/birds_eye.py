@@ -19,21 +19,20 @@ VERGE = (52, 66, 50)
 LEAD_BODY = (92, 78, 168)
 BEHIND = 8.0  # m of road shown behind the car's front
 SHOULDER = 0.7  # m
-DASH, PERIOD = 3.05, 12.2  # m; of the outer lines, so that motion is visible
+DASH, PERIOD = 3.05, 12.2  # m; of the outer lines, which show the motion
 LINE_WIDTH, FAR_LINE_WIDTH = 2, 1  # pixels
 
 
 class BirdsEye:
-    """Draws frames into strips of `width` x `height` pixels, filled by three lanes; the car has `colour`."""
+    """Draws frames into strips of `width` x `height` pixels with three lanes; the car has `colour`."""
 
     def __init__(self, width: int, height: int, colour: pen.Colour) -> None:
         self._size, self._colour = (width, height), colour
-        self._shift = 0.0  # m that the strip shifts to follow a car that leaves the road
+        self._shift = 0.0  # m, shift of the strip to follow a car that leaves the road
         self._scale = height / (3.0 * LANE_WIDTH + 2.0 * (SHOULDER + 0.3))
         self.ahead = width / self._scale - BEHIND  # m shown
 
     def draw(self, frame: Frame) -> np.ndarray:
-        """The strip of a frame, BGR."""
         self._shift = copysign(max(0.0, abs(frame.offset) - LANE_WIDTH), frame.offset)
         strip = np.full((self._size[1], self._size[0], 3), VERGE, np.uint8)
         self._draw_road(strip, frame.position)
@@ -57,7 +56,7 @@ class BirdsEye:
                 pen.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
 
     def _draw_seen(self, strip: np.ndarray, frame: Frame) -> None:
-        """Seen lines and planned path, relative to the true lane, without the road's bends."""
+        """Draw seen lines and planned path relative to the true lane, without the road's bends."""
         seen = [line for line in (frame.lines or {}).values() if line.drawable]
         lines = [(line.y, pen.line_colour(line.prob), LINE_WIDTH) for line in seen]
         if np.isfinite(frame.plan).all():
@@ -69,7 +68,7 @@ class BirdsEye:
     def _draw_car(
         self, strip: np.ndarray, front: float, offset: float, heading: float, colour: pen.Colour
     ) -> None:
-        """A car with its front bumper at `front` m; its windscreen shows the direction."""
+        """Draw a car with its front bumper at `front` m; its windscreen shows the direction."""
         for x, y, tone in (
             ([0.0, 0.0, -LENGTH, -LENGTH], 1.0, colour),
             ([-1.2, -1.2, -1.9, -1.9], 0.8, pen.PAPER),
@@ -82,7 +81,6 @@ class BirdsEye:
             )
 
     def _draw_distances(self, strip: np.ndarray, frame: Frame) -> None:
-        """The lead's distances from radar and camera: one pin each beside the lane."""
         for name, distance, colour, side in (
             ("radar", frame.radar, pen.FAULTY, 1.0),
             ("camera", frame.camera_lead if frame.d_rel is not None else None, pen.DOUBTED, -1.0),
@@ -99,7 +97,6 @@ class BirdsEye:
             pen.write(strip, words, (left, row + 5), colour, pen.SMALL)
 
     def _places(self, x: object, y: object) -> np.ndarray:
-        """Points `x` m ahead and `y` m left of the lane centre, in the strip."""
         columns = (np.asarray(x, float) + BEHIND) * self._scale
         rows = 0.5 * self._size[1] - (np.asarray(y, float) - self._shift) * self._scale
         return np.stack([columns, rows], axis=1)

@@ -1,4 +1,4 @@
-"""The camera's frame, with the seen lines, path and lead drawn in."""
+"""The camera's frame, with the detected lines, path and lead drawn in."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -18,7 +18,7 @@ LINE_HALF, PATH_HALF = 0.06, 0.8  # m; half the drawn width
 LINE_SHARE, PATH_SHARE = 0.8, 0.3  # opacity over the picture
 CAR_HALF, CAR_HEIGHT = 1.0, 1.55  # m; of the frame around the lead
 FRAME_MARGIN = 4  # pixels
-WRONG_DISTANCE = 2.0  # m between the lead and the camera's message that is worth a frame
+WRONG_DISTANCE = 2.0  # m; a larger error of the camera's message is drawn
 
 
 class CameraPane:
@@ -27,7 +27,7 @@ class CameraPane:
     def __init__(self, model: CameraModel, width: int, height: int) -> None:
         self._model, self._width = model, width
         self._scale = width / model.width
-        self._top = height - round(model.rows * self._scale)  # the picture's top row; may be < 0
+        self._top = height - round(model.rows * self._scale)  # top row of the picture; may be < 0
         near = max(0.0, model.distance(model.rows - 1.0))
         self._x = np.concatenate([[near], np.arange(np.ceil(near + 0.1), KNOTS[-1] + 1.0)])
 
@@ -36,7 +36,6 @@ class CameraPane:
         return RoadRenderer(self._model, "solid", 0)
 
     def draw(self, frame: Frame) -> np.ndarray:
-        """The pane of a frame, BGR."""
         pane = self._fitted(self._picture(frame))
         if np.isfinite(frame.plan).all():
             pen.glaze(pane, self._strip(frame.plan, PATH_HALF), pen.PATH, PATH_SHARE)
@@ -59,7 +58,6 @@ class CameraPane:
         return picture
 
     def _bent(self, picture: np.ndarray, frame: Frame) -> np.ndarray:
-        """A straight road's picture with each row shifted by the road's bend."""
         model = self._model
         bend = np.array(frame.bend) + np.tan(frame.heading) * np.array(KNOTS)
         if np.allclose(bend, 0.0, atol=1e-6):
@@ -81,7 +79,6 @@ class CameraPane:
         )
 
     def _fitted(self, picture: np.ndarray) -> np.ndarray:
-        """The picture scaled to the pane's width, aligned at the bottom."""
         width = self._width
         rows = round(self._model.rows * self._scale)
         scaled = cv2.resize(picture, (width, rows), interpolation=cv2.INTER_LINEAR)
@@ -94,7 +91,7 @@ class CameraPane:
             pen.glaze(pane, self._strip(line.y, LINE_HALF), pen.line_colour(line.prob), LINE_SHARE)
 
     def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
-        """A frame around the lead with its distance, and one at the camera's message if it differs."""
+        """Frame the lead, with its distance, and the camera's message if it differs."""
         told = frame.camera_lead
         if frame.d_rel is not None:
             self._frame_lead(pane, frame, frame.d_rel, pen.INK, f"{frame.d_rel:.1f} m")
@@ -123,23 +120,21 @@ class CameraPane:
         pen.tag(pane, label, (right + 8, top + 10), colour)
 
     def _sideways(self, frame: Frame, distance: float) -> float:
-        """The lane's shift to the left (m) in view at the lead."""
+        """The lane's shift to the left (m) in view at `distance`."""
         beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])
         return float(np.interp(distance, KNOTS, frame.bend)) + beyond
 
     def _strip(self, knots: Sequence[float], half: float) -> np.ndarray:
-        """The outline of a strip of road along a line that is given at KNOTS."""
+        """The outline of a strip of road along a line given at KNOTS."""
         y = np.interp(self._x, KNOTS, knots)
         sides = [self._seen_at(self._x, y + half), self._seen_at(self._x, y - half)[::-1]]
         return np.concatenate(sides)
 
     def _seen_at(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """The positions of road points (x, y) in the pane."""
         model = self._model
         depth = x * cos(model.pitch) + model.height * sin(model.pitch)
         row = model.horizon + model.fy * model.height / (depth * cos(model.pitch))
         return np.stack(self._in_pane(model.cx - model.fx * y / depth, row), axis=1)
 
     def _in_pane(self, column: float, row: float) -> tuple[float, float]:
-        """The pane position of a picture position."""
         return (column + 0.5) * self._scale - 0.5, (row + 0.5) * self._scale - 0.5 + self._top

@@ -12,7 +12,7 @@ from selfdrive.common.errors import ConfigError, writing
 from selfdrive.sim.film import pen
 
 PICTURES_PER_S = 20
-GIF_EVERY = 4  # every such picture is left out of a GIF, to limit its size
+GIF_EVERY = 4  # a GIF has only every fourth picture, to limit its size
 GIF_WIDTH = 800
 GIF_COLOURS = 128
 H264 = {"crf": "25", "preset": "veryfast"}
@@ -20,7 +20,7 @@ STILLS = ".png", ".jpg"
 
 
 def write_video(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """Write BGR pictures of one size, a twentieth of a second each, to `path`. Raises ConfigError."""
+    """Write BGR pictures of one size, 50 ms each, to `path`. Raises ConfigError."""
     writers: dict[str, Callable[[Iterable[np.ndarray], Path], None]] = {
         ".mp4": _write_mp4,
         ".gif": _write_gif,
@@ -50,7 +50,6 @@ def write_still(picture: np.ndarray, path: Path) -> None:
 
 
 def _make_room(path: Path) -> None:
-    """Check before the work whether the file can be written."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.touch()
 
@@ -69,7 +68,7 @@ def _write_mp4(pictures: Iterable[np.ndarray], path: Path) -> None:
 
 
 def _write_gif(pictures: Iterable[np.ndarray], path: Path) -> None:
-    """Smaller and with fewer pictures; one palette, so that static parts take no space.
+    """Write fewer pictures with one palette, to limit the size.
 
     The palette has the sheet's own colours, then those of the middle picture.
     """

@@ -1,4 +1,4 @@
-"""The harness's data on the faulty run: title, outcome, and event times. Read from JSON."""
+"""Title, outcome and event times of the faulty run, read from the harness's JSON."""
 
 import json
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class Mark:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Events:
-    """The harness's data on the faulty run. Times in s; `active` spans its activations, if any.
+    """Data on the faulty run. Times in s; `active` spans its activations, if any.
 
-    `names` are short hazard names by id. `end` is the end of the drive; the run may go on.
+    `names` are short hazard names by id. `end` is the end of the drive; the run may continue.
     """
 
     title: str
@@ -34,7 +34,7 @@ class Events:
 
 
 def read_events(path: Path) -> Events:
-    """Read events from a JSON file. ConfigError for any other file."""
+    """Read events from a JSON file. Raises ConfigError for any other file."""
     try:
         data = json.loads(path.read_text())
         if data["schema"] != SCHEMA:

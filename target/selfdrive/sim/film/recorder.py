@@ -1,8 +1,8 @@
 """Records camera frames and the controller's view of them.
 
 A film is a folder: `film.jsonl`, with a heading and a line for each picture, and the pictures as JPEG files.
-It is written during the run, so an aborted run leaves a film up to that point. Recording only reads: a run
-with a film gives the same bytes as without.
+It is written during the run, so an aborted run has a film up to that point. Recording does not change the
+run's bytes.
 """
 
 import json
@@ -21,14 +21,14 @@ from selfdrive.sim.truth import GroundTruth
 
 SCHEMA = "film/1"
 INDEX = "film.jsonl"
-KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead; where lines are recorded
-JPEG_QUALITY = 95  # high, to keep noise from effects visible
+KNOTS = tuple(range(0, VIEW_LENGTH, 7))  # m ahead, where lines are recorded
+JPEG_QUALITY = 95  # high, to preserve noise from effects
 
 
 class Film:
-    """A film being recorded in `folder`, which is created if needed. ConfigError if that fails.
+    """A film being recorded in `folder`, which is created if needed. Raises ConfigError if that fails.
 
-    If recording fails later, as on a full disk, the run ends with ConfigError.
+    If recording fails later, for example on a full disk, the run ends with ConfigError.
     """
 
     def __init__(self, folder: Path, camera: CameraModel) -> None:
@@ -41,7 +41,7 @@ class Film:
     def take(
         self, truth: GroundTruth, view: CameraView, manager: Manager, hazards: Mapping[str, float | None]
     ) -> None:
-        """Record a step with a picture: `view`, and what the controller had published by its end."""
+        """Record a step with a picture: `view`, and what the controller published by the end of the step."""
         state, radar = manager.controlsd.state, manager.radar_state
         lead = radar.lead_one if radar else None
         entry = {
@@ -66,7 +66,6 @@ class Film:
         self._count += 1
 
     def _keep(self, view: CameraView) -> str | None:
-        """The file of the view's picture."""
         if view.picture is None:
             return None
         import cv2  # not needed in runs without pictures
@@ -82,7 +81,6 @@ class Film:
 
 
 def _seen(model: ModelData | None, t: float) -> dict | None:
-    """What visiond published at `t`; None if nothing."""
     if model is None or model.t != t:
         return None
     lines = {"left": model.left_lane, "right": model.right_lane}
@@ -93,7 +91,6 @@ def _seen(model: ModelData | None, t: float) -> dict | None:
 
 
 def _height(polynomial: Sequence[float], x: float) -> float:
-    """The polynomial's value at `x`; the highest power comes first."""
     total = 0.0
     for factor in polynomial:
         total = total * x + float(factor)

@@ -23,7 +23,7 @@ class SeenLine:
 
     @property
     def drawable(self) -> bool:
-        """Whether it was seen and is finite somewhere: faults can produce any line."""
+        """Whether the line was seen and is finite somewhere (faults can produce any line)."""
         return self.prob > 0.0 and isfinite(self.prob) and all(isfinite(y) for y in self.y)
 
 
@@ -32,8 +32,8 @@ class Frame:
     """The moment of one picture: the world, the controller's view, its messages to the driver. SI units.
 
     `d_rel` is None on a free road, `lines` if visiond published nothing, `radar` if radard has no lead.
-    `plan` is the path that the controller plans, y at KNOTS.
-    In the camera's view the lane centre is at `middle` beside the car, shifted by `bend` at KNOTS.
+    `plan` is the planned path, y at KNOTS. In the camera's view, the lane centre is at `middle` beside the
+    car, shifted by `bend` at KNOTS.
     """
 
     t: float
@@ -54,7 +54,7 @@ class Frame:
     hazards: tuple[str, ...]
 
     def image(self) -> np.ndarray | None:
-        """The grey picture; None if the run has none. ConfigError if it cannot be read."""
+        """The grey picture; None if the run has none. Raises ConfigError if it cannot be read."""
         if self.picture is None:
             return None
         image = cv2.imread(str(self.picture), cv2.IMREAD_GRAYSCALE)
@@ -67,18 +67,17 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Reel:
-    """A film: its camera and its frames, a twentieth of a second apart."""
+    """A film: its camera and its frames, 50 ms apart."""
 
     camera: CameraModel
     frames: tuple[Frame, ...]
 
     def at(self, index: int) -> Frame:
-        """The frame of that number, or the last one after the end."""
         return self.frames[min(index, len(self.frames) - 1)]
 
 
 def read_reel(folder: Path) -> Reel:
-    """Read the film in `folder`. ConfigError if it is missing or damaged."""
+    """Read the film in `folder`. Raises ConfigError if it is missing or damaged."""
     index = folder / INDEX
     try:
         head, *lines = [json.loads(line) for line in index.read_text().splitlines()]

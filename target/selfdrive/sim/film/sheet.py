@@ -1,4 +1,4 @@
-"""One sheet of a film of two runs: golden on the left, faulty on the right, timeline below."""
+"""One picture of a film of two runs: golden on the left, faulty on the right, timeline below."""
 
 import cv2
 import numpy as np
@@ -18,7 +18,7 @@ HEADING = 42
 PANE = 628, 404
 CAPTION = 26
 STRIP = 104
-CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the text below a pane
+CAPTION_COLUMNS = (0, 104, 204, 330, 468)  # pixels; of the caption
 OUTCOMES = {"hazard": pen.HAZARD, "sdc": pen.ALERT, "masked": pen.MANIFESTED}
 
 
@@ -40,15 +40,12 @@ class Sheet:
         self._draw_heading()
 
     def time(self, index: int) -> float:
-        """Time (s) of a frame."""
         return max(reel.at(index).t for reel in self._reels)
 
     def nearest(self, t: float) -> int:
-        """The frame nearest to a time."""
         return min(range(self.count), key=lambda index: abs(self.time(index) - t))
 
     def draw(self, index: int) -> np.ndarray:
-        """The sheet of frame `index`, BGR."""
         canvas, t = self._canvas.copy(), self.time(index)
         for side, left in zip(self._sides, (MARGIN, WIDTH - MARGIN - PANE[0]), strict=True):
             block = side.draw(index)
@@ -97,7 +94,6 @@ class _Side:
             pen.chip(pane, words, (PANE[0] - 8 - pen.chip_width(words), 8), pen.TRIGGER)
 
     def _draw_warnings(self, pane: np.ndarray, frame: Frame) -> None:
-        """The driver's alert, and a red frame from the first hazard."""
         alerts = [name for name in frame.alerts if name in COUNTED_ALERTS]
         foot = PANE[1]
         if frame.hazards:
@@ -123,7 +119,6 @@ class _Side:
 
 
 def _lines_seen(frame: Frame) -> tuple[str, pen.Colour]:
-    """The probabilities of both lines, or that they are missing, in a warning colour."""
     if frame.lines is None:
         return "no camera message", pen.ALERT
     left, right = (frame.lines[name].prob for name in ("left", "right"))
@@ -132,7 +127,7 @@ def _lines_seen(frame: Frame) -> tuple[str, pen.Colour]:
 
 
 def _bar(pane: np.ndarray, foot: int, text: str, colour: pen.Colour, ink: pen.Colour) -> int:
-    """A bar of text across the pane that ends at row `foot`; returns its first row."""
+    """Draw a bar of text across the pane that ends at row `foot`; return its first row."""
     top = foot - 30
     layer = np.full((30, pane.shape[1], 3), colour, np.uint8)
     cv2.addWeighted(layer, 0.9, pane[top:foot], 0.1, 0.0, dst=pane[top:foot])

@@ -1,4 +1,4 @@
-"""Offset and distance of both runs over time, with event marks and a moving cursor."""
+"""Offset and distance of both runs over time, with event marks and a cursor."""
 
 from collections.abc import Callable, Sequence
 from math import ceil
@@ -18,12 +18,12 @@ KINDS = {
     "hazard": pen.HAZARD,
 }
 GUTTER = 86  # pixels left of the plots, for their names
-FOOT, HEAD = 18, 18  # pixels below the plots for seconds, above them for marks
+FOOT, HEAD = 18, 18  # pixels below the plots (seconds) and above them (marks)
 GAP = 6  # pixels between plots and between labels
 TICKS = (1.0, 2.0, 5.0, 10.0, 20.0, 60.0)  # s
 MOST_TICKS = 16
 LEAST_OFFSET, MOST_OFFSET = 0.3, 4.0  # m; limits of the plot's range
-LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the plot reaches to the one at least, down to the other at most
+LEAST_DISTANCE, LEAST_GAP = 10.0, -10.0  # m; the range includes the first, and ends at the second
 
 
 class Timeline:
@@ -45,7 +45,6 @@ class Timeline:
         pen.grey(self._canvas[:, round(self._x(self._driven)) + 2 :])
 
     def draw(self, t: float) -> np.ndarray:
-        """The timeline with its cursor at `t` (s)."""
         canvas = self._canvas.copy()
         x = round(self._x(t))
         cv2.line(canvas, (x, HEAD - 2), (x, self._size[1] - FOOT), pen.INK, 1)
@@ -76,7 +75,7 @@ class Timeline:
         reels: Sequence[tuple[Reel, pen.Colour, int]],
         limit: float | None,
     ) -> None:
-        """One plot of both runs; `limit` is drawn on either side of zero if a value comes near it."""
+        """Plot both runs; `limit` is drawn on either side of zero if a value comes near it."""
         cv2.rectangle(self._canvas, (GUTTER, top), (self._size[0] - 10, top + rows), pen.PANEL, cv2.FILLED)
         series = [(np.array([value(frame) for frame in reel.frames]), reel) for reel, _, _ in reels]
         driven = [values[[f.t <= self._driven for f in reel.frames]] for values, reel in series]
@@ -99,12 +98,10 @@ class Timeline:
             pen.write(self._canvas, label, (GUTTER - 6 - pen.width(label, 0.34), row), pen.DIM, 0.34)
 
     def _shade(self, first: float, last: float) -> None:
-        """Show how long the fault was active."""
         part = self._canvas[HEAD : self._size[1] - FOOT, round(self._x(first)) : round(self._x(last)) + 1]
         cv2.addWeighted(part, 0.85, np.full_like(part, pen.FAULTY), 0.15, 0.0, dst=part)
 
     def _draw_marks(self, marks: Sequence[Mark]) -> None:
-        """A line for each mark, with its name above if there is room."""
         taken = 0
         for mark in sorted(marks, key=lambda mark: mark.t):
             x, colour = round(self._x(mark.t)), KINDS.get(mark.kind, pen.DIM)
@@ -126,7 +123,6 @@ def _distance(frame: Frame) -> float:
 
 
 def _span(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
-    """The lowest and highest value shown."""
     finite = values[np.isfinite(values)]
     if symmetric:
         most = min(max(LEAST_OFFSET, 1.1 * float(np.abs(finite).max(initial=0.0))), MOST_OFFSET)
@@ -136,6 +132,5 @@ def _span(values: np.ndarray, *, symmetric: bool) -> tuple[float, float]:
 
 
 def _pieces(there: np.ndarray) -> list[slice]:
-    """The runs of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     return [slice(first, last) for first, last in zip(edges[::2], edges[1::2], strict=True)]
