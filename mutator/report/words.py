@@ -61,15 +61,15 @@ def meanings_of(run: ReportedRun) -> Words:
     triggers = words.get("Triggers", {})
     drawn = run.texts[run.texts["method"] == Method.RANDOM.value]["trigger"].unique()
     at_random = {
-        name: f"a time drawn at random, as the counterpart of {name.rpartition('/')[2]}"
-        for name in sorted(drawn)
+        name: "a time drawn at random" + (f", as the counterpart of {of}" if of else "")
+        for name, of in ((name, name.partition("/")[2]) for name in sorted(drawn))
     }
     endings = {
         name.replace(" ", "_"): about for names, about in _ENDINGS.items() for name in names.split(", ")
     }
     return {
         "scenario": words.get("Scenarios", {}),
-        "trigger": triggers | at_random,
+        "trigger": {**triggers, **at_random},
         "method": triggers,
         "ending": endings,
         "outcome": endings,
