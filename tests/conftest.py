@@ -92,10 +92,8 @@ def pytest_terminal_summary(terminalreporter: Any) -> None:
 
 @pytest.fixture(scope="session", autouse=True)
 def _caches(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep the caches of module and session fixtures apart from the user's.
-
-    All tests share matplotlib's font cache and the bytecode: otherwise each command would build them again.
-    """
+    """Keep the caches of module and session fixtures apart from the user's. All tests share matplotlib's font
+    cache and the bytecode, which are slow to rebuild."""
     folder = tmp_path_factory.mktemp("caches")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("MPLCONFIGDIR", str(folder / "matplotlib"))
@@ -139,8 +137,6 @@ def toycar(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Workspac
 
 @pytest.fixture(scope="session")
 def copy_toycar() -> Callable[[Path], Workspace]:
-    """Copy the toy car's library and tree into a folder."""
-
     def copy(folder: Path) -> Workspace:
         root = folder / "toy"
         shutil.copytree(_TESTS / "toy", root, ignore=shutil.ignore_patterns("__pycache__", "templates"))
@@ -227,10 +223,7 @@ def experiment() -> Callable[..., Experiment]:
 
 @pytest.fixture(scope="session")
 def record() -> Callable[..., Record]:
-    """Build the record of a successful experiment with a masked fault.
-
-    The given fields replace the defaults.
-    """
+    """Build the record of a masked fault. The given fields replace the defaults."""
 
     def make(experiment_id: str = "e" * 16, **given: Any) -> Record:
         fields: dict[str, Any] = {
@@ -276,10 +269,8 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
         changed: Callable[[Plan], Plan] = lambda plan: plan,
         **choices: Any,
     ) -> Path:
-        """`became` holds each record's own fields. None means that the experiment was not run.
-
-        `changed` alters the campaign's plan.
-        """
+        """`became` holds each record's own fields; None means that the experiment was not run. `changed`
+        alters the campaign's plan."""
         plan = changed(make_plan(workspace, campaign, Choices(**choices)))
         freeze(plan, out, workspace)
         compared = workspace.manifest(plan.campaign.target).compared
@@ -297,11 +288,8 @@ def write_run(record: Callable[..., Record]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
-    """Turn a plan into one of mutants from operators.
-
-    Each operation of a file has its sign changed, in the scenarios of the plan's first experiments. The
-    second one has a permanent fault.
-    """
+    """Turn a plan into one of mutants from operators: the sign of each operation of a file is changed, in the
+    scenarios of the plan's first experiments. The second mutant has a permanent fault."""
 
     def of(workspace: Workspace, path: str, drives: int = 2) -> Callable[[Plan], Plan]:
         def changed(plan: Plan) -> Plan:
@@ -320,7 +308,6 @@ def of_operators() -> Callable[[Workspace, str], Callable[[Plan], Plan]]:
 
 
 def operator_faults(file: ParsedFile) -> Iterator[Fault]:
-    """A mutant for each binary operation."""
     for function, known in file.expressions.items():
         seen: list[str] = []
         for expression in known:
@@ -377,10 +364,7 @@ def write_finished(write_run: Callable[..., Path]) -> Callable[..., Path]:
 
 @pytest.fixture(scope="session")
 def reseal() -> Callable[..., None]:
-    """Recompute every checksum and digest of a run folder, as a careful forger would.
-
-    The folder then shows no trace of the forgery.
-    """
+    """Recompute every checksum and digest of a run folder, as a careful forger would."""
 
     def compute(run: Path, finished: bool | None = None) -> None:
         for path in (file for kind in ("records", "timings", "proof") for file in (run / kind).glob("*")):

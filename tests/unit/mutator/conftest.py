@@ -24,13 +24,13 @@ def toy(tmp_path: Path) -> Workspace:
 
 @pytest.fixture(scope="session")
 def clone() -> Workspace:
-    """The shipped workspace: library, templates and target of this clone."""
+    """The shipped workspace of this clone."""
     return Workspace.find(root=CLONE)
 
 
 @pytest.fixture
 def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
-    """A fork engine on the toy. Files can be edited before the engine is first used."""
+    """A fork engine on the toy."""
     made = Fork(toycar, tmp_path)
     yield made
     made.close()
@@ -38,8 +38,6 @@ def fork(toycar: Workspace, tmp_path: Path) -> Iterator[Fork]:
 
 @pytest.fixture
 def edit(toycar: Workspace) -> Edit:
-    """Replace text in one of the toy's files."""
-
     def replaced(name: str, old: str, new: str) -> None:
         path = toycar.library.parent / name
         text = path.read_text()

@@ -19,7 +19,7 @@ LIMITS = Limits(cpu_s=20, wall_s=60, memory_mb=1024, steps=500)
 
 
 class Fork:
-    """A fork engine on the toy. `manifest` is read on first use, so files can be edited before."""
+    """`manifest` is read on first use, so files can be edited before."""
 
     def __init__(self, toy: Workspace, folder: Path) -> None:
         self.toy = toy

@@ -43,16 +43,14 @@ def arguments(tmp_path: Path) -> list[str]:
 
 
 def driven(arguments: list[str]) -> tuple[dict[str, list[float]], dict[str, object]]:
-    """The trace and the record of a run."""
     Ball.main(arguments)
     out = Path(arguments[5])
     with np.load(out / "trace.npz") as trace:
         return {name: trace[name].tolist() for name in trace}, json.loads((out / "record.json").read_text())
 
 
-def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
-    """The trace has the time and every channel of every step. The record has when each hazard first
-    occurred, or null, and when each alert began."""
+def test_a_run_writes_a_row_for_each_step(arguments: list[str]) -> None:
+    """The record has the time at which each hazard first occurred, or null, and at which each alert began."""
     trace, record = driven(arguments)
     assert list(trace) == ["t", "height", "lies"]
     assert trace["t"] == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
@@ -62,14 +60,14 @@ def test_a_run_leaves_a_row_for_each_step(arguments: list[str]) -> None:
     assert record["alerts"] == [{"name": "low", "t": 0.1}, {"name": "low", "t": pytest.approx(0.4)}]
 
 
-def test_a_run_may_end_early(arguments: list[str]) -> None:
-    """The step that calls `end` is the last, and is recorded."""
+def test_the_step_that_calls_end_is_the_last(arguments: list[str]) -> None:
+    """That step is recorded."""
     trace, _ = driven([*arguments, "--caught"])
     assert trace["height"][-1] == 0.0
 
 
-def test_equal_runs_leave_equal_bytes(arguments: list[str]) -> None:
-    """Trace and record do not depend on when or how often they were written. No other file is left."""
+def test_equal_runs_write_equal_bytes(arguments: list[str]) -> None:
+    """When and how often they were written does not matter. No other file is left."""
     out = Path(arguments[5])
     files = []
     for _ in range(2):
@@ -90,8 +88,8 @@ def test_steps_of_an_opened_run_are_those_of_main(arguments: list[str], tmp_path
 
 
 @pytest.mark.parametrize("flags", [["--height-m", "-2"], ["--height_m=-2"]])
-def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], flags: list[str]) -> None:
-    """An additional flag with a value replaces a key of the scenario, so that a change needs no code."""
+def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[str]) -> None:
+    """A change then needs no code."""
     trace, _ = driven([*arguments, *flags])
     assert trace["height"][0] == -3.0
 
@@ -108,15 +106,14 @@ def test_flags_stand_in_place_of_what_the_scenario_has(arguments: list[str], fla
         (["--duration_s", "long"], "duration_s is 'long'; expected a number"),
     ],
 )
-def test_a_wrong_argument_is_told(arguments: list[str], flags: list[str], words: str) -> None:
-    """The error for an invalid argument names it and says what is expected."""
+def test_a_wrong_argument_is_named(arguments: list[str], flags: list[str], words: str) -> None:
     with pytest.raises(GlueError) as told:
         Ball.main([*arguments, *flags])
     assert words in str(told.value)
 
 
-def test_values_of_a_scenario(tmp_path: Path) -> None:
-    """Values are read as JSON if possible, and otherwise as text, which may have colons."""
+def test_values_are_read_as_json_or_as_text(tmp_path: Path) -> None:
+    """Text may have colons."""
     path = tmp_path / "a.yaml"
     path.write_text('a: 1\nb: 2.5\nc: true\nd: null\ne: [1, 2]\nf: {"x": 1}\ng: a: b\nh: "1"\ni: a#b\n')
     expected = {
@@ -134,7 +131,7 @@ def test_values_of_a_scenario(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("line", ["- a", "a:", "  b: 1", "a 1", "first: 2"])
-def test_what_a_scenario_file_cannot_say_is_told(tmp_path: Path, line: str) -> None:
+def test_an_invalid_scenario_file_is_an_error(tmp_path: Path, line: str) -> None:
     path = tmp_path / "a.yaml"
     path.write_text(f"first: 1\n{line}\n")
     with pytest.raises(GlueError, match=r"a\.yaml:2: '.*'; expected `key: value`"):
@@ -153,7 +150,7 @@ def test_each_step_has_the_same_channels(later: dict[str, float]) -> None:
     "value",
     [None, "1", "near", b"1", [1.0], np.zeros(1), np.zeros((2, 3)), 1j, pytest.param(10**400, id="huge")],
 )
-def test_what_is_recorded_is_a_number(value: object) -> None:
+def test_only_numbers_can_be_recorded(value: object) -> None:
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=1.0, gap=2.0)
     with pytest.raises(GlueError, match=r"^at 0.5 s: gap is .*; expected a number$"):
@@ -162,7 +159,7 @@ def test_what_is_recorded_is_a_number(value: object) -> None:
 
 @pytest.mark.parametrize("value", [True, 3, np.float32(2.5), np.array(4), float("inf")])
 def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
-    """Numbers of Python and numpy, booleans, infinity and arrays without dimensions are recorded."""
+    """These are numbers of Python and numpy, booleans, infinity and arrays without dimensions."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=value)
     run.write(tmp_path)
@@ -171,8 +168,7 @@ def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("length", [0, -0.1, float("nan"), float("inf"), None])
-def test_steps_have_a_length(length: float) -> None:
-    """A step length that is infinite or zero is refused, at the start or later."""
+def test_an_infinite_or_zero_step_length_is_refused(length: float) -> None:
     with pytest.raises(GlueError, match=r"step_s is .*; expected"):
         Run(step_s=length, duration_s=1.0)
     run = Run(step_s=0.5, duration_s=1.0)
@@ -180,11 +176,9 @@ def test_steps_have_a_length(length: float) -> None:
         run.step_s = length
 
 
-def test_a_run_that_ends_before_it_began_is_told(
+def test_ending_a_run_in_its_constructor_is_an_error(
     arguments: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Calling `end` in the constructor is an error, because nothing is recorded yet."""
-
     class Ended(Ball):
         def __init__(self, scenario, seed):
             super().__init__(scenario, seed)
@@ -199,8 +193,8 @@ LENGTHS = [0.1, 0.25, 0.05, 0.1, 0.1, 0.4, 0.1]
 
 @pytest.mark.parametrize("first", [0.1, 0.7])
 def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
-    """If a step sets `step_s` before it records, it has that length, and the next step begins after it.
-    The run keeps its duration, to the nearest step."""
+    """If a step sets `step_s` before it records, it has that length, and the next step begins after it. The
+    run keeps its duration, to the nearest step."""
 
     class Uneven(Run):
         def __init__(self, scenario, seed):
@@ -219,9 +213,8 @@ def test_steps_may_differ_in_length(first: float, arguments: list[str]) -> None:
         assert trace["t"] == pytest.approx([0.0, 0.1, 0.35, 0.4, 0.5, 0.6])
 
 
-def test_times_of_equal_steps_are_no_sums() -> None:
-    """If all lengths are equal, the time of a step is exactly its number times the length, even if each
-    step sets the length."""
+def test_times_of_equal_steps_are_exact_multiples() -> None:
+    """Lengths are not added up, even if each step sets the length."""
     run = Run(step_s=0.1, duration_s=100.0)
     times = []
     while not run.done:
@@ -231,8 +224,8 @@ def test_times_of_equal_steps_are_no_sums() -> None:
     assert times == [number * 0.1 for number in range(1000)]
 
 
-def test_time_is_recorded_anyhow() -> None:
-    """A channel with the name `time` is refused, because the time would overwrite it."""
+def test_a_channel_named_time_is_refused() -> None:
+    """The time would overwrite it."""
     with pytest.raises(GlueError, match="without t"):
         Run(step_s=0.5, duration_s=1.0).record(t=1.0)
 
@@ -244,9 +237,7 @@ def test_a_step_records_once(arguments: list[str], rows: int, monkeypatch: pytes
         Ball.main(arguments)
 
 
-def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
-    """The error for a subclass that does not call `Run`'s constructor says how to call it."""
-
+def test_a_subclass_must_call_the_constructor_of_run(arguments: list[str]) -> None:
     class Bare(Run):
         def __init__(self, scenario, seed):
             self.seed = seed
@@ -255,13 +246,12 @@ def test_a_run_that_is_not_set_up_says_so(arguments: list[str]) -> None:
         Bare.open(arguments)
 
 
-def test_a_run_without_a_step_says_so(arguments: list[str]) -> None:
+def test_a_run_without_a_step_is_an_error(arguments: list[str]) -> None:
     with pytest.raises(NotImplementedError, match="Run has no step"):
         Run(step_s=1.0, duration_s=1.0).step()
 
 
-def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
-    """A run leaves the random generators of the process unchanged. Only `seed_globals` seeds them."""
+def test_only_seed_globals_seeds_global_generators(arguments: list[str]) -> None:
     before = random.getstate()
     driven(arguments)
     assert random.getstate() == before
@@ -272,8 +262,7 @@ def test_nothing_global_is_seeded_unasked(arguments: list[str]) -> None:
     assert draws[0] == draws[1]
 
 
-def test_the_glue_needs_numpy_alone() -> None:
-    """Importing the glue loads no other part of the harness, and no package except numpy."""
+def test_importing_the_glue_loads_only_numpy() -> None:
     code = (
         "import numpy, sys; known = set(sys.modules); import mutator.glue; print(*sys.modules.keys() - known)"
     )

@@ -1,4 +1,4 @@
-"""The names that `import mutator` offers."""
+"""The names in `mutator`."""
 
 import subprocess
 import sys
@@ -8,7 +8,7 @@ import pytest
 import mutator
 
 
-def test_every_public_name_is_there() -> None:
+def test_every_public_name_can_be_imported() -> None:
     assert list(mutator.__all__) == sorted(mutator.__all__, key=lambda n: (n.lower() == n, n))
     for name in mutator.__all__:
         assert getattr(mutator, name).__doc__, name
@@ -18,7 +18,7 @@ def test_every_public_name_is_there() -> None:
 
 
 def test_the_import_is_light() -> None:
-    """`import mutator` loads nothing that is slow. Using a name loads what it needs."""
+    """Nothing slow is loaded until a name is used."""
     code = "import mutator, sys; dir(mutator); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     loaded = {name.partition(".")[0] for name in done.stdout.split()}

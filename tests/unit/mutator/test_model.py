@@ -40,11 +40,11 @@ def test_a_fault_and_its_row_of_the_results_have_the_same_label(
 
 
 def test_an_experiment_has_one_label(experiment: Callable[..., Experiment]) -> None:
-    """The label has fault, value, scenario and trigger, each once."""
+    """Fault, value, scenario and trigger appear once each."""
     assert experiment(value=35).label == "radar/chaff/distance 35 m, S1, guided C1"
     assert experiment(method=Method.RANDOM, trigger="random/C2").drive_label == "S1, random C2"
 
 
-def test_nobody_else_strips_a_unit() -> None:
-    """Only one module combines value and unit, because several once gave six different labels."""
+def test_only_one_module_combines_value_and_unit() -> None:
+    """Several modules once gave six different labels."""
     assert [path for path in SOURCES.rglob("*.py") if '(" -")' in path.read_text()] == []

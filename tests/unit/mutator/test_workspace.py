@@ -21,8 +21,9 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return place
 
 
-def test_found_upward(toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From any folder in a clone, the nearest library is found."""
+def test_the_nearest_library_above_is_found(
+    toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     root = toy.library.parent
     (root / "templates").mkdir()
     (root / "deep" / "down").mkdir(parents=True)
@@ -31,10 +32,10 @@ def test_found_upward(toy: Workspace, elsewhere: Path, monkeypatch: pytest.Monke
     assert (found.library, found.templates) == (root / "fault_library", root / "templates")
 
 
-def test_options_go_before_the_environment(
+def test_options_override_the_environment(
     toy: Workspace, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An option overrides a variable. A folder for one part overrides the root."""
+    """A folder for one part overrides the root."""
     root = toy.library.parent
     (root / "templates").mkdir()
     other = elsewhere / "library"
@@ -51,17 +52,14 @@ def test_options_go_before_the_environment(
     assert Workspace.find(str(root), target=str(root / "target")).target == root / "target"
 
 
-def test_outside_a_clone_there_is_what_ships(elsewhere: Path) -> None:
-    """Without options and variables, and without a library in a parent folder, library and templates are
-    the shipped ones."""
+def test_outside_a_clone_the_shipped_library_is_used(elsewhere: Path) -> None:
     found = Workspace.find()
     assert (found.library, found.templates) == (CLONE / "fault_library", CLONE / "templates")
     assert found.manifest("openpilot").root == CLONE / "target"
 
 
-def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> None:
-    """A library found in a parent folder may lack templates, and the shipped ones are used. A root that is
-    named must have both."""
+def test_a_library_without_templates_uses_the_shipped_ones(elsewhere: Path) -> None:
+    """A root that is named must have both."""
     (elsewhere / "fault_library").mkdir()
     found = Workspace.find()
     assert (found.library, found.templates) == (elsewhere / "fault_library", CLONE / "templates")
@@ -69,14 +67,13 @@ def test_a_library_without_templates_uses_those_that_ship(elsewhere: Path) -> No
         Workspace.find(root=elsewhere)
 
 
-def test_a_named_folder_must_be_there(elsewhere: Path) -> None:
-    """A named folder that is missing is an error with a remedy. The shipped one is not used instead."""
+def test_a_named_folder_must_exist(elsewhere: Path) -> None:
+    """The shipped one is not used instead."""
     with pytest.raises(MutatorError, match=r"no folder .*none; expected the fault_library folder.*`library`"):
         Workspace.find(library=elsewhere / "none", templates=elsewhere)
 
 
-def test_names_and_paths(toy: Workspace) -> None:
-    """Every item of the library is found by name, or by the path of its file."""
+def test_items_are_found_by_name_or_path(toy: Workspace) -> None:
     assert list(toy.targets) == ["toy"]
     assert list(toy.scenarios) == ["follow"]
     assert list(toy.context_tables) == ["pedals"]
@@ -94,30 +91,29 @@ def test_names_and_paths(toy: Workspace) -> None:
         toy.campaign("x")
 
 
-def test_names_do_not_lead_out(toy: Workspace) -> None:
+def test_a_name_cannot_lead_out_of_the_library(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="no fault spec"):
         toy.spec("../targets/toy")
 
 
-def test_specs_lie_where_their_names_say(toy: Workspace) -> None:
-    """The name of a spec's file consists of its module and fault type, so that names are unique."""
+def test_spec_file_names_consist_of_module_and_fault_type(toy: Workspace) -> None:
+    """This makes names unique."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):
         toy.specs()
 
 
-def test_it_is_shown_in_a_line_and_as_a_table(toycar: Workspace) -> None:
-    """A notebook shows the counts and the names."""
+def test_a_workspace_prints_as_a_line_and_as_a_table(toycar: Workspace) -> None:
     assert repr(toycar).endswith("9 fault specs, 2 scenarios, 1 context table, 3 campaigns, 1 target>")
     shown = toycar._repr_html_()
     for name in ("sensor/lane", "near_far", "small", "toycar", str(toycar.templates)):
         assert name in shown
 
 
-def test_faults_to_iterate_over(toycar: Workspace) -> None:
-    """A pattern selects specs or variants, and the values depend on the seed. A file can be given in place
-    of a name."""
+def test_faults_can_be_iterated(toycar: Workspace) -> None:
+    """A pattern selects specs or variants, and the values depend on the seed. A file can be given instead of
+    a name."""
     names = {fault.spec for fault in toycar.faults("sensor/*")}
     assert names == {
         *("sensor/distance/longer", "sensor/distance/nearer"),
@@ -134,7 +130,7 @@ def test_faults_to_iterate_over(toycar: Workspace) -> None:
         toycar.faults("sensor/lan")
 
 
-def test_the_only_target_is_meant(toycar: Workspace) -> None:
+def test_the_only_target_is_the_default(toycar: Workspace) -> None:
     assert toycar.target_name() == "toycar"
     other = toycar.library / "targets" / "other.yaml"
     other.write_bytes((toycar.library / "targets" / "toycar.yaml").read_bytes())

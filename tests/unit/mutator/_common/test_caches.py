@@ -25,11 +25,10 @@ def filled() -> Path:
 
 
 @pytest.mark.parametrize("named", ["", "relative/folder"])
-def test_the_home_has_the_cache_unless_a_folder_is_named(
+def test_the_cache_is_in_the_home_folder_unless_xdg_cache_home_is_absolute(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str
 ) -> None:
-    """XDG_CACHE_HOME is used if its path is absolute, as its specification requires; otherwise the cache
-    is in ~/.cache."""
+    """The XDG specification requires an absolute path."""
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert caches.folder() == tmp_path / "mutator"
@@ -37,9 +36,7 @@ def test_the_home_has_the_cache_unless_a_folder_is_named(
     assert caches.folder() == tmp_path / "home" / ".cache" / "mutator"
 
 
-def test_without_a_home_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without a known home folder the cache path cannot be created, so the cache is empty."""
-
+def test_without_a_home_folder_the_cache_is_empty(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_home() -> Path:
         raise RuntimeError("Could not determine home directory.")
 
@@ -51,22 +48,20 @@ def test_without_a_home_nothing_is_kept(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 @pytest.mark.parametrize("name", ["..", "a/b", "/", ".hidden", "plain"])
-def test_any_name_of_a_target_is_one_folder(name: str) -> None:
-    """Every target's folder lies inside the cache and outside the other targets' folders."""
+def test_each_target_has_its_own_cache_folder(name: str) -> None:
     place = caches.of_target(name)
     assert place.resolve().parent == (caches.folder() / "targets").resolve()
 
 
-def test_entries_are_checks_and_the_files_of_targets(filled: Path) -> None:
-    """Passed checks are one entry; each file of a target is a separate entry. Sizes are those on disk."""
+def test_passed_checks_are_one_entry_and_each_target_file_is_another(filled: Path) -> None:
     found = [(entry.what, entry.path.relative_to(filled).as_posix()) for entry in caches.entries()]
     files = ["targets/car/a.npy", "targets/car/b.npy", "targets/car/compiled/hog.so"]
     assert found == [("checks", "checks/ab12"), *(("target car", file) for file in files)]
     assert all(entry.size >= 5000 for entry in caches.entries())
 
 
-def test_a_table_with_holes_counts_as_what_it_takes() -> None:
-    """A sparse file of 800 MB counts with its size on disk, so pruning keeps the other entries."""
+def test_a_sparse_file_counts_with_its_size_on_disk() -> None:
+    """The sparse file of 800 MB takes little space, so pruning keeps the other entries."""
     place = caches.of_target("car")
     place.mkdir(parents=True)
     with (place / "table").open("wb") as file:
@@ -75,8 +70,7 @@ def test_a_table_with_holes_counts_as_what_it_takes() -> None:
     assert entry.size < 1_000_000
 
 
-def test_the_least_recently_used_go_first(filled: Path) -> None:
-    """Pruning deletes the oldest entries until the rest fits the limit."""
+def test_pruning_deletes_the_least_recently_used_entries_first(filled: Path) -> None:
     sizes = {entry.path.name: entry.size for entry in caches.entries()}
     kept = sizes["ab12"] + sizes["a.npy"]
     assert [entry.path.name for entry in caches.prune(kept)] == ["hog.so", "b.npy"]
@@ -84,8 +78,7 @@ def test_the_least_recently_used_go_first(filled: Path) -> None:
     assert caches.prune(kept) == []
 
 
-def test_clearing_leaves_no_file(filled: Path) -> None:
-    """Clearing deletes everything in the cache. A link is deleted, and its target stays."""
+def test_clearing_deletes_links_but_not_their_targets(filled: Path) -> None:
     outside = filled.parent / "outside"
     outside.mkdir()
     (outside / "kept").write_text("kept")
@@ -95,9 +88,7 @@ def test_clearing_leaves_no_file(filled: Path) -> None:
     assert (outside / "kept").exists()
 
 
-def test_a_target_that_is_driven_with_many_seeds_keeps_what_it_used_last(
-    filled: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_recently_used_files_of_a_target_stay(filled: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only the least recently used files are deleted, and only if space is short."""
     assert caches.make_room("car") == []
     monkeypatch.setattr(caches, "TARGET_BYTES", 2 * 12_288)

@@ -19,11 +19,10 @@ from mutator._common import cores
         (None, 8),
     ],
 )
-def test_a_quota_counts(
+def test_a_quota_limits_the_cores(
     quota: str | None, usable: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The number of usable cores follows the process's affinity. A container's quota can lower it, but not
-    below one."""
+    """A container's quota can lower the number that the process's affinity gives, but not below one."""
     monkeypatch.setattr(os, "sched_getaffinity", lambda pid: set(range(8)))
     monkeypatch.setattr(cores, "_QUOTA", tmp_path / "cpu.max")
     if quota is not None:

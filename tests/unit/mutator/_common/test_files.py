@@ -23,8 +23,7 @@ from mutator._common.files import (
 from mutator.errors import EXIT_HARNESS_ERRORS, MutatorError
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """A JSON object of the right schema is read back unchanged."""
+def test_a_written_object_is_read_back_unchanged(tmp_path: Path) -> None:
     write_json(tmp_path / "a.json", {"schema": "a/1", "x": [1, None]})
     assert read_json(tmp_path / "a.json", "a/1") == {"schema": "a/1", "x": [1, None]}
 
@@ -32,16 +31,14 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "{", "[]", "{}", '{"schema": "b/1"}', '{"schema": "a"}', '{"schema": 1}']
 )
-def test_other_files_are_refused(tmp_path: Path, text: str) -> None:
-    """A file without a JSON object of that schema is an error that names the file."""
+def test_a_file_of_another_schema_is_refused_by_name(tmp_path: Path, text: str) -> None:
     path = tmp_path / "a.json"
     path.write_text(text)
     with pytest.raises(MutatorError, match=r"a\.json"):
         read_json(path, "a/1")
 
 
-def test_nobody_waits_for_a_pipe(tmp_path: Path) -> None:
-    """A pipe in place of a file is refused without waiting; a regular file is read."""
+def test_a_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.json")
     with pytest.raises(MutatorError, match=r"a\.json: not a file"):
         read_json(tmp_path / "a.json", "a/1")
@@ -55,9 +52,9 @@ def test_newer_schema_is_refused() -> None:
         check_schema("run/3", "run/2", Path("run.json"))
 
 
-def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
-    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link in place
-    of the folder."""
+def test_any_folder_can_be_removed(tmp_path: Path) -> None:
+    """Deep, locked and unusual folders are deleted. The targets of links stay, and so does a link in place of
+    the folder."""
     kept, folder = tmp_path / "kept", tmp_path / "folder"
     kept.mkdir()
     (kept / "x").touch()
@@ -79,8 +76,8 @@ def test_a_folder_is_removed_however_it_is(tmp_path: Path) -> None:
     assert (kept / "x").exists() and kept.stat().st_mode == before
 
 
-def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A scratch folder is deleted at the end of its `with` block, or together with its object."""
+def test_a_scratch_folder_is_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It goes at the end of its `with` block, or together with its object."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()
@@ -92,8 +89,8 @@ def test_a_scratch_folder_goes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("name", ["pipe", "link", "/dev/zero"])
-def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
-    """A pipe, a device, or a link to one is refused without waiting. A folder causes the usual error."""
+def test_pipes_devices_and_links_to_them_are_refused_without_waiting(tmp_path: Path, name: str) -> None:
+    """A folder causes the usual error."""
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "link").symlink_to(tmp_path / "pipe")
     with pytest.raises(OSError, match="No such device") as refused:
@@ -102,8 +99,7 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path, name: str) -> None:
     assert no_pipe(tmp_path) == tmp_path and no_pipe(tmp_path / "none") == tmp_path / "none"
 
 
-def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a full disk, the old file stays complete, no temporary file is left, and the error has a remedy."""
+def test_a_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "results.csv"
     path.write_bytes(b"old")
 
@@ -118,9 +114,7 @@ def test_full_disk_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.Monke
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_several_write_one_file_at_once(tmp_path: Path) -> None:
-    """While threads or processes write a file, readers always get the complete content of one writer. No
-    temporary file is left."""
+def test_readers_see_complete_files_while_several_writers_write(tmp_path: Path) -> None:
     path = tmp_path / "file"
     texts = [bytes([number]) * 100_000 for number in range(4)]
     write_atomic(path, texts[0])
@@ -141,9 +135,8 @@ def no_room(*_: object, **__: object) -> None:
     raise OSError(errno.EDQUOT, os.strerror(errno.EDQUOT))
 
 
-def test_a_full_disk_in_other_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A full disk or quota is recognized in the list of texts that `shutil` raises, and behind a library's
-    own error."""
+def test_a_full_disk_is_recognized_in_other_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`shutil` raises a list of texts, and libraries raise errors of their own."""
     (tmp_path / "from").mkdir()
     (tmp_path / "from" / "file").touch()
     monkeypatch.setattr(shutil, "copyfile", no_room)

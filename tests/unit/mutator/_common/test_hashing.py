@@ -18,28 +18,28 @@ CONDITION = "hwt <= 2.0"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Injection(model.Injection):
-    """The Injection class of a later version, with one more field."""
+    """`Injection` of a later version, with one more field."""
 
     every: int = added(1)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trigger(model.Trigger):
-    """The Trigger class of a later version, with one more field."""
+    """`Trigger` of a later version, with one more field."""
 
     fade: Hold | None = added(None)
 
 
 @dataclass(frozen=True)
 class Fault(model.Fault):
-    """The Fault class of a later version, with one more field."""
+    """`Fault` of a later version, with one more field."""
 
     tags: tuple[str, ...] = added(())
 
 
 @dataclass(frozen=True)
 class Experiment(model.Experiment):
-    """The Experiment class of a later version, with one more field."""
+    """`Experiment` of a later version, with one more field."""
 
     repeat: int = added(0)
 
@@ -62,13 +62,12 @@ OLD = experiment(model.Experiment, model.Trigger, OLD_FAULT)
 
 
 def test_ids_are_those_of_the_first_release() -> None:
-    """Every version computes the same ids, because published results cite them."""
+    """Published results cite these ids."""
     assert (OLD_FAULT.id, OLD.id) == ("a128796d71e1fdf8", "876900fefe457b38")
     assert content_id([OLD_FAULT.injections[0], OLD.trigger]) == "f51174baeee5206c"
 
 
-def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
-    """Records with later fields at their defaults have the same ids and plan lines as without them."""
+def test_an_added_field_at_its_default_changes_no_id() -> None:
     new_fault = fault(Fault, Injection)
     new = experiment(Experiment, Trigger, new_fault)
     assert (new_fault.id, new.id) == (OLD_FAULT.id, OLD.id)
@@ -76,8 +75,7 @@ def test_an_added_field_changes_no_id_while_it_holds_its_default() -> None:
     assert (added_values(new), added_values(OLD)) == ({}, {})
 
 
-def test_an_added_field_that_says_something_changes_the_id() -> None:
-    """A value other than the default, at any level, changes the id of the fault and of the experiment."""
+def test_an_added_field_with_another_value_changes_the_id() -> None:
     tagged = fault(Fault, Injection, tags=("wet",))
     injection = Injection(location=LOCATION, model="offset", params=PARAMS, every=2)
     rarer = replace(fault(Fault, Injection), injections=(injection,))
@@ -90,13 +88,11 @@ def test_an_added_field_that_says_something_changes_the_id() -> None:
     assert added_values(replace(new, repeat=1)) == {"repeat": 1}
 
 
-def test_a_field_that_is_not_added_counts_also_with_its_default() -> None:
-    """These fields are always part of the hash, because the first release hashed every field."""
+def test_fields_of_the_first_release_are_hashed_even_at_their_defaults() -> None:
     assert plain(Anchor(kind=AnchorKind.ENTRY)) == {"kind": "entry", "name": "", "nth": None}
 
 
-def test_digests_tell_kinds_of_values_apart() -> None:
-    """A number, its text, its truth value, and lists of these all have different digests."""
+def test_values_of_different_types_have_different_digests() -> None:
     values = [1.0, 1, True, "1", None, [1], [[1]], {"a": 1}, b"1 "]
     assert len({digest(value) for value in values}) == len(values)
 
@@ -106,13 +102,11 @@ def test_digests_tell_kinds_of_values_apart() -> None:
     ["[1.5, -0.0, 1e-7]", "NaN", "[Infinity, -1e999]", "18446744073709551615", '"\\ud800"', "-0"],
 )
 def test_json_is_read_as_the_standard_library_reads_it(text: str) -> None:
-    """JSON is read as `json.loads` reads it, including values that the faster reader refuses: NaN,
-    infinities and lone surrogates."""
+    """This includes values that the faster reader refuses: NaN, infinities and lone surrogates."""
     assert repr(from_json(text.encode())) == repr(json.loads(text))
 
 
 @pytest.mark.parametrize("data", [b"", b"{", b"\xff", b"[1,]"])
-def test_what_is_no_json_is_a_value_error(data: bytes) -> None:
-    """Invalid JSON raises ValueError, as in `json.loads`."""
+def test_invalid_json_raises_a_value_error(data: bytes) -> None:
     with pytest.raises(ValueError):
         from_json(data)

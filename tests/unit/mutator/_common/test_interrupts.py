@@ -30,7 +30,7 @@ def test_held_signal_waits_until_the_outermost_ends(number: signal.Signals) -> N
         pass  # one request gets one response
 
 
-def test_held_signal_goes_before_the_error_that_it_found() -> None:
+def test_a_held_signal_is_raised_before_the_error() -> None:
     with pytest.raises(KeyboardInterrupt), terminable(), held():
         signal.raise_signal(signal.SIGINT)
         raise ValueError

@@ -11,17 +11,17 @@ from mutator.errors import MutatorError
 
 
 @pytest.mark.parametrize("processes", [1, 2, 3])
-def test_results_come_in_the_order_of_the_work(processes: int) -> None:
+def test_results_keep_the_order_of_the_inputs(processes: int) -> None:
     for count in (0, 1, 7):
         assert list(shared(lambda n: n * n, range(count), processes)) == [n * n for n in range(count)]
 
 
-def test_the_work_is_done_by_others() -> None:
+def test_other_processes_do_the_work() -> None:
     found = list(shared(lambda _: os.getpid(), range(6), 2))
     assert found == found[:2] * 3 and len({*found, os.getpid()}) == 3
 
 
-def test_what_goes_wrong_is_raised_here() -> None:
+def test_errors_of_other_processes_are_raised() -> None:
     """An error is raised unchanged after all results before it. A killed process is reported."""
 
     def fails(n: int) -> int:
@@ -37,8 +37,7 @@ def test_what_goes_wrong_is_raised_here() -> None:
         list(shared(lambda _: os.kill(os.getpid(), signal.SIGKILL), range(4), 2))
 
 
-def test_no_process_is_left_behind() -> None:
-    """When the consumer stops taking results, no process is left running."""
+def test_no_process_keeps_running_after_the_consumer_stops() -> None:
     found = shared(lambda n: (os.getpid(), b"x" * 1_000_000), range(50), 2)
     pids = [next(found)[0], next(found)[0]]
     found.close()  # type: ignore[attr-defined]
@@ -48,9 +47,7 @@ def test_no_process_is_left_behind() -> None:
 
 
 @pytest.mark.parametrize("processes", [1, 2])
-def test_work_is_done_beside(processes: int) -> None:
-    """`beside` runs the function in another process if two are allowed. The call returns its result or
-    raises its error."""
+def test_beside_uses_another_process_if_two_are_allowed(processes: int) -> None:
     with beside(os.getpid, processes) as found:
         assert (found() == os.getpid()) is (processes == 1)
 

@@ -21,7 +21,6 @@ FILES = {"target/selfdrive/a.py": b"A = 1\n", "fault_library/b.yaml": b"b: 1\n",
 
 @pytest.fixture
 def archive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The files of a wheel installation, with an empty data folder."""
     path = tmp_path / "shipped.zip"
     with ZipFile(path, "w") as file:
         for name, data in FILES.items():
@@ -42,8 +41,7 @@ def test_a_clone_ships_its_own_folders() -> None:
 
 
 def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
-    """The archive is unpacked into the user's data folder once: exactly its files, which then stay
-    unchanged."""
+    """The user's data folder then has exactly the archive's files."""
     folder = shipped_folder()
     assert folder.is_relative_to(tmp_path / "data" / "mutator")
     found = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
@@ -56,7 +54,6 @@ def test_the_archive_is_unpacked_once(archive: Path, tmp_path: Path) -> None:
 
 
 def test_another_archive_has_another_folder(archive: Path) -> None:
-    """Two versions of the harness unpack their files into separate folders."""
     folder = shipped_folder()
     with ZipFile(archive, "a") as file:
         file.writestr("target/selfdrive/new.py", b"")
@@ -87,26 +84,23 @@ def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None]
         as_in_a_new_process()
 
 
-def test_bytecode_is_no_change(archive: Path) -> None:
-    """Bytecode is never part of a tree, so bytecode that an import writes does no harm."""
+def test_bytecode_does_not_count_as_a_change(archive: Path) -> None:
     folder = shipped_folder()
     (folder / "target/selfdrive/__pycache__").mkdir()
     (folder / "target/selfdrive/__pycache__/a.cpython-311.pyc").touch()
     assert as_in_a_new_process() == folder
 
 
-def test_a_folder_that_cannot_be_written(
+def test_a_read_only_data_folder_is_an_error_with_a_remedy(
     archive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The error names the folder and says how to choose another one."""
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "file"))
     with pytest.raises(MutatorError, match=r"file/mutator/shipped.*cannot unpack.*set XDG_DATA_HOME"):
         shipped_folder()
 
 
-def test_a_faster_process_wins(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If another process has unpacked the archive first, its folder is used, and no files are left over."""
+def test_a_folder_unpacked_by_another_process_is_used(archive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = shipped_folder()
     monkeypatch.setattr(Path, "is_dir", lambda path, **_: path.exists() and not _first(seen, path))
     seen: set[Path] = set()
@@ -122,8 +116,7 @@ def _first(seen: set[Path], path: Path) -> bool:
     return new
 
 
-def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
-    """The harness refuses to write to the unpacked library's files, and writes to others."""
+def test_the_unpacked_library_is_not_written_to(archive: Path, tmp_path: Path) -> None:
     refuse_shipped(tmp_path / "library" / "reviews" / "openpilot.yaml")
     with pytest.raises(MutatorError, match=r"ships with mutator.*mutator init DIR"):
         refuse_shipped(shipped_folder() / "fault_library" / "reviews" / "openpilot.yaml")
@@ -132,8 +125,7 @@ def test_what_ships_is_not_written_to(archive: Path, tmp_path: Path) -> None:
 def test_a_new_library_is_a_copy_that_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A new library differs from the shipped one only in the manifest's `root`, and its folder can be
-    moved."""
+    """It differs from the shipped one only in the manifest's `root`, and its folder can be moved."""
     write_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")
@@ -150,8 +142,8 @@ def test_a_new_library_is_a_copy_that_finds_the_controller(
     assert manifest.path.read_text().splitlines()[3] == "root: shipped:target"
 
 
-def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
-    """After edits of a template and a spec in the new library, the mutant's diff shows both."""
+def test_edits_in_a_new_library_take_effect(tmp_path: Path) -> None:
+    """The mutant's diff shows edits of a template and a spec."""
     write_library(tmp_path / "new")
     template = tmp_path / "new/templates/offset.py.j2"
     template.write_text(template.read_text().replace("{{ by | signed }}", "{{ by | signed }} * 1.0", 1))
@@ -165,8 +157,7 @@ def test_an_edit_in_a_new_library_is_what_runs(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["file", "full", "below a file"])
-def test_only_an_empty_folder_becomes_a_library(tmp_path: Path, kind: str) -> None:
-    """A new library is not mixed with existing files and does not overwrite any."""
+def test_a_new_library_needs_an_empty_folder(tmp_path: Path, kind: str) -> None:
     place = tmp_path / "place"
     if kind == "full":
         place.mkdir()

@@ -21,8 +21,8 @@ from mutator.errors import EXIT_HARNESS_ERRORS
         (RuntimeError("can't start new thread"), "no more processes"),
     ],
 )
-def test_shortages(error: Exception, said: str) -> None:
-    """Each shortage is reported with a remedy, even if it is the cause of another error."""
+def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
+    """This holds even if it is the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)

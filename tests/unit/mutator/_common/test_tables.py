@@ -6,20 +6,19 @@ from mutator._common.tables import Table
 
 
 def test_text_pads_columns_and_aligns_numbers_to_the_right() -> None:
-    """Columns are as wide as their widest cell, and no line ends with spaces."""
+    """No line ends with spaces."""
     table = Table(heads=("fault", "runs"), rows=[("radar/chaff", "7"), ("fog", "12")], right=(1,))
     assert table.as_text().splitlines() == ["fault        runs", "radar/chaff     7", "fog            12"]
 
 
-def test_a_table_without_rows_is_its_heads() -> None:
+def test_a_table_without_rows_has_its_heads() -> None:
     table = Table(heads=("a", "b"), rows=[])
     assert table.as_text() == "a  b"
     assert table.as_markdown() == "| a | b |\n|---|---|"
     assert "<tbody>\n</tbody>" in table.as_html()
 
 
-def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
-    """Line breaks and characters with a meaning in Markdown stay text in a cell."""
+def test_markdown_cells_stay_on_one_line_and_are_escaped() -> None:
     lines = [["a\r\nb\rc"], ["<class 'float'>"], ["p < 0.05"], ["no *x* in __init__"], ["a * b_c_d * `_e`"]]
     assert Table(heads=["said"], rows=lines).as_markdown().splitlines()[2:] == [
         "| a b c |",
@@ -30,16 +29,15 @@ def test_a_table_in_markdown_has_a_line_for_each_row() -> None:
     ]
 
 
-def test_a_bar_in_a_cell_does_not_end_it() -> None:
-    """A vertical bar is escaped, unless the cells are already Markdown."""
+def test_a_vertical_bar_in_a_cell_is_escaped() -> None:
+    """Cells that are already Markdown are left unchanged."""
     table = Table(heads=["x"], rows=[["a|b *c*"]])
     assert table.as_markdown().endswith(r"| a\|b \*c\* |")
     assert table.as_markdown(escape=False).endswith("| a|b *c* |")
 
 
 def test_html_escapes_texts_and_marks_continued_rows() -> None:
-    """Text never becomes an HTML element, braces stay text, and a row with an empty first cell has a
-    class."""
+    """A row with an empty first cell has a class."""
     html = Table(heads=["<b>"], rows=[["<i> & {0}"], [""]]).as_html("plain")
     assert '<table class="plain">' in html
     assert '<th scope="col">&lt;b&gt;</th>' in html
@@ -47,8 +45,7 @@ def test_html_escapes_texts_and_marks_continued_rows() -> None:
     assert '<tr class="group"><td></td></tr>' in html
 
 
-def test_html_shows_markup_as_it_is() -> None:
-    """A cell may be a link. Text is escaped unless the caller marks it as markup."""
+def test_html_keeps_cells_that_are_marked_as_markup() -> None:
     link = Markup('<a href="#e=1">{}</a>').format("<1>")
     html = Table(heads=["id", "said"], rows=[[link, "<b>"]]).as_html()
     assert '<tr><td><a href="#e=1">&lt;1&gt;</a></td><td>&lt;b&gt;</td></tr>' in html

@@ -18,14 +18,13 @@ from mutator.triggers.conditions import check_condition
         ("match(name, 'a=!b&&') and", ""),
     ],
 )
-def test_operators_of_other_languages(text: str, hint: str) -> None:
-    """An operator of another language gets one hint. Valid or quoted operators get none."""
+def test_an_operator_of_another_language_gets_one_hint(text: str, hint: str) -> None:
+    """Valid or quoted operators get none."""
     assert operator_hint(text) == hint
 
 
 @pytest.mark.parametrize("text", ["t > 2 && v > 3", "t > 2 || v > 3", "!(t > 2)", "t = 2"])
 def test_conditions_and_filters_give_the_hint(text: str) -> None:
-    """The error for such an operator in a condition or a filter says what to write."""
     for refused in (check_condition, lambda text: compile_filter(text, ("t", "v"))):
         with pytest.raises(MutatorError) as caught:
             refused(text)

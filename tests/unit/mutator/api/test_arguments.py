@@ -46,10 +46,10 @@ def drive(workspace: Workspace, **given: Any) -> mutator.Trial:
         (lambda w, out: drive(w, armed_after_s=-1), "armed_after_s"),
     ],
 )  # fmt: skip
-def test_a_wrong_argument_is_named(
+def test_a_wrong_argument_is_named_as_in_python(
     toycar: Workspace, tmp_path: Path, call: Callable[[Any, Path], Any], argument: str
 ) -> None:
-    """An invalid argument raises a MutatorError that names the argument, not a command-line option."""
+    """The MutatorError names the argument, not a command-line option."""
     out = tmp_path / "out"
     with pytest.raises(MutatorError) as caught:
         call(toycar, out)
@@ -59,8 +59,7 @@ def test_a_wrong_argument_is_named(
     assert not (out / "results.csv").exists()
 
 
-def test_an_id_is_text(toycar: Workspace, tmp_path: Path) -> None:
-    """A number is refused as the beginning of an experiment's id."""
+def test_an_experiment_id_must_be_text(toycar: Workspace, tmp_path: Path) -> None:
     mutator.plan("toy", tmp_path / "p", workspace=toycar)
     wrong: Any = 3
     with pytest.raises(MutatorError, match=r"^id: 3; expected the id of an experiment"):

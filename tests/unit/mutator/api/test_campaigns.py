@@ -15,9 +15,8 @@ from mutator.workspace import Workspace
 TWO = mutator.Choices(only='fault_type == "lane"', limit=2)
 
 
-def test_a_plan_is_a_frame(toycar: Workspace, tmp_path: Path) -> None:
-    """A plan prints as a line or a table and converts to a frame with experiment ids as its index.
-    Planning writes no files."""
+def test_a_plan_prints_and_converts_to_a_frame(toycar: Workspace, tmp_path: Path) -> None:
+    """The frame has experiment ids as its index. Planning writes no files."""
     plan = mutator.plan("toy", workspace=toycar)
     assert repr(plan) == "<Plan of toy, as_described: 24 experiments, seed 7>"
     assert "sensor/lane" in plan._repr_html_()
@@ -30,7 +29,6 @@ def test_a_plan_is_a_frame(toycar: Workspace, tmp_path: Path) -> None:
 
 
 def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Path) -> None:
-    """A run reports progress and a summary. A resumed run repeats nothing, and two runs can be compared."""
     seen: list[mutator.Progress] = []
     first = mutator.run("small", tmp_path / "a", choices=TWO, workspace=toycar, progress=seen.append)
     assert first.summary is not None
@@ -56,11 +54,9 @@ def test_a_campaign_runs_resumes_and_is_compared(toycar: Workspace, tmp_path: Pa
         same.findings(["bad"])
 
 
-def test_harness_errors_are_not_silent(
+def test_harness_errors_are_named_in_a_warning_and_retried(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with harness errors names them in a warning and retries them in the same call."""
-
     def run_campaign(*args: Any, **kwargs: Any) -> mutator.Summary:
         return replace(running.run_campaign(*args, **kwargs), harness_errors=(("abcd", "no memory"),), done=1)
 

@@ -10,17 +10,14 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_a_library_is_made_once(tmp_path: Path) -> None:
-    """The new folder is a workspace. A second library in the same folder does not overwrite it."""
+def test_a_second_library_does_not_overwrite_the_first(tmp_path: Path) -> None:
     folder = mutator.init_library(tmp_path / "own")
     assert mutator.Workspace.find(folder).campaigns
     with pytest.raises(MutatorError, match="not empty"):
         mutator.init_library(folder)
 
 
-def test_a_first_library_for_a_controller(tmp_path: Path) -> None:
-    """A library for a target is a workspace with a manifest. Its only problems are placeholders to fill
-    in."""
+def test_a_new_library_for_a_controller_only_lacks_its_placeholders(tmp_path: Path) -> None:
     (tmp_path / "tree").mkdir()
     (tmp_path / "tree" / "a.py").write_text("def control(x):\n    y = 2 * x\n    return y\n")
     folder = mutator.init_library(tmp_path / "own", target=tmp_path / "tree")
@@ -31,22 +28,20 @@ def test_a_first_library_for_a_controller(tmp_path: Path) -> None:
     assert all(problem.got.startswith("not filled in: ") and problem.line for problem in problems)
 
 
-def test_problems_of_a_library_are_a_list(toycar: Workspace) -> None:
-    """A broken spec adds one problem, which names the spec's file."""
+def test_a_broken_spec_adds_one_problem(toycar: Workspace) -> None:
     before = {problem.where for problem in mutator.check_library(toycar)}
     spec = toycar.spec("sensor/lane").path
     spec.write_text("nonsense: true\n")
     assert {problem.where for problem in mutator.check_library(toycar)} - before == {str(spec)}
 
 
-def test_the_doctor_knows_a_library_that_is_missing(toycar: Workspace, tmp_path: Path) -> None:
+def test_the_doctor_reports_a_missing_library(toycar: Workspace, tmp_path: Path) -> None:
     found = {f.name: f.level for f in mutator.doctor(tmp_path / "none")}
     assert found["library"] == "failed"
     assert {f.name for f in mutator.doctor(toycar)} >= {"library"}
 
 
-def test_an_analysis_is_asked_for(toycar: Workspace, tmp_path: Path) -> None:
-    """Without a hazard analysis, checking or drawing it raises an error that says that it is missing."""
+def test_a_missing_hazard_analysis_is_an_error(toycar: Workspace, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     with pytest.raises(MutatorError, match=r"no control_structure\.yaml"):
         mutator.draw_control_structure(replace(toycar, library=tmp_path / "empty"))

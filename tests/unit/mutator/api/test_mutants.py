@@ -14,8 +14,8 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_a_mutant_is_built(toycar: Workspace, tmp_path: Path) -> None:
-    """A mutant has a diff, a patch and files. Its written tree is the patched target."""
+def test_a_mutant_has_a_diff_a_patch_and_files(toycar: Workspace, tmp_path: Path) -> None:
+    """Its written tree is the patched target."""
     mutant = mutator.build_mutant("sensor/distance/longer", "near", value=12.5, workspace=toycar)
     assert "gap = gap + 12.5" in mutant.diff
     assert set(mutant.files) == {"toycar/_fi.py", "toycar/go.py", "toycar/sensing.py"}
@@ -28,8 +28,7 @@ def test_a_mutant_is_built(toycar: Workspace, tmp_path: Path) -> None:
         mutant.write(tree)
 
 
-def test_the_same_input_gives_the_same_id(toycar: Workspace) -> None:
-    """A fault under a trigger gives the same mutant, whether both are given by name or as records."""
+def test_names_and_records_give_the_same_mutant(toycar: Workspace) -> None:
     [fault, *_] = toycar.faults("sensor/distance/longer")
     by_record = mutator.build_mutant(fault, "near", workspace=toycar)
     assert isinstance(fault.value, int)
@@ -42,8 +41,7 @@ def test_the_same_input_gives_the_same_id(toycar: Workspace) -> None:
 
 
 def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) -> None:
-    """Each mutant of a campaign is written as a patch that the index names. `step` is called once for each
-    mutant."""
+    """The index names each patch. `step` is called once for each mutant."""
     steps: list[int] = []
     bench, pairs = pairs_of_campaign(toycar, "small", Choices(limit=4))
     index = write_mutants(bench, pairs, tmp_path / "m", step=lambda: steps.append(1))
@@ -54,7 +52,7 @@ def test_mutants_of_a_campaign_are_written(toycar: Workspace, tmp_path: Path) ->
 
 
 def test_specs_are_paired_with_every_context(toycar: Workspace) -> None:
-    """Without triggers, every context is used. A glob that matches nothing is an error."""
+    """A glob that matches nothing is an error."""
     bench = Bench.of(toycar)
     pairs = pairs_of_specs(bench, ["sensor/lane"])
     assert {trigger.name for _, trigger in pairs} == {"near", "far"}

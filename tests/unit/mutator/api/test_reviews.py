@@ -9,8 +9,8 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
-    """An approval is stored and can be read again, and the review page is written."""
+def test_a_decision_is_stored(toycar: Workspace, tmp_path: Path) -> None:
+    """The review page is written, too."""
     found = mutator.load_review(specs=["sensor/lane"], workspace=toycar)
     group = found.undecided[0]
     assert found.find([group.id[:8]]) == [group]
@@ -22,7 +22,6 @@ def test_a_decision_is_kept(toycar: Workspace, tmp_path: Path) -> None:
     assert again.write_page(tmp_path / "page.html").read_text().startswith("<!doctype html>")
 
 
-def test_a_campaign_or_specs(toycar: Workspace) -> None:
-    """A campaign together with specs is refused, and the error names the argument."""
+def test_a_campaign_together_with_specs_is_refused(toycar: Workspace) -> None:
     with pytest.raises(MutatorError, match=r"^campaign: together with specs"):
         mutator.load_review(campaign="small", specs=["sensor/lane"], workspace=toycar)

@@ -54,9 +54,9 @@ def run(
     return mutator.load_run(write_run(toycar, folder / "first", became), workspace=toycar)
 
 
-def test_propagation_as_frames(run: Run) -> None:
+def test_propagation_is_available_as_frames(run: Run) -> None:
     """A run's frame has a row for each channel that left golden. An experiment's frame has its channels by
-    time. For older runs, an error says that the data are missing."""
+    time. Older runs lack the data, and an error says so."""
     frame = run.propagation()
     lanes = run.results.index[run.results["fault_type"] == "lane"]
     assert list(frame["experiment_id"].unique()) == sorted(lanes)
@@ -70,8 +70,8 @@ def test_propagation_as_frames(run: Run) -> None:
         Results(old / "results.csv").propagation()
 
 
-def test_the_frame_is_typed(run: Run) -> None:
-    """In the frame, names are categories, flags are nullable, and times are floats with a unit."""
+def test_the_columns_of_the_frame_have_types(run: Run) -> None:
+    """Names are categories, flags are nullable, and times are floats with a unit."""
     frame = run.results
     assert len(frame) == 24
     assert frame.index.name == "experiment_id"
@@ -86,8 +86,8 @@ def test_the_frame_is_typed(run: Run) -> None:
     assert set(numbers) <= set(frame.attrs["units"])
 
 
-def test_hazards_of_the_frame(run: Run) -> None:
-    """The frame says whether a hazard occurred and which came first. For a crash, this is unknown."""
+def test_the_frame_has_hazards(run: Run) -> None:
+    """`hazard` is unknown for a crash."""
     frame = run.results
     lane, silence = (frame[frame["fault_type"] == name] for name in ("lane", "silence"))
     assert lane["hazard"].all()
@@ -96,8 +96,8 @@ def test_hazards_of_the_frame(run: Run) -> None:
     assert not frame[frame["fault_type"] == "distance"]["hazard"].any()
 
 
-def test_it_says_what_it_is(run: Run) -> None:
-    """A run prints as one line and gives access to its faults and provenance."""
+def test_a_run_prints_as_one_line(run: Run) -> None:
+    """It gives access to its faults and provenance."""
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
@@ -111,7 +111,7 @@ def driven_once(
     copy_toycar: Callable[[Path], Workspace],
     write_run: Callable[..., Path],
 ) -> Path:
-    """A run of one simulated experiment with its golden run, patch and record, but without a trace."""
+    """A run of one simulated experiment, without a trace."""
     root = tmp_path_factory.mktemp("driven")
     toycar = copy_toycar(root)
     folder = RunFolder.open(
@@ -135,17 +135,14 @@ def driven_once(
 
 @pytest.fixture
 def driven(driven_once: Path, toycar: Workspace, tmp_path: Path) -> Run:
-    """A copy of that run in runs/first, which a test may extend."""
+    """A copy of that run in runs/first."""
     run = shutil.copytree(driven_once, tmp_path / "runs" / "first")
     return mutator.load_run(run, workspace=toycar)
 
 
-def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
-    """The golden run and the faulty run are frames by time, with units.
-
-    Without a stored series, the experiment is rerun once. Exact traces are rerun each time and have all
-    channels in double precision.
-    """
+def test_traces_are_frames_and_exact_ones_are_rerun(driven: Run) -> None:
+    """Without a stored series, the experiment is rerun once. Exact traces are rerun each time and have all
+    channels in double precision."""
     [name] = driven.results.index
     golden = driven.golden("A")
     assert (golden.index.name, len(golden)) == ("time", 120)
@@ -169,9 +166,8 @@ def test_traces_are_the_series_and_exact_ones_are_driven(driven: Run) -> None:
     assert kept.stat().st_mtime_ns > before
 
 
-def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
-    """An experiment has a diff, a fault, a record, a verdict and a plot. A notebook shows it as a table
-    and a figure."""
+def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
+    """A notebook shows it as a table and a figure."""
     [name] = driven.results.index
     experiment = driven.experiment(name)
     assert "# fi:" in experiment.diff
@@ -184,12 +180,8 @@ def test_an_experiment_shows_all_of_itself(driven: Run) -> None:
     assert repr(experiment) in unescape(experiment._repr_html_())
 
 
-def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
-    """A rerun says whether its record equals the campaign's. It leaves no files unless the caller requests
-    them.
-
-    The series of a rerun that differs is not kept.
-    """
+def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
+    """It leaves no files unless the caller requests them. The series of a rerun that differs is not kept."""
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
@@ -206,8 +198,8 @@ def test_an_experiment_driven_again_is_the_same(driven: Run) -> None:
     assert kept.exists()
 
 
-def test_two_processes_may_want_one_series(driven: Run) -> None:
-    """If two processes want the traces of one experiment at once, each gets the complete series."""
+def test_two_processes_may_request_the_same_series(driven: Run) -> None:
+    """Each gets the complete series."""
     [name] = driven.results.index
     library = driven.workspace.library
     look = (
@@ -228,8 +220,10 @@ def test_two_processes_may_want_one_series(driven: Run) -> None:
     ]
 
 
-def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The code of the documentation page runs as printed, block by block, on a run in runs/first."""
+def test_the_code_of_the_notebook_page_runs(
+    driven: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page's blocks run as printed, on a run in runs/first."""
     library = driven.workspace.library
     monkeypatch.setenv("MUTATOR_ROOT", str(library.parent))
     small = (library / "campaigns" / "small.yaml").read_text()
@@ -247,8 +241,7 @@ def test_the_page_about_notebooks(driven: Run, tmp_path: Path, monkeypatch: pyte
     assert names["trial"].outcome == "hazard"
 
 
-def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
-    """The error for missing data lists the data that the run has."""
+def test_the_error_for_missing_data_lists_the_existing_data(run: Run, tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="no golden run Z"):
         run.golden("Z")
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
@@ -260,8 +253,7 @@ def test_what_is_not_there_is_told(run: Run, tmp_path: Path) -> None:
 def test_a_planned_experiment_has_a_diff_and_no_traces(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """The mutant of a planned experiment is built on request. Its traces do not exist, and the error has a
-    remedy."""
+    """The mutant is built on request. The error for the missing traces has a remedy."""
     run = mutator.load_run(write_run(toycar, tmp_path / "r", lambda e: None), workspace=toycar)
     experiment = run.experiment(next(iter(run.experiments)))
     assert "# fi:" in experiment.diff
@@ -271,8 +263,9 @@ def test_a_planned_experiment_has_a_diff_and_no_traces(
             ask()
 
 
-def test_harness_errors_are_seen(toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]) -> None:
-    """A run with harness errors reports them when displayed and names the experiments."""
+def test_a_displayed_run_names_its_harness_errors(
+    toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
+) -> None:
     run = mutator.load_run(
         write_run(
             toycar,

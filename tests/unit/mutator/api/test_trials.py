@@ -10,8 +10,7 @@ from mutator.model import Outcome, Status
 from mutator.workspace import Workspace
 
 
-def test_a_fault_is_tried(toycar: Workspace) -> None:
-    """A fault tried by name, at a time, has a diff, a verdict, frames by time, and a figure for notebooks."""
+def test_a_fault_is_tried_by_name(toycar: Workspace) -> None:
     trial = mutator.try_fault("sensor/lane/shifted", "A", 1.0, workspace=toycar)
     assert (trial.outcome, trial.status) == (Outcome.HAZARD, Status.OK)
     assert "H3" in trial.verdict["hazards_s"]
@@ -28,8 +27,8 @@ def test_a_fault_is_tried(toycar: Workspace) -> None:
     assert "toycar/sensing.py" in trial._repr_html_()
 
 
-def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
-    """`value` replaces the drawn values, and `out` keeps all files."""
+def test_value_replaces_the_drawn_values(toycar: Workspace, tmp_path: Path) -> None:
+    """`out` keeps all files."""
     trial = mutator.try_fault(
         "sensor/distance/longer", "A", "near", value=12.5, workspace=toycar, out=tmp_path / "o"
     )
@@ -41,9 +40,8 @@ def test_a_value_is_taken_exactly(toycar: Workspace, tmp_path: Path) -> None:
     assert trial.trigger.condition == "hwt <= 2.0"
 
 
-def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
-    """A Fault record is tried unchanged. A crash of the controller is a result, with the data recorded
-    before it."""
+def test_any_fault_record_can_be_tried(toycar: Workspace) -> None:
+    """A crash of the controller is a result, with the data recorded before it."""
     [fault] = toycar.faults("hostile/crash")
     trial = mutator.try_fault(fault, "A", workspace=toycar)
     assert trial.fault is fault
@@ -53,7 +51,7 @@ def test_any_fault_of_the_library_can_be_tried(toycar: Workspace) -> None:
         mutator.try_fault(fault, "A", value=3.0, workspace=toycar)
 
 
-def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
+def test_the_temporary_folder_is_deleted_with_the_trial(toycar: Workspace) -> None:
     trial = mutator.try_fault("sensor/lane/shifted", "A", 5.0, workspace=toycar)
     folder = trial.folder
     assert folder.is_dir()
@@ -61,8 +59,7 @@ def test_a_temporary_folder_goes_with_the_trial(toycar: Workspace) -> None:
     assert not folder.exists()
 
 
-def test_a_trial_that_deletes_its_output(toycar: Workspace) -> None:
-    """A faulty run that deletes its output folder is a valid result, a crash."""
+def test_a_faulty_run_that_deletes_its_output_is_a_crash(toycar: Workspace) -> None:
     driver = toycar.library.parent / "tree" / "toycar" / "driver.py"
     lost = "        if gap > 500.0:\n            import os, shutil\n            shutil.rmtree(os.getcwd())\n"
     old = "        wanted ="
@@ -81,7 +78,8 @@ def test_a_trial_that_deletes_its_output(toycar: Workspace) -> None:
         ("sensor/lane", "A", "hwt <", "expected a context"),
     ],
 )
-def test_mistakes_are_told(toycar: Workspace, fault: str, scenario: str, trigger: str, said: str) -> None:
-    """The error for an unknown name lists the known names."""
+def test_an_unknown_name_is_an_error_that_lists_the_known_ones(
+    toycar: Workspace, fault: str, scenario: str, trigger: str, said: str
+) -> None:
     with pytest.raises(MutatorError, match=said):
         mutator.try_fault(fault, scenario, trigger, workspace=toycar)
