@@ -36,6 +36,7 @@ SCRIPTS = (  # in load order, because scripts use earlier ones
     "replay_plots.js",
     "replay.js",
     "path.js",
+    "happened.js",
     "experiment.js",
     "report.js",
     "ways.js",

@@ -2,8 +2,6 @@
 // An open experiment next to the list: events, path, replay, diff, and commands to run it again.
 
 class Experiment {
-  /** What the header says after the outcome; by `warning`. */
-  static ALERTED = { "no alert at all": ", no alert at all,", "alert only after the hazard": ", no alert before it,", "alert before the hazard": " after an alert," };
   static open = null; // {id, experiment} for scripts that add buttons, which the event `filled` notifies
 
   /** `move(by)` moves within the list, `place()` returns the position in the list, `close()` closes the panel. */
@@ -85,11 +83,11 @@ class Experiment {
     this.place.replaceChildren(
       el("header", {},
         el("div", {}, el("h2", { tabindex: -1, id: "experiment-title" }, this.text("fault")),
-          el("p.under", {}, Grid.ending(this.text("ending")), Experiment.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
+          el("p.under", {}, Grid.ending(this.text("ending")), Happened.ALERTED[this.text("warning")] ?? "", " in ", code("scenario"), ", trigger ", code("trigger"))),
         this.#buttons()),
       el("p.id", {}, "experiment ", el("code", {}, id), " ", Dom.copyButton(() => id, "Copy id"), " ", Dom.copyButton(() => this.#link(), "Copy link")),
       this.text("detail") ? el("p.detail", {}, this.text("detail")) : "",
-      el("section.happened", {}, el("h3", {}, "What happened"), this.#setting(), this.#events()),
+      el("section.happened", {}, el("h3", {}, "What happened"), new Happened(this.table, this.row, this.facts).parts),
       typeof Path === "undefined" ? "" : section("Path of the fault", "path"),
       section("Replay", "replay"),
       section("Pictures", "pictures"),
@@ -104,74 +102,6 @@ class Experiment {
 
   #link() {
     return `${location.href.split("#")[0]}#e=${this.text("experiment_id")}`;
-  }
-
-  /** Scenario, trigger and alerts in words. */
-  #setting() {
-    const { el } = Dom;
-    const known = (name) => [this.text(name), this.table.meaning(name, this.text(name))].filter(Boolean).join(": ");
-    const condition = this.text("condition"), trigger = known("trigger");
-    const rows = [["scenario", known("scenario")], ["trigger", trigger.includes(condition) ? trigger : `${condition} (${trigger})`]];
-    if (this.#endedWell && this.table.columns.has("alerts")) rows.push(["alert", this.#alert()]);
-    return el("table.plain.setting", {}, el("tbody", {}, rows.filter(([, about]) => about).map(([name, about]) =>
-      el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, about)))));
-  }
-
-  /** Whether there was an alert, and whether it came before the hazard. */
-  #alert() {
-    const first = this.text("alerts").split(";")[0], reaction = this.table.number(this.row, "reaction_time");
-    if (!first) return this.text("hazards") ? "none, neither before nor after the hazard" : "none";
-    if (!this.text("hazards")) return `${first}, without a hazard`;
-    return Number.isNaN(reaction) ? `none before the hazard, ${first} only after it` : `${first}, ${reaction.toFixed(2)} s before the hazard`;
-  }
-
-  #events() {
-    const { el } = Dom;
-    const at = (name) => this.table.number(this.row, name), begin = at("t_activation");
-    const happened = [["t_activation", `fault first active (${this.text("activations") || "?"} times in the whole run)`],
-      ["t_manifest", "manifested: an actuator differs from the golden run"], ["t_alert", `alert (of this run: ${this.text("alerts").replaceAll(";", ", ")})`],
-      ...this.table.checked.map((hazard) => [`t_${hazard.toLowerCase()}`, this.#hazard(hazard)]), ["t_end", "end of the drive: later steps count in no metric"]]
-      .map(([name, what]) => [at(name), what]).filter(([t]) => !Number.isNaN(t)).sort((a, b) => a[0] - b[0]);
-    if (!happened.length) return el("p", {}, Experiment.#nothing(this.text("status"), this.text("outcome")));
-    const reaction = at("reaction_time");
-    return el("div", {}, el("table.events", {}, el("thead", {}, el("tr", {}, ["time [s]", "from activation [s]", "what"].map((t) => el("th", { scope: "col" }, t)))),
-      el("tbody", {}, happened.map(([t, what]) => el("tr", {}, el("td.time", {}, t.toFixed(2)),
-        el("td.time", {}, Number.isNaN(begin) ? "" : `${t < begin ? "−" : "+"}${Math.abs(t - begin).toFixed(2)}`), el("td", {}, what))))),
-      Number.isNaN(reaction) ? "" : el("p", {}, `Reaction time (first alert to first hazard): ${reaction.toFixed(2)} s.`),
-      this.#severity(), this.#metrics());
-  }
-
-  /** The reason why there are no events. */
-  static #nothing(status, outcome) {
-    if (status === "invalid_mutant") return "The mutant could not be built. This says nothing about the fault.";
-    if (status === "harness_error") return "The harness failed. This says nothing about the fault.";
-    return outcome === "not_activated" ? "The fault was never active, so nothing happened." : "No event was recorded.";
-  }
-
-  /** A hazard with its meaning, if the manifest has one. */
-  #hazard(name) {
-    const about = (this.facts.hazards || []).find((hazard) => hazard.name === name)?.about;
-    return `hazard ${name}${about ? `: ${about}` : ""}`;
-  }
-
-  /** The severity class of the contact and its meaning. */
-  #severity() {
-    const { el } = Dom;
-    const name = this.text("severity"), scale = this.facts.severity;
-    if (!name || !scale) return "";
-    const about = scale.classes.find(([of]) => of === name)?.[2];
-    return el("div", {}, el("b", {}, `Severity ${name}`), `: delta-v ${this.table.number(this.row, "delta_v").toFixed(2)} m/s`,
-      about ? `, ${about}` : "", el("details.quiet", {}, el("summary", {}, "Source of the classes"), `${scale.name}: ${scale.source}`));
-  }
-
-  /** The metrics of this run and their meanings. */
-  #metrics() {
-    const { el } = Dom;
-    const known = (this.facts.metrics || []).filter(([name]) => this.text(name) !== "");
-    if (!known.length) return "";
-    return el("details", {}, el("summary", {}, `Metrics (${known.length})`), el("div.scroll", { tabindex: 0 }, el("table.plain", {}, el("tbody", {},
-      known.map(([name, unit, about]) => el("tr", {}, el("th", { scope: "row" }, name.replaceAll("_", " ")),
-        el("td.number", {}, Grid.number(this.table.number(this.row, name))), el("td", {}, unit), el("td", {}, about)))))));
   }
 
   command(text) {
