@@ -1,8 +1,7 @@
-"""The messages between the parts of the controller.
+"""The messages between the parts of the controller, in SI units and radians.
 
-Units are SI and radians. Left is positive for lateral positions, angles and steering torque. Receivers must
-not change messages; these are not frozen because creating a frozen one takes four times as long, and a run
-creates thousands.
+Left is positive for lateral positions, angles and steering torque. Receivers must not change messages; these
+are not frozen because creating a frozen one takes four times as long.
 """
 
 from dataclasses import dataclass, field

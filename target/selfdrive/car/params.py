@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarParams:
-    """Tables are (breakpoints, values). Tables are (breakpoints, values).
+    """Physical data and tuning of one car model. Tables are (breakpoints, values).
 
     Speeds in m/s, masses in kg, lengths in m, stiffness in N/rad, inertia in kg m^2. Gains of the lateral PI
     loop are per radian of steering-wheel angle, `steer_kf` also per (m/s)^2, because the self-aligning torque

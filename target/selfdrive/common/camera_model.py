@@ -1,7 +1,7 @@
 """The camera's geometry: a pinhole over a flat road.
 
-Car frame: x forward from the camera, y to the left, both in m on the road. Picture: column u to the right,
-row v down, in pixels. The camera looks along x, pitched down, without roll and lens distortion.
+Car frame: x forward from the camera, y left, in m on the road. Picture: column u right, row v down, in
+pixels. The camera is pitched down, without roll and lens distortion.
 """
 
 from dataclasses import dataclass

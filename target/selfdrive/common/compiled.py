@@ -1,8 +1,8 @@
-"""Compiled C libraries that replace some Python calculations: same numbers, but faster; all are optional.
+"""Optional compiled C libraries that replace Python calculations: same numbers, but faster.
 
 A C file lists the Python files that it replaces: `Stands for: hog.py, mark_edges.py.` The library's name
 contains a digest of all of these, so an edited file has no library and runs in Python.
-`selfdrive.sim.compile_helpers` builds the libraries; runs only look for them.
+`selfdrive.sim.compile_helpers` builds the libraries.
 """
 
 import ctypes

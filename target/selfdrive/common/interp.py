@@ -1,4 +1,4 @@
-"""Piecewise linear tables on plain floats; an array library is twenty times slower here."""
+"""Piecewise linear tables on plain floats; numpy is twenty times slower here."""
 
 from bisect import bisect_right
 from collections.abc import Sequence

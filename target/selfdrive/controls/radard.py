@@ -1,4 +1,4 @@
-"""radard: selects the leads from radar tracks and the camera's lead, at 20 Hz."""
+"""radard: selects leads from radar tracks and the camera's lead, at 20 Hz."""
 
 from collections import deque
 

@@ -1,7 +1,6 @@
 """Compiles the slowest calculations: `python -m selfdrive.sim.compile_helpers`.
 
-Installing the harness does the same. Runs with these libraries give the same bytes in less time. Exit code 2
-without a C compiler. Needs only Python.
+Installing the harness does the same. Exit code 2 without a C compiler. Needs only Python.
 """
 
 import argparse

@@ -1,9 +1,8 @@
-"""Detection results by picture, in a file that all runs share.
+"""Detection results by picture, in a file of fixed size that all runs share.
 
-The file is a table of fixed size. An entry has the digest of all inputs of a detection, a checksum, and
-numbers. Processes use it concurrently without a lock: if an entry is damaged, incomplete or overwritten, the
-reader repeats the work and writes the same entry. If the file cannot be created, for example on a full disk,
-nothing is stored.
+An entry has the digest of all inputs of a detection, a checksum, and numbers. Processes use the file
+concurrently without a lock: if an entry is damaged, incomplete or overwritten, the reader repeats the work
+and writes the same entry. If the file cannot be created, nothing is stored.
 """
 
 import os

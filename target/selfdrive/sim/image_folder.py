@@ -98,7 +98,6 @@ def _calibration(folder: Path) -> tuple[bytes, Section]:
 
 
 def _size(root: Section) -> tuple[int, int]:
-    """Width and height of the frames as stored."""
     return _pixels(root, "width", _LARGEST), _pixels(root, "rows", _LARGEST)
 
 
@@ -115,7 +114,6 @@ def _camera(root: Section) -> CameraModel:
 
 
 def _model(root: Section, width: int, rows: int) -> CameraModel:
-    """The camera of the frames as stored."""
     height = root.number("height_m", 0.2, 10.0)
     whole = ("fx_px", "fy_px", "cx_px", "cy_px", "pitch_deg")
     if "horizon_row" in root or "focal_px" in root:
@@ -208,7 +206,6 @@ def _frame(path: Path, match: re.Match[str], number: int) -> Path:
 
 
 def _decoded(data: bytes) -> np.ndarray | None:
-    """Decode a file's bytes to a grey picture (uint8); None if they are incomplete."""
     # OpenCV fills in the rest of a truncated JPEG file, so check that the last scan is complete.
     if data[:2] == b"\xff\xd8" and data.rfind(b"\xff\xda") > data.rfind(b"\xff\xd9"):
         return None

@@ -183,7 +183,6 @@ def _write(path: Path, shape: tuple[int, int, int], frames: Made) -> None:
 
 
 def _mapped(path: Path, shape: tuple[int, int, int]) -> tuple[np.ndarray, bytes] | None:
-    """Map the frames of a file and read their checks; None if it is missing or incomplete."""
     if path.is_fifo():  # reading a pipe would block
         return None
     header = _header(shape)

@@ -67,7 +67,6 @@ def tinted(
 def _mark_strip(
     parts: np.ndarray, model: CameraModel, sides: tuple[float, float], heading: float, part: int
 ) -> None:
-    """Mark the strip of road between two lines that pass the car at `sides` (m) as that part."""
     rows = (max(0, floor(model.horizon) + 1), model.rows - 1)
     ends = []
     for y in sides:

@@ -49,7 +49,6 @@ def _maneuver(run: runs.Run, reference: Reference | None, tolerances: Tolerances
 
 
 def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scenario]:
-    """The scenarios to run, by name; by default all with a road that the plant supports."""
     names = options.names or _all_names(options.scenarios, known)
     scenarios = {}
     for name in names:
@@ -64,7 +63,6 @@ def _scenarios(options: argparse.Namespace, known: list[str]) -> dict[str, Scena
 
 
 def _all_names(scenarios: Path, known: list[str]) -> list[str]:
-    """Names of all scenarios, S1 before O01, and of the references that are variants of one."""
     found = {path.stem for path in scenarios.glob("*.yaml")}
     if not found:
         raise ConfigError(

@@ -1,7 +1,7 @@
 """The reference plant: openpilot v0.4.2's own PC simulation with its errors, for comparison with recordings.
 
-It moves longitudinally like the standard plant. Its lateral motion and its messages are the original's crude
-model: do not draw conclusions about driving from it.
+Do not draw conclusions about driving from it: its lateral motion and its messages are the original's crude
+model.
 """
 
 from selfdrive.car.params import CarParams
@@ -17,10 +17,7 @@ FIRST_HEADWAY = 30.0  # s
 
 
 class CrudeLateral:
-    """Torque turns the steering wheel slowly; the car moves laterally only while it turns, at any speed.
-
-    There is no heading, no bend, and no self-aligning force.
-    """
+    """Torque turns the steering wheel slowly; the car moves laterally only while it turns, at any speed."""
 
     heading = 0.0  # rad
 

@@ -1,8 +1,8 @@
 """Compares runs with reference traces: `python -m selfdrive.sim.replay --references DIR [NAME...]`.
 
 Each CSV in the folder (or each named one) is compared by channel with a run of its scenario on the reference
-plant, using a tolerance table. Exit code 0 within tolerance, 1 otherwise, 2 for invalid input. References are
-written only with --update-references.
+plant. Exit code 0 within tolerance, 1 otherwise, 2 for invalid input. References are written only with
+--update-references.
 """
 
 import argparse

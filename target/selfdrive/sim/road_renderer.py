@@ -1,7 +1,7 @@
 """Renders a straight road from any position, with the true positions of its lines.
 
-The road is painted once, from above (`road_texture`). A picture shows that strip through the camera. Each
-band of rows uses a copy of suitable coarseness, so that the far road does not flicker.
+The road is painted once, from above (`road_texture`), and seen through the camera. Each band of rows uses a
+copy of suitable coarseness, so that the far road does not flicker.
 """
 
 from dataclasses import dataclass
@@ -86,7 +86,6 @@ class RoadRenderer:
         return ((half - offset) / cos(heading), slope), ((-half - offset) / cos(heading), slope)
 
     def _draw_far(self, picture: np.ndarray, heading: float) -> None:
-        """Draw sky and trees, which only pan as the car turns."""
         rows, width = len(self._far), picture.shape[1]
         spare = self._far.shape[1] - width
         first = min(max(spare // 2 - pan(self.model, heading), 0), spare)

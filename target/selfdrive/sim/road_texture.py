@@ -73,7 +73,6 @@ def lines(look: Look) -> tuple[tuple[float, Paint | None], ...]:
 
 
 def _edge(look: Look) -> float:
-    """Distance (m) from the lane centre to the end of the shoulder."""
     return 1.5 * look.lane_width + look.shoulder_width
 
 

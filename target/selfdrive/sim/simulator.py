@@ -125,7 +125,6 @@ class Simulator:
         return SimulationResult(record=record, trace=recorder.trace())
 
     def _advance(self, t: float) -> None:
-        """Advance the world from time `t`, with the previous step's commands."""
         road, plant = self._road, self._plant
         plant.step(self._actuators, road.grade(t), road.curvature(plant.position))
         if self._lead:

@@ -1,8 +1,7 @@
 """The bytes of trace.npz, as `numpy.savez` writes them, but faster.
 
-`savez` takes as long as a few dozen steps of the run, because channels pass through `zipfile` and its
-buffers; here they are taken directly from memory. Format: PKWARE's APPNOTE 6.3 (stored entries with a ZIP64
-extra field each, dated 1980-01-01), and NumPy's .npy 1.0.
+`savez` copies channels through `zipfile` and its buffers; here they are taken directly from memory. Format:
+PKWARE's APPNOTE 6.3 (stored entries with a ZIP64 extra field each, dated 1980-01-01), and NumPy's .npy 1.0.
 """
 
 from collections.abc import Mapping

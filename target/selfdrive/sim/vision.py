@@ -1,6 +1,6 @@
 """How the controller sees in a run: ideal geometry, or pictures with a detector.
 
-Picture libraries load slowly, so only runs with pictures import them.
+Only runs with pictures import picture libraries, which load slowly.
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-SINGLE = (3, 5)  # columns: half width of a mark, and distance from its middle to the middle of each side
+SINGLE = (3, 5)  # columns: width of a mark (up to 0.2 m), and distance from its middle to that of each side
 DOUBLE = (9, 8)  # the same for a double line, 0.3 m wide in total
 EDGE = DOUBLE[1]
 SIDE = 5  # columns of road on each side for comparison
@@ -88,6 +88,5 @@ def _inner(picture: np.ndarray) -> np.ndarray:
 
 
 def _sides(side: np.ndarray, apart: int) -> tuple[np.ndarray, np.ndarray]:
-    """The road to the left and right of each inner point."""
     end = side.shape[1]
     return side[:, EDGE - apart : end - EDGE - apart], side[:, EDGE + apart : end - EDGE + apart]

@@ -124,7 +124,6 @@ def _columns_of_lines(points: np.ndarray) -> tuple[float, float]:
 
 
 def _radius(points: np.ndarray) -> float:
-    """Radius of a circle with NEIGHBOURS points, if all were evenly spread over their bounding box."""
     down, across = (points.max(axis=0) - points.min(axis=0)).tolist()
     return sqrt(down * across * NEIGHBOURS / (len(points) * pi))
 
@@ -138,7 +137,6 @@ def _linked(pixels: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _crossing(pixels: np.ndarray, counts: np.ndarray) -> float:
-    """Column in which the line fitted to a cluster crosses the row where lines are read."""
     row, column = pixels.T.astype(float)
     weight = counts / counts.sum()
     mean_row, mean_column = dot(weight, row), dot(weight, column)

@@ -1,8 +1,8 @@
 """Finds the threshold of the detector as coded: `python -m selfdrive.visiond.coded_threshold`.
 
-Uses only clean pictures of the road. A threshold qualifies if at most ALLOWED of the windows inside the lane
-are classified as marks, and if the fewest pictures have a line that is more than OFF away. The middle of the
-qualifying ones is used.
+Uses only clean pictures. A threshold qualifies if at most ALLOWED of the windows inside the lane are
+classified as marks, and the fewest pictures have a line more than OFF away. The middle of the qualifying ones
+is used.
 """
 
 from collections.abc import Sequence

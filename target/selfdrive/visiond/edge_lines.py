@@ -17,7 +17,7 @@ BESIDE = 8.0  # m ahead, where the nearest line is determined
 CROWD = 0.8  # m; of lines this close, the one with more edges is used
 TRIES = 8  # clusters examined on each side, from the nearest
 REACHES = 0.3, 0.2  # m; distance of edges that belong to a line, in each round of fitting
-LEAST_SHARE = 0.12  # of a mark's edges lead into the paint, and at least as many out of it
+LEAST_SHARE = 0.12  # smallest share of a mark's edges that lead into the paint, and out of it
 MARK_WIDTHS = 0.03, 0.45  # m between both kinds of edges, for one or two strips of paint
 SHARP = 0.05  # m, standard deviation of the edges on one side of a strip of paint
 SURE_PIXELS = 80.0  # edge pixels of a line with full certainty
@@ -85,7 +85,6 @@ class EdgeLines:
         )
 
     def _first_line(self, clusters: list[list[float]], points: Points) -> RoadLine | None:
-        """The first valid line of the clusters (m away, a, b), or a better one close to it."""
         best, first, most, where = None, 0.0, 0, 0.0
         for away, a, b in clusters:
             if best is not None and (away > first + CROWD or away < where + REACHES[0]):
@@ -118,7 +117,6 @@ class EdgeLines:
 
 
 def _away(points: Points, a: float, b: float) -> np.ndarray:
-    """Distance (m) of points to the right of the line column = a * row + b."""
     away = points.column - a * points.row
     away -= b
     away *= points.scale

@@ -3,8 +3,7 @@
 TRUTH is a JSON file: {"lines": {KEY: {"L": [a, b], "R": [a, b]}}} with x = a * row + b, or, if only the
 lines' centres in row 278 are known, {KEY: {"gt": [xl, xr]}}. Coordinates are in the canonical frame: 640 x
 480, the frame scaled to 640 and moved vertically until its vanishing row is 200. The first word of a key
-(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml. Every frame is examined by a
-new detector, without history.
+(`p1` in `p1_solidWhiteCurve`) names the camera, unless FRAMES has a camera.yaml.
 """
 
 import argparse
@@ -223,7 +222,6 @@ def _read_truth(path: Path) -> dict:
 
 
 def _centres(key: str, entry: dict, truth: Path) -> tuple[float, float]:
-    """Columns of both lines in row 278, from the lines if available, else from their centres."""
     try:
         if entry.get("L") and entry.get("R"):
             left, right = (entry[side][0] * ROW + entry[side][1] for side in "LR")

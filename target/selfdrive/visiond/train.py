@@ -1,8 +1,7 @@
 """Trains the neural net of the paper's lane detector: `python -m selfdrive.visiond.train`.
 
-It learns only from windows of rendered roads, drawn from the seed, and prints its accuracy on windows of
-different roads. It takes some minutes, or some seconds with `--small`. Needs scikit-learn, which the detector
-does not.
+It uses only windows of rendered roads, drawn from the seed, and prints its accuracy on windows of different
+roads. It takes minutes, or seconds with `--small`. Needs scikit-learn.
 """
 
 import argparse

@@ -1,9 +1,9 @@
 """Measures how well detectors find real lanes in bad weather.
 
 `python -m selfdrive.visiond.under_effects FRAMES TRUTH` takes the same input as `selfdrive.visiond.evaluate`.
-Each frame is changed by each level of each effect, once per seed, and examined by detectors without history.
-The result is the number of pictures in which a detector misses a line; these are not independent, because a
-frame always shows the same road. `--strips` writes all levels of a frame side by side for inspection.
+Each frame is changed by each level of each effect, once per seed. The result is the number of pictures in
+which a detector misses a line; these are not independent, because a frame always shows the same road.
+`--strips` writes all levels of a frame side by side.
 """
 
 import argparse

@@ -1,9 +1,4 @@
-"""The Honda Civic Touring 2016 as the controller sees it: CAN in, CarState out; CarControl in, CAN out.
-
-Events raised in `CarState.events`: can_error, steer_unavailable, steer_temp_unavailable,
-brake_unavailable, wrong_gear, reverse_gear, door_open, seatbelt_not_latched, esp_disabled,
-wrong_car_mode, brake_hold, park_brake, pedal_pressed, button_enable, button_cancel.
-"""
+"""The Honda Civic Touring 2016 as the controller sees it: CAN in, CarState out; CarControl in, CAN out."""
 
 from collections.abc import Sequence
 from operator import attrgetter

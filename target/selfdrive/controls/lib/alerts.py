@@ -75,7 +75,6 @@ _PERMANENT = ("steer_unavailable", "brake_unavailable")
 
 
 def _table() -> dict[str, Alert]:
-    """All alerts by name; refusals end in `_no_entry`, permanent alerts in `_permanent`."""
     table = dict(_SPECIAL)
     for name, text in _IMMEDIATE.items():
         table[name] = Alert("Take over now", text, HIGH, "steer_required", "chime_repeated", 1.0, 3.0, 4.0)

@@ -1,7 +1,6 @@
 """The solvers of both model-predictive controllers: compiled C if available, else CasADi's.
 
-CasADi is imported only if needed, because importing it and building both solvers takes as long as simulating
-a few seconds of driving.
+CasADi is imported only if needed, because importing it and building both solvers is slow.
 """
 
 import ctypes

@@ -1,4 +1,4 @@
-"""Forward collision warning: all conditions must hold for a while before the warning."""
+"""Forward collision warning: all conditions must hold for a while."""
 
 from collections.abc import Sequence
 from math import inf, sqrt

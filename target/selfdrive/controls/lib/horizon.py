@@ -1,4 +1,4 @@
-"""The 21 nodes at which both model-predictive controllers plan, and the intervals between them."""
+"""The 21 nodes of both model-predictive controllers, and the intervals between them."""
 
 LATERAL_STEP = 0.05  # s, of RK4
 LONGITUDINAL_STEP = 0.2  # s

@@ -1,6 +1,6 @@
 """Lateral model-predictive control: steers along a path between two lanes.
 
-The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
+Problem, rules and constants are those of openpilot v0.4.2.
 """
 
 import math

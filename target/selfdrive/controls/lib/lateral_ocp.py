@@ -1,6 +1,6 @@
 """The lateral optimal control problem: steer along a path between two lanes.
 
-Its terms and their constants are those of openpilot v0.4.2.
+Terms and constants are those of openpilot v0.4.2.
 """
 
 import math

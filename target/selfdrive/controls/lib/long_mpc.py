@@ -1,6 +1,6 @@
 """Longitudinal model-predictive control: follows one lead vehicle.
 
-The optimal control problem, the rules around it and their constants are those of openpilot v0.4.2.
+Problem, rules and constants are those of openpilot v0.4.2.
 """
 
 from array import array
@@ -83,7 +83,6 @@ class LongitudinalMpc:
             self._discard(v_ego, a_ego)
 
     def _follow(self, lead: LeadData) -> tuple[float, float, float, float]:
-        """The lead's position, speed, acceleration, and the decay of its acceleration."""
         x, v, a = lead.d_rel, max(0.0, lead.v_lead), lead.a_lead_k
         if v < LEAD_STOPPED_SPEED or -a / 2 > v:  # stopped, or soon will be
             v = a = 0.0

@@ -1,6 +1,6 @@
 """The longitudinal optimal control problem: follow one lead vehicle.
 
-Its terms and their constants are those of openpilot v0.4.2.
+Terms and constants are those of openpilot v0.4.2.
 """
 
 import math

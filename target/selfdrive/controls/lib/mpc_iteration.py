@@ -16,10 +16,7 @@ class Buffers(Protocol):
 
 
 class Solver(Protocol):
-    """One iteration as a function with three arguments and three results (see `build_solver`).
-
-    This is the part of a CasADi function's interface that is used.
-    """
+    """One iteration as a function with three arguments and three results (see `build_solver`)."""
 
     def size1_in(self, i: int) -> int:
         """Length of argument `i`."""

@@ -1,8 +1,7 @@
 """Generates a part of `mpc.c`. Run `python -m selfdrive.controls.lib.mpc_parts` after changing a problem.
 
-The part is what CasADi derives from each optimal control problem, one statement per operation, in order: an
-RK4 step, the residuals of stages and end, and their derivatives. With a new CasADi, the tests of
-`compiled_mpc` show whether the rest of `mpc.c` still gives the same bits.
+The part is what CasADi derives from each optimal control problem, one statement per operation, in order. With
+a new CasADi, the tests of `compiled_mpc` show whether the rest of `mpc.c` still gives the same bits.
 """
 
 from collections.abc import Iterator
@@ -55,7 +54,6 @@ def _of(ocp: Ocp) -> Iterator[str]:
 
 
 def _over(a: ca.SX, factor: float) -> ca.SX:
-    """The other factor of each element of `a` that is a product with `factor`."""
     of_product = ca.SX(a.shape[0], a.shape[1])
     for i, j in zip(*a.sparsity().get_triplet(), strict=True):
         element = a[i, j]
@@ -65,7 +63,6 @@ def _over(a: ca.SX, factor: float) -> ca.SX:
 
 
 def _under(c: ca.SX) -> ca.SX:
-    """The divisor of each element of `c` that is a quotient 1/x."""
     of_quotient = ca.SX(c.shape[0], c.shape[1])
     for i, j in zip(*c.sparsity().get_triplet(), strict=True):
         element = c[i, j]

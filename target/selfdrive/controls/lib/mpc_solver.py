@@ -1,8 +1,8 @@
 """One real-time iteration of nonlinear model-predictive control, built with CasADi.
 
-The scheme is that of ACADO's generated code, which the original controller used: multiple shooting with RK4,
-Gauss-Newton Hessian, states eliminated (condensing), one quadratic program, full step. DAQP solves the
-program and is set up anew in every call, so a solver is stateless.
+As in ACADO's generated code, which the original controller used: multiple shooting with RK4, Gauss-Newton
+Hessian, states eliminated (condensing), one quadratic program, full step. DAQP is set up anew in every call,
+so a solver is stateless.
 """
 
 import math

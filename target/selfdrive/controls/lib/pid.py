@@ -67,7 +67,6 @@ class PIController:
         return self._convert(control, speed) if self._convert else control
 
     def _integrate(self, error: float, speed: float) -> None:
-        """Integrate, unless that would push further into a limit."""
         integral = self.i + error * interp(speed, *self._ki) * DT_CTRL
         control = self._output(integral, speed)
         up_ok = error >= 0.0 and (control <= self.pos_limit or integral < 0.0)

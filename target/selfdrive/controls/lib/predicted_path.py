@@ -20,7 +20,7 @@ def steering_curve(curvature: float) -> Curve:
     """The circle (curvature in 1/m) that the steering wheel describes."""
 
     def curve(x: float) -> tuple[float, float]:
-        # limits how sharp a turn can be
+        # limited to the circle's extent
         angle = asin(clip(x * curvature, -0.999, 0.999))
         return x * tan(angle / 2.0), tan(angle)
 

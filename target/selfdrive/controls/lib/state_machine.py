@@ -86,7 +86,6 @@ class StateMachine:
             self._cycles_left = SOFT_DISABLE_CYCLES
 
     def _harden(self, events: Sequence[Event]) -> None:
-        """Return to ENABLED if the reason is gone; disengage if the time is up."""
         if not has_kind(events, SOFT_DISABLE):
             self.state = ENABLED
         elif self._cycles_left == 0:

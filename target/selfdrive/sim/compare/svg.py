@@ -90,7 +90,6 @@ def _path(x: np.ndarray, y: np.ndarray) -> str:
 
 
 def _scale(lines: tuple[Line, ...]) -> tuple[float, float, float]:
-    """Lowest and highest value of the axis, at least 0.1 apart, and its tick distance."""
     finite = np.concatenate([line.values[np.isfinite(line.values)] for line in lines] or [np.zeros(1)])
     if not finite.size:
         finite = np.zeros(1)

@@ -1,7 +1,6 @@
 """Reference traces as CSV: a header, then a row for each time; cells without a published value are empty.
 
-Row `time` = t is the state after the simulation step that began at t, as in trace.npz. Every column maps to a
-recorder channel. 20 Hz is usual; any multiple of 10 ms is accepted.
+Row `time` = t is the state after the simulation step that began at t. Any multiple of 10 ms is accepted.
 """
 
 import csv

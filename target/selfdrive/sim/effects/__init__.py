@@ -1,9 +1,8 @@
-"""Weather, dirt and light between the road and the camera's picture.
+"""Weather, dirt and light between the road and the camera's picture; only faults import this package.
 
-Only faults import this package. There are three presets: the paper's effects with its parameters (PaperRain,
-PaperFog, PaperSnow, PaperOcclusion, and the tone changes), those as its authors coded them (CodedRain,
-CodedFog, CodedSnow, CodedOcclusion, and the same tone changes), and physical ones in real units (Fog, Rain,
-Snow, LensMud, SunGlare, LowLight).
+There are three presets: the paper's effects with its parameters (PaperRain and others), those as its authors
+coded them (CodedRain and others), and physical ones in real units (Fog, Rain, Snow, LensMud, SunGlare,
+LowLight).
 """
 
 from selfdrive.sim.effects.air import Fog

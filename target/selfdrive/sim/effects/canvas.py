@@ -1,4 +1,4 @@
-"""Draws thousands of soft specks and streaks at once; tiles that repeat."""
+"""Draws many soft specks and streaks at once; tiles that repeat."""
 
 from collections.abc import Callable
 

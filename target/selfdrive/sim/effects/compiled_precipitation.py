@@ -112,7 +112,6 @@ class CompiledCover(Cover):
 def _veiled(
     library: compiled.Library, picture: np.ndarray, veil: np.ndarray, taken: np.ndarray, light: float
 ) -> np.ndarray:
-    """`veiled` in compiled C."""
     code = library.code.veiled
     code.argtypes = [_POINTER, _LONG, _POINTER, _LONG, _POINTER, _LONG, _LONG, _FLOAT, _FLOAT, _POINTER]
     code.restype = None
@@ -124,7 +123,6 @@ def _veiled(
 
 
 def _shrunk(library: compiled.Library, picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """`shrunk` in compiled C."""
     columns, rows = size
     if picture.shape != (COARSE * rows, COARSE * columns):
         return shrunk(picture, size)

@@ -1,7 +1,6 @@
 """The base of image effects: seeded, pure changes of the camera's grey picture.
 
-Grey levels are treated as proportional to light, as machine-vision cameras deliver them, so the laws of
-optics apply directly.
+Grey levels are proportional to light, as in machine-vision cameras, so the laws of optics apply directly.
 """
 
 from abc import ABC, abstractmethod

@@ -258,7 +258,6 @@ def write(out: Path) -> None:
 
 
 def _real(folder: Path, kind: type[Effect]) -> list[dict[str, str]]:
-    """The rows of an effect in the table of real frames, by level; empty without that table."""
     path = folder / REAL
     if not path.exists():
         return []

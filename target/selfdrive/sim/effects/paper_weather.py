@@ -19,7 +19,7 @@ from selfdrive.sim.effects.compiled_gaussian import build_gaussian
 from selfdrive.sim.effects.effect import WHITE, Effect, Scene
 from selfdrive.sim.picture import Picture, Region
 
-HAZE = 0.9, 0.4  # remaining share of contrast in fog, and the density of the fog behind snow
+HAZE = 0.9, 0.4  # remaining share of contrast in fog, and behind snow
 STREAKS = 1000  # per thickness: 10,000 at thickness 10
 # m: largest distance at which a drop makes a streak; with it, levels 1 to 10 are light to violent rain
 REACH = 2.2

@@ -89,7 +89,6 @@ class Particles:
         return moved - np.floor(moved)
 
     def _driven(self, scene: Scene, tall: float, along: float) -> np.ndarray:
-        """Share of each box by which driving moves its particles, float32."""
         driven = (along / tall * scene.position / self._reaches) % 1.0  # in double precision at any distance
         return driven.astype(np.float32)
 

@@ -66,7 +66,6 @@ class RoadGauge:
         return float(np.nanmean(differences))
 
     def _mark_edge(self, picture: np.ndarray) -> float:
-        """Median over rows of the strongest horizontal gradient near a line."""
         edges = self._edges(picture)
         width = picture.shape[1]
         reach = np.arange(-12, 13)

@@ -78,7 +78,6 @@ def _range(extinction: float) -> float:
 
 
 def _where(count: Callable[[float], float], wanted: float, least: float, most: float) -> float:
-    """The rate at which an increasing count is nearest to `wanted`."""
     for _ in range(HALVINGS):
         middle = 0.5 * (least + most)
         least, most = (middle, most) if count(middle) < wanted else (least, middle)

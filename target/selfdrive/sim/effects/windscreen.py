@@ -97,7 +97,6 @@ class Windscreen:
         return seen
 
     def _landing(self, region: Region, columns: int) -> list[tuple[Pixels, Pixels]]:
-        """The sets of drops in a region; cached, because a run always requests the same one."""
         if region != self._region:
             self._seen = [tuple(part.within(region, columns) for part in drops) for drops in self._sets]
             self._region = region

@@ -56,7 +56,6 @@ class BirdsEye:
                 pen.stroke(strip, self._places([start, start + DASH], [y, y]), PAINT, FAR_LINE_WIDTH)
 
     def _draw_seen(self, strip: np.ndarray, frame: Frame) -> None:
-        """Draw seen lines and planned path relative to the true lane, without the road's bends."""
         seen = [line for line in (frame.lines or {}).values() if line.drawable]
         lines = [(line.y, pen.line_colour(line.prob), LINE_WIDTH) for line in seen]
         if np.isfinite(frame.plan).all():
@@ -68,7 +67,6 @@ class BirdsEye:
     def _draw_car(
         self, strip: np.ndarray, front: float, offset: float, heading: float, colour: pen.Colour
     ) -> None:
-        """Draw a car with its front bumper at `front` m; its windscreen shows the direction."""
         for x, y, tone in (
             ([0.0, 0.0, -LENGTH, -LENGTH], 1.0, colour),
             ([-1.2, -1.2, -1.9, -1.9], 0.8, pen.PAPER),

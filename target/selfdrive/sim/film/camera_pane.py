@@ -45,7 +45,6 @@ class CameraPane:
         return pane
 
     def _picture(self, frame: Frame) -> np.ndarray:
-        """The detector's grey picture with the lead, or the road in colour if there is none."""
         grey = frame.image()
         if grey is None:
             picture = self._road.colour(frame.position, -frame.middle, frame.heading)
@@ -91,7 +90,6 @@ class CameraPane:
             pen.glaze(pane, self._strip(line.y, LINE_HALF), pen.line_colour(line.prob), LINE_SHARE)
 
     def _draw_leads(self, pane: np.ndarray, frame: Frame) -> None:
-        """Frame the lead, with its distance, and the camera's message if it differs."""
         told = frame.camera_lead
         if frame.d_rel is not None:
             self._frame_lead(pane, frame, frame.d_rel, pen.INK, f"{frame.d_rel:.1f} m")
@@ -120,12 +118,10 @@ class CameraPane:
         pen.tag(pane, label, (right + 8, top + 10), colour)
 
     def _sideways(self, frame: Frame, distance: float) -> float:
-        """The lane's shift to the left (m) in view at `distance`."""
         beyond = max(0.0, distance - KNOTS[-1]) * (frame.bend[-1] - frame.bend[-2]) / (KNOTS[-1] - KNOTS[-2])
         return float(np.interp(distance, KNOTS, frame.bend)) + beyond
 
     def _strip(self, knots: Sequence[float], half: float) -> np.ndarray:
-        """The outline of a strip of road along a line given at KNOTS."""
         y = np.interp(self._x, KNOTS, knots)
         sides = [self._seen_at(self._x, y + half), self._seen_at(self._x, y - half)[::-1]]
         return np.concatenate(sides)

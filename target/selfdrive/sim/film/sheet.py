@@ -127,7 +127,6 @@ def _lines_seen(frame: Frame) -> tuple[str, pen.Colour]:
 
 
 def _bar(pane: np.ndarray, foot: int, text: str, colour: pen.Colour, ink: pen.Colour) -> int:
-    """Draw a bar of text across the pane that ends at row `foot`; return its first row."""
     top = foot - 30
     layer = np.full((30, pane.shape[1], 3), colour, np.uint8)
     cv2.addWeighted(layer, 0.9, pane[top:foot], 0.1, 0.0, dst=pane[top:foot])
