@@ -69,10 +69,9 @@ def test_a_campaign_is_read(tmp_path: Path) -> None:
         ("seed: 3", "seed: 3\nseed: 4", 15, "duplicate key"),
     ],
 )
-def test_mistakes_are_told_with_their_line(
+def test_mistakes_are_reported_with_their_line(
     tmp_path: Path, old: str, new: str, line: int | None, told: str
 ) -> None:
-    """A mistake is reported with the file, the line, and the text found."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT.replace(old, new))
     with pytest.raises(MutatorError, match=re.escape(told)) as error:
@@ -82,8 +81,7 @@ def test_mistakes_are_told_with_their_line(
     assert line is None or error.value.line == line
 
 
-def test_the_campaigns_that_ship_are_read(clone: Workspace) -> None:
-    """Every campaign of the shipped library loads, and its name is that of its file."""
+def test_every_shipped_campaign_loads(clone: Workspace) -> None:
     names = clone.campaigns
     assert "quickstart" in names
     for name in names:
@@ -102,7 +100,7 @@ def in_library(toycar: Workspace, old: str, new: str) -> Path:
     return path
 
 
-def test_one_arming_time_is_for_every_reading(toycar: Workspace) -> None:
+def test_a_single_arming_time_applies_to_every_reading(toycar: Workspace) -> None:
     path = in_library(toycar, "{as_described: 1.5, as_coded: 0.0}", "1.25")
     campaign = load_campaign(path)
     check_readings(campaign, toycar.readings())
@@ -148,7 +146,7 @@ def test_a_setting_may_differ_by_reading(toycar: Workspace) -> None:
         ),
     ],
 )
-def test_readings_are_those_of_the_library(
+def test_readings_must_be_those_of_the_library(
     toycar: Workspace, old: str, new: str, line: int, told: str
 ) -> None:
     path = in_library(toycar, old, new)
@@ -158,8 +156,7 @@ def test_readings_are_those_of_the_library(
     assert any(told in str(problem) for problem in check_library(toycar, "toycar"))
 
 
-def test_a_setting_that_is_none_is_told_by_its_reading(toycar: Workspace) -> None:
-    """For each reading, a plan looks up only that reading's changes in the manifest."""
+def test_a_plan_looks_up_only_the_changes_of_its_reading(toycar: Workspace) -> None:
     text = "setting: {as_described: [], as_coded: [upside_down]}\nmethods:"
     path = in_library(toycar, "methods:", text)
     make_plan(toycar, path)
@@ -167,9 +164,8 @@ def test_a_setting_that_is_none_is_told_by_its_reading(toycar: Workspace) -> Non
         make_plan(toycar, path, Choices(reading="as_coded"))
 
 
-def test_a_study_that_is_not_installed_is_refused(toycar: Workspace, tmp_path: Path) -> None:
-    """An unknown study is refused with its line and the available studies. By default, a campaign has no
-    study."""
+def test_an_unknown_study_is_refused_with_its_line(toycar: Workspace, tmp_path: Path) -> None:
+    """By default, a campaign has no study."""
     path = tmp_path / "mine.yaml"
     path.write_text(TEXT)
     assert make_plan(toycar, path).campaign.study is None

@@ -24,7 +24,7 @@ from mutator.workspace import Workspace
         ("", 3, ()),
     ],
 )
-def test_cut(groups: str, size: int, lengths: tuple[int, ...]) -> None:
+def test_a_plan_is_divided_into_chunks(groups: str, size: int, lengths: tuple[int, ...]) -> None:
     assert cut(groups, size) == lengths
 
 
@@ -39,9 +39,8 @@ def test_everything_is_pending_at_first(folder: RunFolder) -> None:
     assert sum(len(item.places) for item in left) == 24
 
 
-def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Record]) -> None:
-    """An experiment with a record is not pending, unless the record is a harness error. Complete chunks
-    are left out."""
+def test_an_experiment_with_a_record_is_not_pending(folder: RunFolder, record: Callable[..., Record]) -> None:
+    """A harness error stays pending. Complete chunks are left out."""
     faults = read_faults(folder.path)
     chunks = [read_chunk(folder.path, chunk, faults) for chunk in folder.head["chunks"]]
     records = {e.id: record(e.id) for e in (*chunks[0], chunks[1][1], chunks[2][0])}
@@ -53,8 +52,7 @@ def test_what_has_a_record_is_not(folder: RunFolder, record: Callable[..., Recor
     assert len(left) == 7
 
 
-def test_a_chunk_is_read_alone(folder: RunFolder) -> None:
-    """The bytes of each chunk hold its experiments, and all chunks together hold the plan."""
+def test_all_chunks_together_hold_the_plan(folder: RunFolder) -> None:
     faults = read_faults(folder.path)
     found = [e.id for chunk in folder.head["chunks"] for e in read_chunk(folder.path, chunk, faults)]
     assert len(found) == len(set(found)) == 24

@@ -11,8 +11,8 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> None:
-    """A frozen plan is read back equal, and plan.csv is written next to it."""
+def test_a_frozen_plan_is_read_back_equal(toycar: Workspace, tmp_path: Path) -> None:
+    """plan.csv is written next to it."""
     plan = make_plan(toycar, "toy", Choices(limit=9))
     folder = freeze(plan, tmp_path / "run", toycar)
     back = load_plan(folder)
@@ -23,8 +23,7 @@ def test_a_frozen_plan_is_read_as_it_was(toycar: Workspace, tmp_path: Path) -> N
     assert rows[0]["condition"] == plan.experiments[0].trigger.condition
 
 
-def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> None:
-    """The same plan may be frozen again; a different plan is refused."""
+def test_only_the_same_plan_may_be_frozen_again(toycar: Workspace, tmp_path: Path) -> None:
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
     before = {p: p.stat().st_mtime_ns for p in (tmp_path / "run").rglob("*") if p.name != "owner.lock"}
     freeze(make_plan(toycar, "toy"), tmp_path / "run", toycar)
@@ -34,8 +33,7 @@ def test_freezing_again_changes_nothing(toycar: Workspace, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("path", ["tree/toycar/driver.py", "templates/offset.py.j2"])
-def test_changed_sources_are_refused(toycar: Workspace, tmp_path: Path, path: str) -> None:
-    """A run does not resume if its plan was made with another target or other templates."""
+def test_a_run_does_not_resume_with_changed_sources(toycar: Workspace, tmp_path: Path, path: str) -> None:
     plan = make_plan(toycar, "toy")
     freeze(plan, tmp_path / "run", toycar)
     with (toycar.library.parent / path).open("a") as file:
@@ -44,8 +42,7 @@ def test_changed_sources_are_refused(toycar: Workspace, tmp_path: Path, path: st
         freeze(plan, tmp_path / "run", toycar)
 
 
-def test_a_folder_with_other_things_is_left_alone(toycar: Workspace, tmp_path: Path) -> None:
-    """A file is refused, and so is a non-empty folder that is not a run folder."""
+def test_other_files_and_folders_are_refused(toycar: Workspace, tmp_path: Path) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "thesis.tex").touch()
     for place in ("full", "full/thesis.tex"):
@@ -54,18 +51,14 @@ def test_a_folder_with_other_things_is_left_alone(toycar: Workspace, tmp_path: P
     assert [p.name for p in (tmp_path / "full").iterdir()] == ["thesis.tex"]
 
 
-def test_a_freeze_that_was_killed_is_done_again(toycar: Workspace, tmp_path: Path) -> None:
-    """A folder in which freezing was interrupted accepts the plan."""
+def test_an_interrupted_freeze_can_be_repeated(toycar: Workspace, tmp_path: Path) -> None:
     plan = make_plan(toycar, "toy")
     freeze(plan, tmp_path / "run", toycar)
     (tmp_path / "run" / "run.json").rename(tmp_path / "run" / ".run.json.4711")
     assert freeze(plan, tmp_path / "run", toycar).planned == 24
 
 
-def test_a_limit_of_space_is_part_of_a_plan_where_it_is_not_the_default(
-    toycar: Workspace, tmp_path: Path
-) -> None:
-    """The default of `disk_mb`, written out, changes neither the plan's digest nor its head."""
+def test_a_disk_limit_at_its_default_does_not_change_the_plan(toycar: Workspace, tmp_path: Path) -> None:
     path = toycar.campaign("small")
     text = path.read_text()
     before = freeze(make_plan(toycar, "small"), tmp_path / "0", toycar)

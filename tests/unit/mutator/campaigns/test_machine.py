@@ -17,16 +17,15 @@ def git(folder: Path, *words: str) -> None:
     subprocess.run(["git", "-C", folder, *IDENTITY, *words], env=clean, check=True, capture_output=True)
 
 
-def test_required_packages_are_those_of_the_harness_and_theirs() -> None:
-    """The list has mutator's requirements and their requirements, by canonical name. It has neither
-    mutator's extras nor mutator."""
+def test_required_packages_include_indirect_ones() -> None:
+    """They have canonical names. mutator and its extras are left out."""
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found
 
 
-def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package needed only on Windows, or only by an unused extra, is not a requirement."""
+def test_requirements_that_do_not_apply_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Examples are packages for Windows, or for an unused extra."""
     told = {
         "mutator": ("1", ["a[fast]>=1", "w; sys_platform == 'win32'", "t; extra == 'test'"]),
         "a": ("1", ["b", "c; extra == 'fast'", "d; extra == 'slow'", "gone"]),
@@ -36,25 +35,24 @@ def test_requirements_of_other_systems_do_not_count(monkeypatch: pytest.MonkeyPa
     assert machine.required() == {"a", "b", "c"}
 
 
-def test_where_mutator_is_not_installed_every_package_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_an_installed_mutator_every_package_is_listed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(machine, "_installed", lambda: {"numpy": ("1", []), "stranger": ("2", [])})
     assert machine.required() == {"numpy", "stranger"}
 
 
-def test_versions_are_those_installed() -> None:
-    """The version is the one in the package's metadata. A missing package has no version."""
+def test_versions_come_from_package_metadata() -> None:
+    """A missing package has no version."""
     found = machine.versions(["numpy", "no-such-package"])
     assert found == {"numpy": metadata.version("numpy"), "no-such-package": None}
 
 
-def test_modules_are_named_by_their_packages() -> None:
+def test_modules_are_reported_by_package() -> None:
     """A module's name may differ from its package's name. Modules without a package are left out."""
     assert machine.packages_of(["yaml", "_yaml", "cv2", "nosuch"]) == ("opencv-python-headless", "pyyaml")
 
 
-def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """BLAS uses one thread regardless of the user's environment, because the target's process gets a fixed
-    environment."""
+def test_blas_uses_one_thread_in_any_environment(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The target's process gets a fixed environment."""
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     machine.blas.cache_clear()
     (library,) = machine.blas()
@@ -62,16 +60,13 @@ def test_blas_is_that_of_the_targets_process(monkeypatch: pytest.MonkeyPatch) ->
     assert set(machine.threads().values()) == {"1"} and "OPENBLAS_NUM_THREADS" in machine.threads()
 
 
-def test_the_processor_is_named() -> None:
-    """The processor's model is read from /proc/cpuinfo, if the file has one."""
+def test_the_processor_model_is_read_from_cpuinfo() -> None:
     lines = Path("/proc/cpuinfo").read_text().splitlines()
     models = {line.partition(":")[2].strip() for line in lines if line.startswith("model name")}
     assert not models or machine.cpu() in models
 
 
-def test_the_state_of_a_clone(tmp_path: Path) -> None:
-    """The commit is reported with whether that folder has changes. Changes elsewhere in the clone do not
-    count."""
+def test_only_changes_in_the_folder_itself_make_a_commit_dirty(tmp_path: Path) -> None:
     library, other = tmp_path / "library", tmp_path / "other"
     for folder in (library, other):
         folder.mkdir()
@@ -88,6 +83,6 @@ def test_the_state_of_a_clone(tmp_path: Path) -> None:
     assert machine.clone_state(library) == found | {"changed": True}
 
 
-def test_without_git_nothing_is_said(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_git_there_is_no_commit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert machine.clone_state(Path(__file__).parent) is None

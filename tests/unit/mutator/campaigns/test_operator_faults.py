@@ -22,7 +22,7 @@ ENTRY = "  - {operators: [arithmetic, branch], in: ['toycar/driver.py::Driver.*'
 
 @pytest.fixture(autouse=True)
 def lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Replace the executed lines of a golden run by the driver's lines 1 to 16, so that nothing is run."""
+    """Replace the executed lines of a golden run by lines 1 to 16 of the driver, so that nothing is run."""
 
     def known(manifest: TargetManifest, drives: Sequence[GoldenDrive], limits: Limits) -> list[Executed]:
         return [{"toycar/driver.py": frozenset(range(1, 17))} for _ in drives]
@@ -64,17 +64,16 @@ def test_mutants_are_permanent_and_transient(toycar: Workspace, campaign: Path) 
     assert "in lines that no golden run executes" in told
 
 
-def test_a_run_folder_keeps_what_was_left_out(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
-    """The frozen plan stores the list of what was left out. A plan without operators does not have this
-    key."""
+def test_the_frozen_plan_lists_left_out_mutants(toycar: Workspace, campaign: Path, tmp_path: Path) -> None:
+    """A plan without operators does not have this key."""
     plan = make_plan(toycar, campaign)
     folder = freeze(plan, tmp_path / "run", toycar)
     assert load_plan(folder).told == plan.told == tuple(folder.head["operators"])
     assert "operators" not in freeze(make_plan(toycar, "small"), tmp_path / "other", toycar).head
 
 
-def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
-    """`when` selects only permanent or only transient mutants; context rows and specs are planned as well."""
+def test_when_selects_permanent_or_transient_mutants(toycar: Workspace, campaign: Path) -> None:
+    """Context rows and specs are planned as well."""
     _edited(campaign, "sample: 12}", "sample: 2, when: [permanent]}\n  - spec: sensor/silence/no_data")
     kinds = Counter((one.fault.module, one.trigger.name) for one in make_plan(toycar, campaign).experiments)
     assert kinds == {("operators", "always"): 2, ("sensor", "random/always"): 1}
@@ -85,14 +84,14 @@ def test_a_selection_says_when(toycar: Workspace, campaign: Path) -> None:
     assert kinds[("operators", "near")] == 2 == kinds[("operators", "far")]
 
 
-def test_selections_of_the_same_mutants_come_together(toycar: Workspace, campaign: Path) -> None:
+def test_selections_of_the_same_mutants_are_merged(toycar: Workspace, campaign: Path) -> None:
     both = {one.id for one in make_plan(toycar, campaign).experiments}
     entry = ENTRY.removesuffix("}")
     _edited(campaign, ENTRY, "\n".join(f"{entry}, when: [{name}]}}" for name in ("permanent", "transient")))
     assert {one.id for one in make_plan(toycar, campaign).experiments} == both
 
 
-def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
+def test_another_seed_draws_other_mutants(toycar: Workspace, campaign: Path) -> None:
     drawn = [
         {one.fault.id for one in make_plan(toycar, campaign, Choices(seed=seed)).experiments}
         for seed in (3, 4)
@@ -100,8 +99,8 @@ def test_another_seed_draws_others(toycar: Workspace, campaign: Path) -> None:
     assert drawn[0] != drawn[1] and len(drawn[0]) == len(drawn[1])
 
 
-def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
-    """Each operator has one group for each function, regardless of which mutants were drawn."""
+def test_review_groups_do_not_depend_on_the_draw(toycar: Workspace, campaign: Path) -> None:
+    """Each operator has one group for each function."""
 
     def groups(plan: Plan) -> dict[str, object]:
         return {one.what: one.bound for one in of_plan(toycar, plan) if ": operator" in one.what}
@@ -127,8 +126,7 @@ def test_review_groups_are_few(toycar: Workspace, campaign: Path) -> None:
         ("seed: 3", "seed: 3\nsample: 4\nproportional: true", "use their own `sample`"),
     ],
 )
-def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: str) -> None:
-    """Contradictions and unknown terms are reported with file and line."""
+def test_a_wrong_selection_is_refused_with_its_line(campaign: Path, old: str, new: str, said: str) -> None:
     with pytest.raises(MutatorError, match=r"operators\.yaml:\d+") as caught:
         load_campaign(_edited(campaign, old, new))
     assert said in str(caught.value)
@@ -142,8 +140,10 @@ def test_a_wrong_selection_is_refused(campaign: Path, old: str, new: str, said: 
         ("toycar/sensing.py", "no mutant in toycar/sensing.py"),
     ],
 )
-def test_a_place_without_mutants_is_refused(toycar: Workspace, campaign: Path, place: str, said: str) -> None:
-    """A place that does not exist, or that no golden run reaches, is reported at the selection's line."""
+def test_a_place_without_mutants_is_refused_with_its_line(
+    toycar: Workspace, campaign: Path, place: str, said: str
+) -> None:
+    """The place does not exist, or no golden run reaches it."""
     _edited(campaign, "toycar/driver.py::Driver.*", place)
     with pytest.raises(MutatorError, match=r"operators\.yaml:7: ") as caught:
         make_plan(toycar, campaign)

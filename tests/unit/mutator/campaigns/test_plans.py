@@ -27,8 +27,7 @@ def pair_key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 def test_guided_and_random_are_matched_pairs(whole: Workspace) -> None:
-    """Every guided experiment has exactly one random partner with the same scenario, fault and row, and
-    vice versa."""
+    """Partners have the same scenario, fault and row."""
     experiments = make_plan(whole, "toy").experiments
     guided = Counter(pair_key(e) for e in experiments if e.method is Method.GUIDED)
     random = Counter(pair_key(e) for e in experiments if e.method is Method.RANDOM)
@@ -61,8 +60,7 @@ def test_random_times_differ_between_rows_and_scenarios(whole: Workspace) -> Non
 
 
 def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    """Ids, order, chunks and digest depend on the campaign, the library and the seed, and not on the
-    location."""
+    """Ids, order, chunks and digest do not depend on the location."""
     plan = make_plan(toycar, "toy")
     elsewhere = make_plan(copy_toycar(tmp_path / "elsewhere"), "toy")
     assert (plan.experiments, plan.chunks, plan.digest) == (
@@ -76,7 +74,6 @@ def test_the_same_seed_gives_the_same_plan(toycar: Workspace, copy_toycar, tmp_p
 
 
 def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
-    """The id of an experiment depends on the scenario's content."""
     before = make_plan(toycar, "toy")
     with toycar.scenario("A").open("a") as file:
         file.write("\n")
@@ -85,7 +82,7 @@ def test_a_changed_scenario_changes_the_ids(toycar: Workspace) -> None:
         assert (one.id == other.id) == (one.scenario != "A")
 
 
-def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
+def test_experiments_with_the_same_golden_run_are_adjacent(whole: Workspace) -> None:
     plan = make_plan(whole, "toy")
     keys = [(e.scenario, e.fault.changes) for e in plan.experiments]
     assert len(dict.fromkeys(keys)) == 1 + sum(a != b for a, b in pairwise(keys))
@@ -97,9 +94,8 @@ def test_runs_of_one_golden_stand_together(whole: Workspace) -> None:
     assert first == len(keys)
 
 
-def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
-    """A campaign's setting applies to every run once, including the canary and the golden runs, and
-    changes the ids."""
+def test_a_setting_applies_to_all_runs(whole: Workspace) -> None:
+    """The canary and the golden runs have the setting, too. It changes the ids."""
     before = make_plan(whole, "toy")
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("faults:", "setting: [alone]\nfaults:", 1))
@@ -114,7 +110,7 @@ def test_a_setting_holds_for_all_experiments(whole: Workspace) -> None:
 
 
 def test_filters_and_limit(whole: Workspace) -> None:
-    """`--only` keeps experiments, `--exclude` drops them, and `--limit` takes an even sample of the rest."""
+    """`--limit` takes an even sample of what the filters keep."""
     plan = make_plan(
         whole, "toy", Choices(only='scenario == "A"', exclude='method == "random" or value > 60', limit=5)
     )
@@ -126,7 +122,7 @@ def test_filters_and_limit(whole: Workspace) -> None:
 
 
 def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
-    """A limited plan of both methods has complete pairs, as paired statistics require."""
+    """Paired statistics require complete pairs."""
     plan = make_plan(whole, "toy", Choices(limit=10))
     keys = Counter(
         (e.fault.id, e.scenario, e.trigger.name.removeprefix("random/"), e.seed) for e in plan.experiments
@@ -144,8 +140,8 @@ def test_a_limit_keeps_guided_and_random_pairs(whole: Workspace) -> None:
         ({"reading": "as_dreamt"}, "as_dreamt"),
     ],
 )
-def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> None:
-    """Invalid options are reported before any fault is expanded."""
+def test_invalid_options_are_reported(toycar: Workspace, choices: dict, told: str) -> None:
+    """No fault is expanded before."""
     with pytest.raises(MutatorError, match=told):
         make_plan(toycar, "toy", Choices(**choices))
 
@@ -163,10 +159,9 @@ def test_wrong_choices_are_told(toycar: Workspace, choices: dict, told: str) -> 
         ("scenario: A", "scenario: Z", 15, "no scenario 'Z'"),
     ],
 )
-def test_names_that_do_not_exist_are_told(
+def test_an_unknown_name_is_reported_with_its_line(
     toycar: Workspace, old: str, new: str, line: int, told: str
 ) -> None:
-    """An unknown name is reported with the campaign's file and line."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace(old, new))
     with pytest.raises(MutatorError) as error:
@@ -175,9 +170,8 @@ def test_names_that_do_not_exist_are_told(
     assert (error.value.where, error.value.line) == (str(path), line)
 
 
-def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
-    """A campaign cannot use a scenario file from outside the library. A file in a subfolder of the library
-    is allowed."""
+def test_scenarios_must_be_inside_the_library(toycar: Workspace) -> None:
+    """A subfolder of the library is allowed."""
     path, file = toycar.campaign("toy"), toycar.scenario("A")
     text = path.read_text()
     path.write_text(text.replace("[A, B]", f"[A, {file}]"))
@@ -189,15 +183,15 @@ def test_scenarios_are_the_librarys(toycar: Workspace) -> None:
     assert {e.scenario for e in make_plan(toycar, "toy").experiments} == {"more/C"}
 
 
-def test_faults_for_a_time(toycar: Workspace) -> None:
-    """With `hold_s` every fault, guided or random, stays active for that time after its trigger."""
+def test_hold_s_limits_every_fault(toycar: Workspace) -> None:
+    """Guided and random faults stay active for that time after their trigger."""
     path = toycar.campaign("toy")
     path.write_text(path.read_text().replace("  random_until_s", "  hold_s: 1.5\n  random_until_s"))
     triggers = {e.trigger for e in make_plan(toycar, "toy").experiments}
     assert {(trigger.hold, trigger.hold_s) for trigger in triggers} == {(Hold.FOR, 1.5)}
 
 
-def test_some_values_of_a_variant(whole: Workspace) -> None:
+def test_a_campaign_can_select_values_of_a_variant(whole: Workspace) -> None:
     path = whole.campaign("toy")
     path.write_text(path.read_text().replace("  - spec: sensor/*", "  - {spec: sensor/*, values: 2}"))
     faults = {e.fault.id: e.fault.spec for e in make_plan(whole, "toy").experiments}
@@ -209,8 +203,8 @@ def test_some_values_of_a_variant(whole: Workspace) -> None:
     }
 
 
-def test_cost_is_stated(toycar: Workspace) -> None:
-    """The expected time falls with the number of workers. A measured rate replaces the default one."""
+def test_the_expected_time_depends_on_workers_and_rate(toycar: Workspace) -> None:
+    """A measured rate replaces the default one."""
     plan = make_plan(toycar, "toy")
     one, two = plan.cost(1), plan.cost(2)
     assert one.cpu_s == two.cpu_s > 0
@@ -225,9 +219,8 @@ def test_cost_is_stated(toycar: Workspace) -> None:
 BEYOND = ("software", "vision_weather")  # modules of unpublished faults
 
 
-def test_quickstart_shows_everything(clone: Workspace) -> None:
-    """The plan has 60 experiments: every published variant, guided and random, in every scenario and
-    context."""
+def test_quickstart_plans_every_published_variant(clone: Workspace) -> None:
+    """The plan has 60 experiments: guided and random, in every scenario and context."""
     plan = make_plan(clone, "quickstart")
     experiments = plan.experiments
     variants = {f"{spec.name}/{v.name}" for spec in clone.specs() if spec.module not in BEYOND for v in spec}
@@ -271,8 +264,7 @@ def test_the_published_experiments_expand_in_both_readings(clone: Workspace, tmp
 def test_published_plans_keep_their_digests(
     clone: Workspace, campaign: str, reading: str, promised: str
 ) -> None:
-    """Every version computes the same digest of a cited plan, so the ids of its experiments are the same,
-    too."""
+    """Published results cite the digest and the ids."""
     assert make_plan(clone, campaign, Choices(reading=reading)).digest == promised
 
 

@@ -1,4 +1,4 @@
-"""What a session records about itself in run.json, and when a session is refused."""
+"""What a session records about itself in run.json, and when it is refused."""
 
 import json
 from collections.abc import Iterable
@@ -37,9 +37,9 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
     monkeypatch.setattr(machine, "versions", versions)
 
 
-def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -> None:
-    """A stretch stores Python, platform, processor, BLAS, threads, and the packages of the harness and of
-    golden runs."""
+def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
+    """These are Python, platform, processor, BLAS, threads, and the packages of the harness and of golden
+    runs."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]
@@ -50,13 +50,12 @@ def test_a_stretch_has_all_that_computes(folder: RunFolder, toycar: Workspace) -
 
 
 def _clone() -> dict[str, object] | None:
-    """Of the paths in a stretch, only the harness's may be in a clone, because the toy is a copy."""
+    """Only the harness's paths may be in a clone, because the toy is a copy."""
     state = machine.clone_state(Path(machine.__file__).parents[1])
     return {"mutator": state} if state else None
 
 
-def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
-    """A later session appends its stretch to run.json and changes nothing else in it."""
+def test_a_later_session_only_appends_to_run_json(folder: RunFolder, toycar: Workspace) -> None:
     before = json.loads((folder.path / "run.json").read_text())
     for session in ("0001-*", "0002-*"):
         begin_stretch(RunFolder.open(folder.path), toycar, records=session, accept=False)
@@ -65,7 +64,7 @@ def test_each_stretch_is_added(folder: RunFolder, toycar: Workspace) -> None:
     assert before.pop("stretches") == [] and before == after
 
 
-def test_before_anything_was_driven_any_version_will_do(
+def test_before_the_first_run_any_version_is_accepted(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     use(monkeypatch, numpy="2.1.0")
@@ -88,8 +87,7 @@ def test_other_versions_are_refused_unless_accepted(
     other: dict[str, str | None],
     told: str,
 ) -> None:
-    """The error lists the differences, which the user must resolve. If the user accepts them, the stretch
-    records them."""
+    """The error lists the differences. If the user accepts them, run.json records them."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     use(monkeypatch, **other)
     with pytest.raises(MutatorError) as caught:
@@ -112,11 +110,10 @@ def test_another_python_is_refused(
 
 
 @pytest.mark.parametrize("changed", ["cpu", "platform", "threads"])
-def test_another_machine_is_noted_and_not_refused(
+def test_another_machine_is_recorded_but_not_refused(
     folder: RunFolder, toycar: Workspace, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
-    """Processor, kernel and threads are only recorded. Golden runs show whether two machines compute the
-    same."""
+    """Golden runs show whether two machines compute the same."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     other = {"threads": {"OMP_NUM_THREADS": "8"}}.get(changed, "another")
     name = "platform.platform" if changed == "platform" else f"mutator.campaigns.machine.{changed}"

@@ -26,9 +26,9 @@ def many(experiment: Callable[..., Experiment]) -> list[Experiment]:
 
 
 @pytest.mark.parametrize("count", [6, 12, 24])
-def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count: int) -> None:
-    """A sample has equal numbers of each variant, method, scenario and trigger, regardless of the number
-    of values."""
+def test_a_sample_is_balanced(many: list[Experiment], count: int) -> None:
+    """Each variant, method, scenario and trigger appears equally often, regardless of the number of
+    values."""
     picked = pick(many, count, seed=1)
     assert len(picked) == count
     assert set(Counter(e.fault.spec for e in picked).values()) == {count // 3}
@@ -37,17 +37,16 @@ def test_each_variant_method_and_scenario_as_often(many: list[Experiment], count
         assert max(counts.values()) - min(counts.values()) <= 1
 
 
-def test_a_rare_variant_gives_way(many: list[Experiment]) -> None:
-    """If a variant has no experiments left, the other variants fill its share. No experiment is picked
-    twice."""
+def test_other_variants_fill_the_share_of_an_exhausted_one(many: list[Experiment]) -> None:
+    """No experiment is picked twice."""
     picked = pick(many, 60, seed=1)
     counts = Counter(e.fault.spec for e in picked)
     assert counts["radar/jamming/no_data"] == 8
     assert len({e.id for e in picked}) == 60
 
 
-def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> None:
-    """A seed always picks the same experiments in their original order. Another seed picks others."""
+def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> None:
+    """They keep their order. Another seed picks others."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))
@@ -55,7 +54,7 @@ def test_a_sample_keeps_the_order_and_repeats_itself(many: list[Experiment]) -> 
 
 
 @pytest.mark.parametrize("draw", [pick, pick_pairs])
-def test_runs_that_stop_are_a_sample_of_the_same_faults(
+def test_runs_that_stop_sample_the_same_faults(
     many: list[Experiment], draw: Callable[..., tuple[Experiment, ...]]
 ) -> None:
     stopping = [replace(experiment, after_hazard=AfterHazard.STOP) for experiment in many]
@@ -63,8 +62,7 @@ def test_runs_that_stop_are_a_sample_of_the_same_faults(
     assert [stopping.index(e) for e in draw(stopping, 11, seed=1)] == picked
 
 
-def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
-    """A sample as large as the plan is the whole plan."""
+def test_a_sample_as_large_as_the_plan_is_the_plan(many: list[Experiment]) -> None:
     assert pick(many, 1000, seed=1) == tuple(many)
 
 
@@ -72,14 +70,12 @@ def test_more_than_there_is_is_all(many: list[Experiment]) -> None:
     ("count", "wanted", "indices"),
     [(10, 1, [5]), (10, 2, [2, 7]), (3, 3, [0, 1, 2]), (2, 5, [0, 1]), (1, 1, [0])],
 )
-def test_values_are_spread(count: int, wanted: int, indices: list[int]) -> None:
-    """Values are taken evenly from a variant's range, each at most once."""
+def test_values_are_spread_evenly_over_the_range(count: int, wanted: int, indices: list[int]) -> None:
     assert spread(count, wanted) == indices
 
 
-def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experiment]) -> None:
-    """A sample of half has half of each fault type in each scenario, and every guided experiment with its
-    partner."""
+def test_in_proportion_takes_pairs_and_half_of_each_type(many: list[Experiment]) -> None:
+    """The sample is half of the plan, in each scenario."""
     picked = pick_in_proportion(many, 56, seed=1)
     assert len(picked) == len({e.id for e in picked}) == 56
     assert Counter(e.fault.spec for e in picked) == dict(zip(SPECS, (40, 4, 12), strict=True))
@@ -91,8 +87,8 @@ def test_in_proportion_takes_pairs_and_each_type_by_its_number(many: list[Experi
 
 @pytest.mark.parametrize("count", [2, 12, 24, 40, 54])
 def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
-    """Every guided experiment has its random partner. Variants, scenarios and rows are evenly spread, and
-    a seed picks the same experiments for any input order."""
+    """Variants, scenarios and rows are evenly spread, and a seed picks the same experiments for any input
+    order."""
     picked = pick_pairs(many, count, seed=1)
     assert len(picked) == count
     keys = {m: {key(e) for e in picked if e.method is m} for m in Method}
@@ -106,15 +102,14 @@ def test_pairs_stay_together(many: list[Experiment], count: int) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 11, 55])
-def test_an_odd_number_cuts_one_pair(many: list[Experiment], count: int) -> None:
-    """In a sample of odd size, one guided experiment has no partner."""
+def test_a_sample_of_odd_size_splits_one_pair(many: list[Experiment], count: int) -> None:
     picked = pick_pairs(many, count, seed=1)
     guided, random = ({key(e) for e in picked if e.method is m} for m in (Method.GUIDED, Method.RANDOM))
     assert len(picked) == count and len(guided - random) == 1 and random <= guided
 
 
 def test_without_partners_pairs_are_single_experiments(many: list[Experiment]) -> None:
-    """A sample of guided experiments only equals the result of `pick`."""
+    """The sample equals the result of `pick`."""
     guided = [e for e in many if e.method is Method.GUIDED]
     assert pick_pairs(guided, 9, seed=1) == pick(guided, 9, seed=1)
 
@@ -124,7 +119,7 @@ def key(experiment: Experiment) -> tuple[str, str, str]:
 
 
 @pytest.mark.parametrize("count", [10, 57])
-def test_in_proportion_refuses_what_does_not_come_out(many: list[Experiment], count: int) -> None:
-    """A sample is refused if its size is odd, or too small for a pair of each type in each scenario."""
+def test_in_proportion_refuses_sizes_that_do_not_divide(many: list[Experiment], count: int) -> None:
+    """A size must be even and give a pair of each type in each scenario."""
     with pytest.raises(ValueError, match="a multiple of 2, 12 or more"):
         pick_in_proportion(many, count, seed=1)

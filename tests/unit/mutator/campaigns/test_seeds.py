@@ -18,7 +18,7 @@ SEEDS = "seeds: {from: 3, to: 5}"
 
 @pytest.fixture
 def campaign(toycar: Workspace, tmp_path: Path) -> Callable[..., Path]:
-    """Write the campaign `small` with other lines in place of its seed."""
+    """Write the campaign `small` with other lines instead of its seed."""
 
     def write(lines: str = SEEDS, **more: str) -> Path:
         text = toycar.campaign("small").read_text()
@@ -36,10 +36,10 @@ def alone(workspace: Workspace, path: Path, seed: int, **chosen: int) -> Plan:
 
 
 @pytest.mark.parametrize("more", [{}, {"sample": "4"}], ids=["all", "sample"])
-def test_each_seed_plans_what_it_plans_alone(
+def test_several_seeds_plan_the_same_as_each_alone(
     toycar: Workspace, campaign: Callable[..., Path], more: dict[str, str]
 ) -> None:
-    """Experiments, chunks and runs are those of the single seeds in order. `--seed` selects one seed."""
+    """`--seed` selects one seed."""
     path = campaign(**more)
     plan, parts = make_plan(toycar, path), [alone(toycar, path, seed) for seed in (3, 4, 5)]
     assert plan.experiments == tuple(e for part in parts for e in part.experiments)
@@ -50,8 +50,7 @@ def test_each_seed_plans_what_it_plans_alone(
     assert parts[0].digest == make_plan(toycar, path).digest
 
 
-def test_a_limit_is_of_all_seeds(toycar: Workspace, campaign: Callable[..., Path]) -> None:
-    """A limit is the total number of experiments, spread over the seeds."""
+def test_a_limit_is_spread_over_the_seeds(toycar: Workspace, campaign: Callable[..., Path]) -> None:
     plan = make_plan(toycar, campaign(), Choices(limit=7))
     assert [sum(e.seed == seed for e in plan.experiments) for seed in (3, 4, 5)] == [3, 2, 2]
     assert {e.seed for e in make_plan(toycar, campaign(), Choices(limit=2)).experiments} == {3, 4}
@@ -66,10 +65,10 @@ def test_a_filter_may_leave_a_seed_without_experiments(
         make_plan(toycar, campaign(), Choices(only="seed == 9"))
 
 
-def test_each_seed_has_golden_runs_of_its_own(
+def test_each_seed_has_its_own_golden_runs(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """Each seed has separate golden runs, because a run draws from the seed even without a fault."""
+    """A run draws from the seed even without a fault."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     assert folder.seeds == range(3, 6)
     keys = {one.key for one in folder.goldens}
@@ -94,10 +93,9 @@ def test_a_plan_that_is_written_part_by_part_is_the_one_in_memory(
     assert (read.tally, read.goldens()) == (plan.tally, plan.goldens())
 
 
-def test_experiments_are_read_when_asked_for(
+def test_a_large_plan_loads_experiments_when_accessed(
     toycar: Workspace, campaign: Callable[..., Path], tmp_path: Path
 ) -> None:
-    """A large plan is a sequence that loads experiments when they are accessed."""
     folder = freeze(Planning(toycar, campaign()), tmp_path / "run", toycar)
     planned = plan_file.ExperimentsInOrder(folder.path, folder.head["chunks"])
     every = plan_file.read_all(folder.path)
@@ -120,10 +118,9 @@ def test_experiments_are_read_when_asked_for(
         ("seeds: 3", "seeds"),
     ],
 )
-def test_wrong_seeds_are_told(
+def test_invalid_seeds_are_reported_with_their_line(
     toycar: Workspace, campaign: Callable[..., Path], lines: str, said: str
 ) -> None:
-    """Invalid seeds are reported with file and line."""
     with pytest.raises(MutatorError) as told:
         make_plan(toycar, campaign(lines))
     assert re.search(said, str(told.value)) and "small.yaml:" in str(told.value)

@@ -25,11 +25,11 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
     return campaign
 
 
-def test_a_spec_file_is_found_from_the_campaign(
+def test_a_spec_file_is_found_relative_to_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Faults of a named spec file are added to the library's faults, from any current folder. The canary
-    may come from a spec file, too. Random times need a latest time; guided triggers do not."""
+    """Its faults are added to the library's, from any current folder. The canary may come from a spec file,
+    too. Random times need a latest time; guided triggers do not."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)
@@ -39,7 +39,7 @@ def test_a_spec_file_is_found_from_the_campaign(
     assert plan.canary.fault.spec == "sensor/drifting/shifted"
 
 
-def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
+def test_a_missing_spec_file_is_reported(toycar: Workspace, mine: Path) -> None:
     (mine.parent / "specs" / "drifting.yaml").unlink()
     with pytest.raises(
         MutatorError, match=r"mine\.yaml:9: no file .*/specs/drifting\.yaml; expected the path of a spec file"
@@ -47,9 +47,8 @@ def test_a_missing_spec_file_is_told(toycar: Workspace, mine: Path) -> None:
         make_plan(toycar, mine)
 
 
-def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> None:
-    """Two different specs with the same name are refused, because tables could not distinguish them.
-    Naming the library's own file is allowed."""
+def test_two_specs_with_the_same_name_are_refused(toycar: Workspace, mine: Path) -> None:
+    """Tables could not distinguish them. Naming the library's own file is allowed."""
     file = mine.parent / "specs" / "drifting.yaml"
     file.write_text(file.read_text().replace("fault_type: drifting", "fault_type: lane"))
     with pytest.raises(MutatorError, match="has the name of a spec in the library, sensor/lane"):
@@ -60,7 +59,7 @@ def test_a_spec_file_has_a_name_of_its_own(toycar: Workspace, mine: Path) -> Non
     assert {e.fault.spec for e in make_plan(toycar, mine).experiments} >= {"sensor/lane/shifted"}
 
 
-def test_a_missing_campaign_file_is_told(toycar: Workspace) -> None:
+def test_a_missing_campaign_file_is_reported(toycar: Workspace) -> None:
     with pytest.raises(MutatorError, match=r"no file nosuch\.yaml; expected a campaign: the path of a YAML"):
         toycar.campaign("nosuch.yaml")
     with pytest.raises(MutatorError, match=r"no file smal\.yaml.*did you mean 'small'\?"):

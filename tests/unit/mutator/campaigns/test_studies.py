@@ -39,14 +39,14 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(studies, "entry_points", points.select)
 
 
-def test_the_study_that_ships_is_installed() -> None:
-    """The package's metadata lists the study. This test fails if the installation is outdated."""
+def test_the_shipped_study_is_installed() -> None:
+    """This fails if the installation is outdated."""
     assert "driving_agent_resilience" in study_names(), "install again: pip install -e . --no-deps"
     assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 
 
 def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path: Path) -> None:
-    """The how-to page's example works as printed: both forms of its report have its panel and source."""
+    """The how-to page's example works as printed."""
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="crash_tests"), Workspace.find(root=CLONE))
@@ -61,9 +61,8 @@ def test_a_study_from_another_package_is_in_the_report(installed: None, tmp_path
     assert "(STUDY.md)" in written.markdown.read_text()
 
 
-def test_what_is_not_there_is_refused_with_what_is(installed: None) -> None:
-    """The error for an unknown name lists the known ones. The error for a broken package names it with the
-    reason."""
+def test_an_unknown_or_broken_study_is_refused(installed: None) -> None:
+    """The error lists the known names, or the reason."""
     with pytest.raises(MutatorError, match="'moon_landing' is not installed; expected one of broken, crash"):
         find_study("moon_landing")
     with pytest.raises(MutatorError, match=r"'broken' cannot be loaded: .*MISSING"):
@@ -120,18 +119,14 @@ def strangers(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def asking(toycar: Workspace, study: str) -> Path:
-    """The smallest campaign of the library, with a study on its last line."""
     path = toycar.campaign("small")
     path.write_text(f"{path.read_text()}study: {study}\n")
     return path
 
 
 @pytest.mark.parametrize("study", STRANGERS)
-def test_what_is_no_study_is_told_at_the_campaign_that_asks_for_it(
-    strangers: None, toycar: Workspace, study: str
-) -> None:
-    """Planning refuses the study, and `mutator check` lists it: line, reason, the other studies, and a
-    remedy."""
+def test_an_invalid_study_is_reported_at_the_campaign(strangers: None, toycar: Workspace, study: str) -> None:
+    """Planning refuses it, and `mutator check` lists it."""
     before = [str(problem) for problem in check_library(toycar, "toycar")]
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
@@ -148,10 +143,10 @@ def test_what_is_no_study_is_told_at_the_campaign_that_asks_for_it(
 
 
 @pytest.mark.parametrize("study", BAD_CHECKS)
-def test_a_check_that_fails_is_a_problem_of_the_library(
+def test_an_error_in_a_studys_check_is_a_problem_of_the_library(
     strangers: None, toycar: Workspace, study: str
 ) -> None:
-    """An error in a study's own check is listed at the campaign, and `mutator check` continues."""
+    """`mutator check` continues."""
     path = asking(toycar, study)
     line = len(path.read_text().splitlines())
     problems = [str(problem) for problem in check_library(toycar, "toycar")]
@@ -159,16 +154,14 @@ def test_a_check_that_fails_is_a_problem_of_the_library(
     assert any(problem.startswith(said) for problem in problems)
 
 
-def test_a_report_says_that_its_study_is_none(strangers: None, tmp_path: Path) -> None:
-    """If a run's study was replaced by something invalid, the report is written without it."""
+def test_a_report_is_written_without_an_invalid_study(strangers: None, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir()
     written = building.write(make_run(run, study="function"), Workspace.find(root=CLONE))
     assert "function, which cannot be loaded here" in written.markdown.read_text()
 
 
-def test_every_campaign_that_asks_for_a_missing_study_is_told(toycar: Workspace) -> None:
-    """A mistake in two files is listed twice."""
+def test_every_campaign_with_a_missing_study_is_reported(toycar: Workspace) -> None:
     for name in ("small", "toy"):
         path = toycar.campaign(name)
         path.write_text(f"{path.read_text()}study: moon_landing\n")
@@ -187,5 +180,5 @@ def test_a_run_opens_without_its_study(
         make_plan(toycar, "small")
 
 
-def test_the_parts_asked_for_are_those_of_a_study() -> None:
+def test_parts_are_the_fields_of_a_study() -> None:
     assert set(studies.PARTS) == {field.name for field in dataclasses.fields(Study)}

@@ -14,7 +14,6 @@ from mutator.workspace import Workspace
 
 
 def edit(pole: Workspace, old: str, new: str) -> Path:
-    """The pole's campaign, with some text replaced."""
     path = pole.library / "campaigns" / "upright.yaml"
     text = path.read_text()
     assert old in text
@@ -52,9 +51,8 @@ def test_each_listed_trigger_is_planned(pole: Workspace) -> None:
     assert all(0.1 <= float(trigger.condition.removeprefix("t >= ")) <= 5.0 for trigger in random)
 
 
-def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
-    """A plain list of triggers needs no method and is armed as the manifest says. It equals the same list
-    in a mapping."""
+def test_triggers_may_be_a_plain_list(pole: Workspace) -> None:
+    """A plain list needs no method and is armed as the manifest says."""
     path = listed(pole, "triggers: [always, {when: angle > 0.1}]\n")
     path.write_text(path.read_text().replace("methods: [guided]\n", ""))
     manifest = pole.library / "targets" / "pole.yaml"
@@ -85,27 +83,26 @@ def test_triggers_may_be_the_list_itself(pole: Workspace) -> None:
         ("triggers: [always]\n", "[random]", "`random_until_s` in `triggers` for random times"),
     ],
 )
-def test_lists_that_cannot_be(pole: Workspace, triggers: str, methods: str, said: str) -> None:
-    """Each mistake is reported at the line of its item. A condition over values that are not observed is
-    one."""
+def test_a_mistake_in_the_list_is_reported_at_its_line(
+    pole: Workspace, triggers: str, methods: str, said: str
+) -> None:
+    """A condition over values that are not observed is a mistake."""
     path = listed(pole, triggers, methods)
     with pytest.raises(MutatorError, match=said) as caught:
         make_plan(pole, "upright")
     assert caught.value.where == str(path)
 
 
-def test_check_knows_the_conditions(pole: Workspace) -> None:
-    """A library without a hazard analysis is valid. A condition that is invalid for its target is
-    reported."""
+def test_check_reports_invalid_conditions(pole: Workspace) -> None:
+    """A library without a hazard analysis is valid."""
     assert check_library(pole, "pole") == []
     listed(pole, "triggers: [{when: speed > 1}]\n")
     (problem,) = check_library(pole, "pole")
     assert "unknown name 'speed'" in problem.got and problem.line == 9
 
 
-def test_mutants_without_a_table(pole: Workspace) -> None:
-    """Without contexts, mutants of specs are built under `always`. The error for an unknown trigger lists
-    no rows."""
+def test_without_contexts_mutants_are_built_under_always(pole: Workspace) -> None:
+    """The error for an unknown trigger lists no rows."""
     triggers = {trigger.name for _, trigger in MutantSet.of_specs(["sensor/angle"], workspace=pole).pairs}
     assert triggers == {"always"}
     with pytest.raises(MutatorError, match=r"expected a time in s, `always`, or a condition"):

@@ -26,8 +26,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5, "hazards": (("H3", 4.0),
 
 
 def lane_is_left(e: Experiment) -> dict[str, Any]:
-    """The result of an experiment: lane faults are hazardous, except one, which crashes with a given
-    message. Other faults have no effect."""
+    """Make lane faults hazardous, except one, which crashes with a given message."""
     if e.fault.fault_type != "lane":
         return {}
     if e.fault.value == 0.8:
@@ -57,26 +56,24 @@ def lanes(found: Comparison) -> int:
     return sum(p.b.fault.fault_type == "lane" for p in found.pairs)
 
 
-def test_what_differs_is_told(found: Comparison) -> None:
-    """Only the sources differ, and the changed file is named."""
+def test_a_changed_source_file_is_named(found: Comparison) -> None:
     assert [fact.name for fact in found.facts if fact.differs] == ["digest of target"]
     assert pages.files_text(found) == "Files of the target changed: toycar/driver.py."
     assert found.remarks == ()
 
 
-def test_pairs_of_which_one_run_stops_are_counted(found: Comparison) -> None:
-    """If one run of a pair stops early, its missing alert gets a remark and does not count as lost."""
+def test_pairs_in_which_one_run_stops_get_a_remark(found: Comparison) -> None:
+    """The missing alert does not count as lost."""
     first, *rest = found.pairs
     stopped = replace(first, b=replace(first.b, after_hazard=AfterHazard.STOP))
     (remark,) = remarks(found.a, found.b, replace(found.matching, pairs=(stopped, *rest)))
     assert remark.startswith(f"1 of {len(found.pairs)} pairs end at their first terminal hazard in only one")
 
 
-def test_a_run_planned_before_files_were_written_down(
+def test_runs_without_a_list_of_files_can_be_compared(
     runs: tuple[Path, Path], tmp_path: Path, reseal: Callable[[Path], None]
 ) -> None:
-    """Runs whose head has no list of files can be compared. A remark says that the changed files are
-    unknown."""
+    """A remark says that the changed files are unknown."""
     old = shutil.copytree(runs[0], tmp_path / "old")
     head = old / HEAD
     told = json.loads(head.read_text())
@@ -86,8 +83,7 @@ def test_a_run_planned_before_files_were_written_down(
     assert "is not known" in pages.files_text(compare(old, runs[1]))
 
 
-def test_gates_name_what_is_worse(found: Comparison) -> None:
-    """The gate names each experiment that became hazardous once. Gates for other changes find nothing."""
+def test_a_gate_names_each_new_hazard_once(found: Comparison) -> None:
     new = findings(found, [Gate.NEW_HAZARD])
     assert 0 < len(new) <= lanes(found)
     assert all("sensor/lane/shifted" in f.words and "masked -> hazard (H3 2.00 s" in f.words for f in new)
@@ -95,8 +91,8 @@ def test_gates_name_what_is_worse(found: Comparison) -> None:
     assert found.incomplete == 0
 
 
-def test_the_whole_is_in_the_tables(found: Comparison) -> None:
-    """The tables agree with the pairs, and McNemar's test agrees with the counts."""
+def test_the_tables_agree_with_the_pairs(found: Comparison) -> None:
+    """McNemar's test agrees with the counts."""
     endings, changes, rates, _, by_type, _ = found.sheets
     assert sum(sum(line[1:]) for line in endings.lines) == len(found.pairs) == 24  # type: ignore[arg-type]
     total = dict(zip(changes.heads, changes.lines[-1], strict=True))
@@ -115,8 +111,7 @@ def test_the_whole_is_in_the_tables(found: Comparison) -> None:
     assert {kind["p, Holm"] for kind in kinds} == {1.0, min(1.0, 3 * 2 * 0.5**new)}
 
 
-def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
-    """A run compared with itself has no changes and no differing facts, and passes every gate."""
+def test_a_run_compared_with_itself_has_no_changes(runs: tuple[Path, Path]) -> None:
     found = compare(runs[1], runs[1])
     assert found.changed == ()
     assert not any(fact.differs for fact in found.facts)
@@ -124,9 +119,9 @@ def test_nothing_differs_from_itself(runs: tuple[Path, Path]) -> None:
     assert "None of them changed" in pages.summary(found)
 
 
-def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
-    """The comparison covers Python, processor and package versions of all stretches. If a folder lists
-    every installed package, only those that the other folder lists, too, are compared."""
+def test_differing_versions_are_reported(runs: tuple[Path, Path]) -> None:
+    """Python, processor and package versions of all stretches are compared. If a folder lists every installed
+    package, only those that the other folder lists, too, are compared."""
     sides = [read_side(runs[0]) for _ in "ab"]
     old = Stretch(python="CPython 3.11.7", packages={"numpy": "2.0"}, platform="Linux", cpu="Cray 1")
     new = replace(old, python="CPython 3.12.1", packages={"numpy": "2.1", "cv": "5"})
@@ -141,14 +136,13 @@ def test_versions_that_differ_are_told(runs: tuple[Path, Path]) -> None:
     assert {f.name for f in facts(*sides) if f.differs} == {"python", "processor", "package numpy"}
 
 
-def test_only_some(runs: tuple[Path, Path]) -> None:
+def test_a_comparison_can_be_filtered(runs: tuple[Path, Path]) -> None:
     found = compare(*runs, only='fault_type == "lane"')
     assert len(found.pairs) == lanes(found) > 0
     assert found.unmatched == ()
 
 
-def test_runs_with_nothing_in_common(runs: tuple[Path, Path]) -> None:
-    """Two runs without a common experiment are refused; the error has the number of experiments of each."""
+def test_runs_without_a_common_experiment_are_refused(runs: tuple[Path, Path]) -> None:
     with pytest.raises(MutatorError, match="has a partner"):
         compare(*runs, only="value == -1")
 
@@ -165,8 +159,8 @@ def test_a_failed_proof_is_not_compared(
         compare(runs[0], after)
 
 
-def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
-    """Harness errors and experiments that did not run are reported and do not enter any rate."""
+def test_missing_results_enter_no_rate(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+    """Harness errors and experiments that did not run are reported."""
     broken = {"status": Status.HARNESS_ERROR, "outcome": None, "activation": None, "detail": "no disk"}
     a = write_run(toycar, tmp_path / "a", lambda e: HAZARD)
     b = write_run(
@@ -183,8 +177,6 @@ def test_missing_results_are_no_results(toycar: Workspace, tmp_path: Path, write
 
 
 class Page(HTMLParser):
-    """A parsed page: its external resources, texts and tags."""
-
     def __init__(self, text: str) -> None:
         super().__init__()
         self.loaded: list[str] = []
@@ -197,8 +189,8 @@ class Page(HTMLParser):
         self.loaded += [v for k, v in named.items() if v and (k == "src" or (k == "href" and tag == "link"))]
 
 
-def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
-    """Page, Markdown and CSV list every pair that changed. The page is self-contained and escapes text."""
+def test_page_markdown_and_csv_list_every_change(found: Comparison, tmp_path: Path) -> None:
+    """The page is self-contained and escapes text."""
     written = pages.write(found, tmp_path / "out")
     pairs = list(csv.DictReader(written.pairs.open()))
     assert len(pairs) == 24
@@ -215,17 +207,18 @@ def test_it_is_written_down(found: Comparison, tmp_path: Path) -> None:
     }
 
 
-def test_it_is_written_the_same_each_time(found: Comparison, runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """Comparing the same runs again gives the same bytes."""
+def test_comparing_again_gives_the_same_bytes(
+    found: Comparison, runs: tuple[Path, Path], tmp_path: Path
+) -> None:
     one, two = (pages.write(c, tmp_path / name) for c, name in ((found, "a"), (compare(*runs), "b")))
     for a, b in ((one.page, two.page), (one.markdown, two.markdown), (one.pairs, two.pairs)):
         assert a.read_bytes() == b.read_bytes()
 
 
-def test_a_page_of_many_changes_shows_the_first(
+def test_a_long_page_shows_the_first_changes_without_scripts(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Without scripts, the page shows only as many rows as the limit and says so. It contains all rows."""
+    """It contains all rows."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

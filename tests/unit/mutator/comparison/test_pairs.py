@@ -17,7 +17,7 @@ Make = Callable[..., Experiment]
 
 
 def row(experiment_id: str = "e", **given: Any) -> Row:
-    """The row of a successful run with a masked fault, with the given changes applied."""
+    """The row of a successful run with a masked fault."""
     fields: dict[str, Any] = {
         "experiment_id": experiment_id,
         **dict.fromkeys(("module", "fault_type", "variant", "value", "unit", "scenario"), "x"),
@@ -42,9 +42,8 @@ def side(*experiments: Experiment, without: tuple[Experiment, ...] = ()) -> Side
     return Side(folder=RunFolder(Path("run")), experiments=experiments, rows=rows)
 
 
-def test_experiments_are_matched_whatever_their_ids(experiment: Make) -> None:
-    """Experiments with the same fault, scenario and trigger form a pair, even if reading, setting, time or
-    seed differ."""
+def test_experiments_are_matched_by_fault_scenario_and_trigger(experiment: Make) -> None:
+    """Reading, setting, time and seed may differ."""
     one = experiment(method=Method.RANDOM, trigger="random/C1")
     other = dataclasses.replace(
         one,
@@ -70,23 +69,20 @@ def test_experiments_are_matched_whatever_their_ids(experiment: Make) -> None:
     ],
     ids=str,
 )
-def test_another_experiment_is_no_partner(experiment: Make, other: dict[str, Any]) -> None:
-    """An experiment whose fault, value, scenario, method or trigger has no match is reported as present in
-    one run only."""
+def test_an_experiment_without_a_match_is_reported(experiment: Make, other: dict[str, Any]) -> None:
     a, b = experiment(), experiment(**other)
     found = match(side(a), side(b))
     assert (found.pairs, found.only_a, found.only_b) == ((), (a,), (b,))
 
 
-def test_what_has_not_run_is_told(experiment: Make) -> None:
-    """An experiment that is planned but did not run on one side is named and forms no pair."""
+def test_an_experiment_that_did_not_run_forms_no_pair(experiment: Make) -> None:
     a, b = experiment(value=1.0), experiment(value=2.0)
     found = match(side(a, b, without=(a,)), side(a, b, without=(b,)))
     assert (found.pairs, found.no_result_a, found.no_result_b) == ((), (a,), (b,))
 
 
-def test_doubles_are_not_guessed_at(experiment: Make) -> None:
-    """If several experiments share a name, none of them is matched, unless they are identical."""
+def test_ambiguous_experiments_are_not_matched(experiment: Make) -> None:
+    """Experiments that share a name are matched only if they are identical."""
     a = experiment()
     twin = dataclasses.replace(a, seed=8)
     third = dataclasses.replace(a, seed=9)
@@ -136,7 +132,7 @@ SDC = {"outcome": Outcome.SDC, "t_manifest": 2.5}
     ],
 )
 def test_changes(experiment: Make, a: dict[str, Any], b: dict[str, Any], changes: str) -> None:
-    """Each kind of change is reported exactly where it occurs. Times count from the activation."""
+    """Times count from the activation."""
     e = experiment()
     pair = Pair(e, e, row(**a), row(**b))
     assert pair.changes == {Change(name) for name in changes.split()}

@@ -86,8 +86,8 @@ def kinds(found: Comparison, change: Change) -> set[tuple[str, str]]:
     return {(p.b.fault.fault_type, f"{p.row_a.severity}>{p.row_b.severity}") for p in pairs}
 
 
-def test_each_experiment_whose_severity_changed_is_listed(found: Comparison) -> None:
-    """A higher class or a new contact is worse. A lower class or a contact that disappears is better."""
+def test_each_change_of_severity_is_listed(found: Comparison) -> None:
+    """A higher class or a new contact is worse."""
     assert kinds(found, Change.HIGHER_SEVERITY) == {("lane", "S1>S3"), ("distance", ">S2")}
     assert kinds(found, Change.LOWER_SEVERITY) == {("lane", "S1>")}
     assert "higher-severity" in summary(found)
@@ -95,9 +95,7 @@ def test_each_experiment_whose_severity_changed_is_listed(found: Comparison) -> 
     assert (line["delta_v_b"], line["severity_b"]) in {(12.0, "S3"), (5.0, "S2")}
 
 
-def test_the_gate_finds_new_contacts_of_a_class_or_a_worse_one(found: Comparison) -> None:
-    """The gate for a class finds experiments that were milder before, and not those that already had the
-    class."""
+def test_a_gate_finds_contacts_that_were_milder_before(found: Comparison) -> None:
     counts = {gate: len(findings(found, [gate])) for gate in Gate if gate.value.startswith("severity:")}
     distance = sum(p.b.fault.fault_type == "distance" for p in found.pairs)
     harder = sum(p.b.fault.fault_type == "lane" and p.b.method is Method.GUIDED for p in found.pairs)
@@ -124,16 +122,14 @@ def test_medians_of_metrics_in_pairs(found: Comparison) -> None:
     assert told["sensor/silence"] == (20.0, 20.0, 0.0)
 
 
-def test_classes_of_both_runs_in_a_table(found: Comparison) -> None:
-    """Each pair is counted in one cell of the table, by its class before and its class after."""
+def test_each_pair_is_in_one_cell_of_the_table_of_classes(found: Comparison) -> None:
     sheet = next(sheet for sheet in found.sheets if sheet.name == "severity")
     assert sheet.heads == ("before / after", "S3", "S2", "S1", "no contact")
     assert sum(sum(line[1:]) for line in sheet.lines) == len(found.pairs)  # type: ignore[arg-type]
 
 
-def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
-    """The second run's scale applies to both runs, and a remark says that the scales differ. No class has
-    changed."""
+def test_the_second_runs_scale_applies_to_both(runs: tuple[Path, ...]) -> None:
+    """A remark says that the scales differ."""
     found = compare(runs[0], runs[2])
     assert found.changed == ()
     assert {p.row_a.severity for p in found.pairs} == {"", "S2"}
@@ -142,8 +138,10 @@ def test_both_runs_are_classed_by_one_scale(runs: tuple[Path, ...]) -> None:
 
 
 @pytest.mark.parametrize("order", [(0, 3), (3, 0)])
-def test_a_run_without_severity_changes_nothing(runs: tuple[Path, ...], order: tuple[int, int]) -> None:
-    """If one run has no classes, no change of severity is reported, and a gate on severity is refused."""
+def test_without_classes_no_change_of_severity_is_reported(
+    runs: tuple[Path, ...], order: tuple[int, int]
+) -> None:
+    """A gate on severity is refused."""
     found = compare(*(runs[i] for i in order))
     assert not found.having(Change.HIGHER_SEVERITY) + found.having(Change.LOWER_SEVERITY)
     assert "Severity is not compared: without has none." in found.remarks

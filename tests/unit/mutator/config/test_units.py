@@ -11,8 +11,7 @@ from mutator.config import units
 CLONE = Path(__file__).parents[4]
 
 
-def test_a_key_gives_up_its_unit() -> None:
-    """The unit of a key is the longest suffix that is a unit. A key without such a suffix stays whole."""
+def test_the_longest_suffix_of_a_key_is_its_unit() -> None:
     assert units.split("offset_m") == ("offset", units.UNITS["m"])
     assert units.split("per_step_kph") == ("per_step", units.UNITS["kph"])
     assert units.split("by_per_m") == ("by", units.UNITS["per_m"])
@@ -43,30 +42,27 @@ def test_a_key_gives_up_its_unit() -> None:
     ],
 )
 def test_conversion(number: float, source: str, target: str, expected: float) -> None:
-    """A quantity is the same in any unit, and its value in the original unit is preserved exactly."""
+    """The value in the original unit is preserved exactly."""
     result = units.convert(number, units.UNITS[source], units.UNITS[target])
     assert result == pytest.approx(expected, rel=1e-15)
     assert isinstance(result, float)
 
 
-def test_dimensions_do_not_mix() -> None:
-    """Units of different dimensions cannot be converted."""
+def test_units_of_different_dimensions_cannot_be_converted() -> None:
     with pytest.raises(ValueError, match="m is not a unit of speed"):
         units.convert(1, units.UNITS["m"], units.UNITS["mps"])
     with pytest.raises(ValueError, match="degC is not a unit of temperature in kelvin"):
         units.convert(20, units.UNITS["degc"], units.UNITS["k"])
 
 
-def test_every_suffix_ends_a_key() -> None:
-    """Each unit is found as a key's suffix, and no unit is listed twice."""
+def test_each_unit_is_found_once_as_a_suffix() -> None:
     assert {suffix: units.split(f"by_{suffix}") for suffix in units.UNITS} == {
         suffix: ("by", unit) for suffix, unit in units.UNITS.items()
     }
     assert len({unit.symbol for unit in units.UNITS.values()}) == len(units.UNITS)
 
 
-def test_keys_of_the_library_are_what_they_were() -> None:
-    """Each key of the shipped faults and fault models has its expected unit, or none."""
+def test_keys_of_the_shipped_library_have_their_units() -> None:
     first = {"m", "mps", "kph", "mph", "mps2", "rad", "deg", "s", "ms", "mmph", "lx", "px"}
     for path in (*CLONE.glob("fault_library/faults/**/*.yaml"), *CLONE.glob("templates/*.yaml")):
         for key in re.findall(r"[{ ]([a-z][a-z0-9_]*):", path.read_text()):

@@ -32,7 +32,7 @@ def read(tmp_path: Path, text: str | bytes) -> Car:
 
 
 def test_a_good_file_is_read(tmp_path: Path) -> None:
-    """Types are kept. Words that YAML 1.1 reads as booleans or times stay words."""
+    """Words that YAML 1.1 reads as booleans or times stay words."""
     car = read(
         tmp_path, "schema: car/2\nname: on\nwheels: {left: {radius: 3}}\ntags: ['1', 1:30, no, 1_0, 0x1]\n"
     )
@@ -89,8 +89,7 @@ def test_a_good_file_is_read(tmp_path: Path) -> None:
         ("schema: car/2\nname: x\n---\nname: y\n", 3, ["a second document", "remove the `---`"]),
     ],
 )
-def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:
-    """The error names file and line and shows the invalid value."""
+def test_a_mistake_is_reported_at_its_line(tmp_path: Path, text: str, line: int, pieces: list[str]) -> None:
     with pytest.raises(MutatorError) as caught:
         read(tmp_path, text)
     message = str(caught.value)
@@ -100,33 +99,28 @@ def test_a_mistake_is_answered_at_its_line(tmp_path: Path, text: str, line: int,
 
 
 @pytest.mark.parametrize("text", ["", "- a\n", "word\n"])
-def test_a_file_that_is_no_mapping(tmp_path: Path, text: str) -> None:
-    """An empty file, a list and a single word are refused, because a mapping is expected."""
+def test_a_file_that_is_not_a_mapping_is_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(MutatorError, match="expected a mapping of keys to values"):
         read(tmp_path, text)
 
 
-def test_bytes_that_are_no_text(tmp_path: Path) -> None:
-    """A file that is not UTF-8 is refused with the offset of the bad byte."""
+def test_invalid_utf_8_is_refused_with_its_offset(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="not UTF-8 \\(byte 0xff at offset 6\\)"):
         read(tmp_path, b"name: \xff\n")
 
 
-def test_a_file_made_to_hurt(tmp_path: Path) -> None:
-    """Very deep nesting and very large files are refused immediately."""
+def test_deep_nesting_and_huge_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MutatorError):
         read(tmp_path, "[" * 20_000)
     with pytest.raises(MutatorError, match="at most 1000000 bytes"):
         read(tmp_path, "#" * 1_000_001)
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    """A missing file is reported as a user's error, without a traceback."""
+def test_a_missing_file_is_a_users_error(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="cannot be read"):
         yaml_files.load(tmp_path / "none.yaml")
 
 
-def test_several_mistakes_are_counted(tmp_path: Path) -> None:
-    """The first mistake is shown, with the number of further mistakes."""
+def test_further_mistakes_are_counted(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="1 more mistake after this one"):
         read(tmp_path, "schema: car/2\nname: 1\ntags: 2\n")
