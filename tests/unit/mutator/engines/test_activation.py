@@ -71,9 +71,10 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
         "True",
     ],
 )
-def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: float, hold: Hold) -> None:
-    """For any observations, including standstill and NaN, the result is the first step for which `observe`
-    returns that the probe is active."""
+def test_the_activation_step_agrees_with_observe(
+    probe, condition: str, armed_after_s: float, hold: Hold
+) -> None:
+    """This holds for any observations, including standstill and NaN."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):
@@ -92,16 +93,15 @@ def test_the_answer_is_that_of_observing(probe, condition: str, armed_after_s: f
         assert (start.step if start else None) == (active.index(True) if True in active else None)
 
 
-def test_a_probe_may_be_armed_more_exactly(probe) -> None:
-    """The precision of the arming time is taken from the probe's template."""
+def test_the_probes_template_determines_the_precision_of_the_arming_time(probe) -> None:
     code = probe(Trigger(name="x", condition="True", armed_after_s=SEEN.values[3][0] + 0.001))
     close, far = (code.replace("\n_TINY = 1e-9\n", f"\n_TINY = {tiny}\n") for tiny in (0.0, 0.002))
     assert [start_of(one, SEEN).step for one in (close, far)] == [4, 3]
 
 
-def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
-    """A probe's common part and its trigger-specific part, run one after the other, do the same as the
-    whole probe, on the same lines."""
+def test_a_probe_in_two_parts_equals_the_whole(probe) -> None:
+    """The common part and the trigger-specific part, run one after the other, have the same lines as the
+    whole probe."""
     trigger = Trigger(name="x", condition="hwt < 2.0", hold=Hold.FOR, hold_s=0.1)
     whole, parts = {}, {}
     exec(compile(probe(trigger), "_fi", "exec"), whole)
@@ -116,9 +116,8 @@ def test_the_parts_of_a_probe_do_what_it_does(probe) -> None:
     assert parts_of(probe(trigger))[1] == parts_of(probe(always()))[1]
 
 
-def test_several_observations_in_a_step(probe) -> None:
-    """A step may have no observation or several. A mutant leaves the golden run before the step that
-    observes."""
+def test_a_step_may_have_several_observations_or_none(probe) -> None:
+    """A mutant leaves the golden run before the step that observes."""
     seen = Observed(values=SEEN.values, before=(0, 1, 3, 3, 6))
     starts = [start_of(probe(at_time(0.05 * i)), seen) for i in range(6)]
     assert [start.step for start in starts if start] == [0, 1, 1, 3, 3, 3]
@@ -126,8 +125,7 @@ def test_several_observations_in_a_step(probe) -> None:
 
 
 @pytest.mark.parametrize("trigger", [at_time(0.2), Trigger(name="x", condition="d_rel <= 20.0")])
-def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
-    """A probe that is set to the state after some observations equals one that made all of them."""
+def test_a_probe_set_to_a_state_equals_one_that_observed(probe, trigger: Trigger) -> None:
     start = start_of(probe(trigger), SEEN)
     saw: dict = {}
     given: dict = {}
@@ -145,8 +143,7 @@ def test_a_probe_given_the_state_equals_one_that_observed(probe, trigger: Trigge
     assert not math.isinf(states[0]["t"])
 
 
-def test_probes_of_one_trigger_are_asked_once(probe) -> None:
-    """Mutants that differ only in their ids share one answer. Another trigger has another answer."""
+def test_probes_with_the_same_trigger_share_one_answer(probe) -> None:
     one, other = (probe(Trigger(name=name, condition="d_rel <= 30.0")) for name in ("one", "other"))
     assert one != other
     assert start_of(one, SEEN) is start_of(other, SEEN)

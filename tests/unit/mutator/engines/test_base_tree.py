@@ -16,8 +16,7 @@ def folder(tmp_path: Path) -> Path:
     return folder
 
 
-def test_a_tree_of_its_own(folder: Path, tmp_path: Path) -> None:
-    """A tree without links has the same files, and writes to it do not reach any other tree."""
+def test_writes_to_a_tree_without_links_stay_in_it(folder: Path, tmp_path: Path) -> None:
     base = BaseTree(folder)
     base.lay_out(tmp_path / "tree", linked=False)
     (tmp_path / "tree" / "car" / "go.py").write_bytes(b"stop")
@@ -26,7 +25,7 @@ def test_a_tree_of_its_own(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["car/go.py", "car/__pycache__/go.pyc"])
-def test_what_is_written_through_a_link_is_undone(folder: Path, tmp_path: Path, name: str) -> None:
+def test_writes_through_a_link_are_undone(folder: Path, tmp_path: Path, name: str) -> None:
     """A changed or locked file is restored. Every user of the tree is notified once."""
     base, other = BaseTree(folder), BaseTree(folder)
     genuine = (folder / name).read_bytes()

@@ -57,8 +57,8 @@ def changes() -> Changes:
 GUARDED = 'if _fi.active("abc"):\n    y = y + 1.0'
 
 
-def test_functions_that_changed_are_found(changes: Changes) -> None:
-    """Each changed function is listed by module and path, with its old and new code."""
+def test_changed_functions_are_found(changes: Changes) -> None:
+    """Each is listed by module and path, with its old and new code."""
     found = changes(
         ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
     )
@@ -89,9 +89,9 @@ def test_imports_of_injected_lines(changes: Changes) -> None:
         ("limit = 3.0", 'if _fi.active("abc"):\n    limit = 0.0', None),
     ],
 )
-def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
-    """A statement that acts without its trigger, a generator, and an inner function are refused with
-    reasons. Code outside functions needs no swap."""
+def test_some_changes_cannot_be_swapped(changes: Changes, before: str, lines: str, why: str | None) -> None:
+    """A statement that acts without its trigger, a generator, and an inner function are refused with reasons.
+    Code outside functions needs no swap."""
     if why is None:
         assert changes((before, lines)).functions == ()
         return
@@ -100,8 +100,8 @@ def test_what_cannot_be_swapped(changes: Changes, before: str, lines: str, why: 
 
 
 @pytest.mark.parametrize(("kept", "swappable"), [(1, True), (0, False)])
-def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
-    """A guard that keeps the whole statement under `else:` also asks the probe in that branch."""
+def test_a_guard_also_asks_the_probe_in_its_else_branch(kept: int, swappable: bool) -> None:
+    """The guard keeps the whole statement under `else:`."""
     guarded = "".join(
         f"        {line}  # fi:abc guard:1\n" for line in ('if _fi.active("abc"):', "    y = x", "else:")
     )
@@ -118,8 +118,7 @@ def test_a_guard_with_another_branch(kept: int, swappable: bool) -> None:
         plan_swap(manifest, files, "/tree")  # type: ignore[arg-type]
 
 
-def test_files_that_are_read_by_the_run(changes: Changes) -> None:
-    """A mutant of a file that the run digests must be written to the disk."""
+def test_a_file_that_the_run_digests_must_be_written_to_disk(changes: Changes) -> None:
     with pytest.raises(NotSwappable, match="read by the run itself"):
         changes(reads_itself=("car/*.py",))
 

@@ -20,7 +20,6 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def gone(pid: int) -> bool:
-    """Whether the process ends within a few seconds."""
     deadline = time.monotonic() + 20.0
     while time.monotonic() < deadline:
         try:
@@ -33,9 +32,8 @@ def gone(pid: int) -> bool:
     return False
 
 
-def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
-    """Every process that forks has one OS thread. After the engine is closed, no process and no scratch
-    file is left."""
+def test_forking_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
+    """No scratch file is left."""
     for time_s in (2.0, 4.0, 3.0):
         assert fork.run(fork.job(at_time(time_s))).mode is RunMode.FORK
     pids = fork.processes()
@@ -48,8 +46,8 @@ def test_processes_have_one_thread_and_end_with_the_engine(fork: Fork) -> None:
     assert [path.name for path in (fork.folder / "work").iterdir() if "server" in path.name] == []
 
 
-def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
-    """The golden run simulates the steps before the activation, and only a few processes wait."""
+def test_a_fork_starts_just_before_its_fault(fork: Fork) -> None:
+    """The golden run simulates the steps before, and only a few processes wait."""
     starts = [fork.run(fork.job(at_time(0.05 * step))).start for step in (40, 41, 90, 10, 100, 0)]
     assert starts == [40, 41, 90, 10, 100, 0]
     for step in range(3, 100, 9):
@@ -57,8 +55,7 @@ def test_a_fork_starts_right_before_its_fault(fork: Fork) -> None:
     assert len(fork.processes()) <= 10
 
 
-def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
-    """Libraries that a run imports late are found, and every waiting process loads them."""
+def test_late_imports_are_loaded_before_the_fork(fork: Fork) -> None:
     fork.run(fork.job(at_time(2.0)))
     (seen,) = fork.engine._seen.values()
     assert isinstance(seen, Observed)
@@ -67,16 +64,15 @@ def test_libraries_of_a_run_are_loaded_before_it_is_forked(fork: Fork) -> None:
     assert all(set(seen.libraries) <= waiting.loaded for waiting in fork.pool._waiting if waiting.step)
 
 
-def test_a_never_active_fault_is_not_run(fork: Fork) -> None:
-    """An experiment whose trigger never holds gets golden's files without a run."""
+def test_an_experiment_that_never_triggers_gets_goldens_files(fork: Fork) -> None:
+    """No run is needed."""
     execution = fork.run(fork.job(at_time(100.0)))
     assert (execution.mode, execution.status, execution.cpu_s) == (RunMode.GOLDEN, Status.OK, 0.0)
     assert execution.out == fork.golden
 
 
-def test_a_kill_is_a_harness_error_and_the_next_run_goes_on(fork: Fork) -> None:
-    """If the server or a waiting process is killed, the run is a harness error, and the next job gets new
-    processes."""
+def test_a_killed_process_is_a_harness_error_for_one_job_only(fork: Fork) -> None:
+    """The next job gets new processes, whether the server or a waiting process was killed."""
     job = fork.job(at_time(2.0))
     for place in (0, -1):  # the first process, then a waiting one
         assert fork.run(job).status is Status.OK
@@ -103,8 +99,8 @@ def test_waiting_processes_end_with_the_server(fork: Fork) -> None:
     assert all(map(gone, (guard, *waiting)))
 
 
-def test_a_server_without_its_guard_is_not_used(fork: Fork) -> None:
-    """If the server's guard process is killed, the next run reports it, and no process is left."""
+def test_a_killed_guard_is_reported_by_the_next_run(fork: Fork) -> None:
+    """No process is left."""
     fork.run(fork.job(at_time(2.0)))
     pids = fork.processes()
     os.kill(fork.pool._process.pid, signal.SIGKILL)
@@ -129,8 +125,8 @@ time.sleep(60)
 
 
 @pytest.mark.slow
-def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> None:
-    """If the engine's process is killed, the server and all waiting processes end."""
+def test_the_server_ends_when_its_engine_is_killed(toycar: Workspace, tmp_path: Path) -> None:
+    """All waiting processes end, too."""
     arguments = [toycar.library, toycar.templates, tmp_path, Path(__file__).parents[1]]
     engine = subprocess.Popen(
         [sys.executable, "-c", ENGINE, *map(str, arguments)], stdout=subprocess.PIPE, text=True
@@ -147,8 +143,7 @@ def test_the_server_ends_with_its_engine(toycar: Workspace, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_the_cpu_limit_is_a_childs_own(fork: Fork, edit: Edit) -> None:
-    """The limit for a child's CPU time counts from its fork and excludes the time of earlier processes."""
+def test_a_childs_cpu_limit_counts_from_its_fork(fork: Fork, edit: Edit) -> None:
     edit(
         "tree/toycar/world.py",
         "        now = self.frame",

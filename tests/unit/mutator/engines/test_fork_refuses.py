@@ -12,7 +12,7 @@ from ..fork_on_toy import LIMITS, Edit, Fork
 
 
 def test_a_target_with_threads_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """A target that starts a thread when it is loaded runs on the reference engine, and the reason is
+    """The target starts a thread when it is loaded. The reference engine runs it, and the reason is
     stored."""
     edit(
         "tree/toycar/go.py",
@@ -37,9 +37,8 @@ def test_a_target_with_pandas_is_forked(fork: Fork, edit: Edit) -> None:
     assert (execution.mode, execution.why) == (RunMode.FORK, "")
 
 
-def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
-    """A target that cannot be imported outside its command runs on the reference engine, and the reason is
-    stored."""
+def test_a_target_that_cannot_be_imported_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """The reference engine runs it, and the reason is stored."""
     edit(
         "tree/toycar/go.py",
         "class Drive:",
@@ -50,8 +49,8 @@ def test_a_target_that_cannot_be_loaded(fork: Fork, edit: Edit) -> None:
     assert "cannot be loaded: ValueError: 3 (toycar/go.py:" in execution.why
 
 
-def test_the_reason_is_printable(fork: Fork, edit: Edit) -> None:
-    """The reason for using the reference engine is stored as printable text, whatever the target raised."""
+def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
+    """A target may raise any text."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -66,9 +65,8 @@ def test_the_reason_is_printable(fork: Fork, edit: Edit) -> None:
 
 
 @pytest.mark.slow
-def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> None:
-    """If a stepwise golden run differs from the command's golden run, the reference engine runs the
-    experiments."""
+def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """Its stepwise golden run differs from the command's golden run."""
     edit(
         "tree/toycar/go.py",
         "    drive = begin(arguments)\n",
@@ -80,9 +78,8 @@ def test_a_target_that_is_another_one_step_by_step(fork: Fork, edit: Edit) -> No
 
 
 @pytest.mark.slow
-def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
-    """A run that leaves a thread would not have ended by itself. The reference engine runs it again and
-    reports that."""
+def test_a_run_that_leaves_a_thread_is_repeated(fork: Fork, edit: Edit) -> None:
+    """The run would not have ended by itself. The reference engine repeats it and reports that."""
     fork.limits = replace(LIMITS, wall_s=3)
     edit(
         "tree/toycar/sensing.py",
@@ -96,9 +93,8 @@ def test_a_target_that_leaves_threads(fork: Fork, edit: Edit) -> None:
 
 
 @pytest.mark.slow
-def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
-    """A run that writes into its tree does not affect the next run. The reference engine decides its
-    result."""
+def test_a_run_that_writes_into_its_tree_does_not_affect_the_next(fork: Fork, edit: Edit) -> None:
+    """The reference engine decides its result."""
     edit(
         "tree/toycar/sensing.py",
         "        self.publish((gap",
@@ -110,9 +106,9 @@ def test_a_target_that_writes_into_its_tree(fork: Fork, edit: Edit) -> None:
     assert "toycar/sensing.py in the tree that ran" in execution.detail
 
 
-def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
-    """A fault in a function that is suspended between steps runs on the reference engine, and the reason
-    is stored."""
+def test_a_suspended_function_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """The function is suspended between steps, so the reference engine runs the experiment and stores the
+    reason."""
     edit(
         "tree/toycar/sensing.py",
         "    def publish(self",
@@ -124,9 +120,8 @@ def test_what_cannot_be_exchanged_is_told(fork: Fork, edit: Edit) -> None:
 
 
 @pytest.mark.slow
-def test_a_golden_run_that_does_not_end_well(fork: Fork, edit: Edit) -> None:
-    """If the stepwise golden run fails, the reference engine runs the experiment, and the reason is
-    stored."""
+def test_a_failed_stepwise_golden_run_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """The reference engine runs the experiment, and the reason is stored."""
     edit(
         "tree/toycar/go.py",
         "    return Drive(case)",
@@ -148,9 +143,9 @@ EARLY = """
 """
 
 
-def test_a_target_that_observes_before_its_first_step(fork: Fork, edit: Edit) -> None:
-    """A fork cannot see observations made before the first step. The reference engine runs such
-    experiments, whether the fault is active then or later, and the reason is stored."""
+def test_a_target_that_observes_before_its_first_step_is_not_forked(fork: Fork, edit: Edit) -> None:
+    """A fork cannot see such observations. The reference engine runs these experiments, whether the fault is
+    active then or later."""
     edit("fault_library/targets/toycar.yaml", "function: Drive.step,", "function: Drive.look,")
     edit("tree/toycar/go.py", '\n        self.steps = int(case["steps"])\n', EARLY)
     for trigger in (always(armed_after_s=-2.0), at_time(2.0)):

@@ -58,8 +58,7 @@ def glued(fork: Fork, edit: Edit) -> Fork:
     return fork
 
 
-def test_both_engines_drive_the_same(glued: Fork) -> None:
-    """A run that an engine steps, forks and writes has the same bytes as one in a fresh interpreter."""
+def test_both_engines_give_the_same_bytes(glued: Fork) -> None:
     job = glued.job(at_time(2.0))
     forked = glued.engine.execute(job, glued.folder / "work" / "forked")
     plain = glued.engine.reference.execute(job, glued.folder / "plain")
@@ -70,16 +69,15 @@ def test_both_engines_drive_the_same(glued: Fork) -> None:
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
 
-def test_the_glue_is_that_of_the_harness(glued: Fork) -> None:
-    """A run imports the glue of the harness that runs it, whichever mutator is installed. Its report does
-    not list the glue as a package of the target."""
+def test_a_run_imports_the_glue_of_its_harness(glued: Fork) -> None:
+    """It does not matter which mutator is installed. The run's report does not list the glue as a package of
+    the target."""
     plain = glued.engine.reference.execute(glued.job(at_time(2.0)), glued.folder / "plain")
     assert Path(plain.log.strip()) == Path(mutator.__file__)
     assert "mutator" not in plain.modules
     assert "numpy" in plain.modules
 
 
-def test_nothing_else_is_found_there() -> None:
-    """The path gives access to the harness only, not to the packages next to it."""
+def test_the_path_of_the_glue_gives_access_to_nothing_else() -> None:
     assert Harness.find_spec("tests") is None
     assert Harness.find_spec("mutator.glue") is None

@@ -56,7 +56,7 @@ def entry(body: str) -> dict[str, str]:
 def test_a_mutant_of_what_runs_read_shares_nothing(
     toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Only a mutant of a file in `reads_itself` gets the arguments for independent runs."""
+    """The mutants concerned are those of files in `reads_itself`."""
     said = 'import json, sys\nfrom pathlib import Path\nPath("words.json").write_text(json.dumps(sys.argv))\n'
     changed = replace(manifest, independent=("--forget",), reads_itself=("toycar/sens*.py",))
     engine = ReferenceEngine(changed, prepare_base(manifest, tmp_path / "base"), tmp_path, LIMITS)
@@ -68,8 +68,8 @@ def test_a_mutant_of_what_runs_read_shares_nothing(
         assert ("--forget" in words) is (read == "toycar/sensing.py")
 
 
-def test_a_good_run_leaves_its_files(run: Run) -> None:
-    """A run that ends well has its trace and record in the output folder, and its CPU time is recorded."""
+def test_a_good_run_leaves_its_trace_and_record(run: Run) -> None:
+    """Its CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
@@ -104,8 +104,8 @@ def test_ways_to_end(run: Run, body: str, status: Status, detail: str) -> None:
     assert (execution.status, execution.detail) == (status, detail)
 
 
-def test_a_target_that_does_not_parse_crashes(run: Run) -> None:
-    """A syntax error in executed code is a failure of the tree and is reported with its position."""
+def test_a_syntax_error_in_executed_code_is_a_crash(run: Run) -> None:
+    """The error is reported with its position."""
     execution = run(entry("if :"))
     assert execution.status is Status.CRASHED
     assert "go.py" in execution.detail
@@ -116,7 +116,7 @@ def test_endless_loop_hits_the_cpu_limit(run: Run) -> None:
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
 
 
-def test_who_ignores_the_cpu_limit_is_killed(run: Run) -> None:
+def test_a_run_that_ignores_the_cpu_limit_is_killed(run: Run) -> None:
     body = "import signal; signal.signal(signal.SIGXCPU, signal.SIG_IGN)\nwhile True: pass"
     execution = run(entry(body), replace(LIMITS, cpu_s=1))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "CPU time limit of 1 s")
@@ -127,15 +127,15 @@ def test_sleeping_hits_the_wall_limit(run: Run) -> None:
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 1 s")
 
 
-def test_who_does_not_end_after_its_work_is_a_timeout(run: Run) -> None:
-    """A run that finishes its work but is kept alive by a thread times out."""
+def test_a_run_kept_alive_by_a_thread_times_out(run: Run) -> None:
+    """The run has finished its work."""
     body = "import threading, time; threading.Thread(target=time.sleep, args=(100,)).start()"
     execution = run(entry(body), replace(LIMITS, wall_s=2))
     assert (execution.status, execution.detail) == (Status.TIMEOUT, "wall time limit of 2 s")
 
 
-def test_steps_are_limited(run: Run) -> None:
-    """More observed steps than allowed are a timeout, at the same step on every machine."""
+def test_too_many_steps_are_a_timeout(run: Run) -> None:
+    """The run ends at the same step on every machine."""
     probe = (
         "MUTANT = 'm'\nclass StepLimit(RuntimeError): pass\n"
         "def limit(n): global most; most = n\n"
@@ -160,8 +160,9 @@ def test_a_huge_file_is_refused(run: Run) -> None:
     assert "File too large" in execution.detail
 
 
-def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManifest) -> None:
-    """A run that imports the package from outside its own tree is a harness error."""
+def test_importing_the_package_from_outside_the_tree_is_a_harness_error(
+    run: Run, manifest: TargetManifest
+) -> None:
     body = (
         f"import sys; sys.path.insert(0, {str(manifest.root)!r})\n"
         "for name in [n for n in sys.modules if n.startswith('toycar')]: del sys.modules[name]\n"
@@ -172,7 +173,7 @@ def test_the_pristine_package_cannot_be_imported(run: Run, manifest: TargetManif
     assert "imported from" in execution.detail
 
 
-def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
+def test_running_another_tree_is_a_harness_error(run: Run) -> None:
     body = "import toycar.world, pathlib\npathlib.Path(toycar.world.__file__).write_text('STEP = 1')"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -180,7 +181,7 @@ def test_a_tree_that_is_not_the_jobs_is_noticed(run: Run) -> None:
     assert run().status is Status.OK, "the next run has its own tree again"
 
 
-def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp_path: Path) -> None:
+def test_emptied_bytecode_affects_only_its_own_run(toycar: Workspace, run: Run, tmp_path: Path) -> None:
     body = "import toycar.world, os\nos.truncate(toycar.world.__cached__, 20)"
     assert run(entry(body)).status is Status.OK
     (kept,) = (tmp_path / "base" / "toycar" / "__pycache__").glob("world.*")
@@ -188,9 +189,8 @@ def test_bytecode_that_a_run_empties_is_its_own(toycar: Workspace, run: Run, tmp
     assert run().status is Status.OK
 
 
-def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
-    """A log or report that a run removes, or replaces with a folder or a pipe, counts as missing. The
-    engine does not wait for it."""
+def test_a_replaced_log_or_report_counts_as_missing(run: Run) -> None:
+    """A run may remove it, or replace it with a folder or a pipe. The engine does not wait for it."""
     head = "import os\nos.unlink('../log')\n"
     for body in ("", "os.mkdir('../log')", "os.mkfifo('../log')"):
         execution = run(entry(head + body))
@@ -210,16 +210,15 @@ def test_a_run_replaces_what_the_engine_reads(run: Run) -> None:
         {},
     ],
 )
-def test_half_a_report_is_none(run: Run, more: dict[str, object]) -> None:
-    """A file in place of the report is accepted only if it is a valid report."""
+def test_an_invalid_report_is_rejected(run: Run, more: dict[str, object]) -> None:
     report = {"ended": "ok", "error": None, "disk_full": False, "outside": [], "probe": None, **more}
     body = f"import json, os\nopen('../report.json', 'w').write(json.dumps({report!r}))\nos._exit(0)"
     execution = run(entry(body))
     assert (execution.status, execution.detail) == (Status.CRASHED, "left with status 0 without a report")
 
 
-def test_names_that_are_no_text(run: Run) -> None:
-    """Names of the target's classes and files are stored as printable text."""
+def test_unprintable_names_are_stored_as_printable_text(run: Run) -> None:
+    """The target chooses the names of its classes and files."""
     body = (
         "import os\nname = os.path.join(os.path.dirname(__file__), '\\udcff\\n')\n"
         "exec(compile('raise type(\"a\\\\n\", (Exception,), {})', name, 'exec'))"
@@ -229,8 +228,8 @@ def test_names_that_are_no_text(run: Run) -> None:
     assert (raised.kind, raised.place) == (r"a\n", r"toycar/\udcff\n:1")
 
 
-def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
-    """A run receives signals even if its parent ignored them, as background programs do."""
+def test_a_run_receives_signals_that_its_parent_ignored(run: Run) -> None:
+    """Programs in the background ignore some signals."""
     body = "import os, signal\nos.kill(os.getpid(), signal.SIGINT)"
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])
@@ -242,8 +241,8 @@ def test_signals_are_those_of_a_fresh_interpreter(run: Run) -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
-    """A source file from outside the job's tree is a harness error; a data cache outside is allowed."""
+def test_a_source_file_from_outside_the_tree_is_a_harness_error(run: Run) -> None:
+    """A data cache outside is allowed."""
     body = "import toycar, pathlib\npathlib.Path(toycar.__file__).with_name('left.py').touch()"
     execution = run(entry(body))
     assert execution.status is Status.HARNESS_ERROR
@@ -252,7 +251,7 @@ def test_a_file_left_in_the_tree_is_noticed(run: Run) -> None:
 
 
 def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path: Path) -> None:
-    """A changed file runs as changed, even if its size and time equal the original's."""
+    """The changed file's size and time equal the original's."""
     pristine = manifest.tree.files["toycar/world.py"].decode()
     changed = pristine.replace("STEP = 0.05", "STEP = 0.06")
     body = "from toycar.world import STEP\nraise ValueError(STEP)"
@@ -263,9 +262,8 @@ def test_stale_bytecode_cannot_run(run: Run, manifest: TargetManifest, tmp_path:
     assert int.from_bytes(cached[0].read_bytes()[4:8], "little") == 0b11, "checked by hash"
 
 
-def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """PYTHONPATH and similar variables do not reach a run. The job sets the hash seed, and there is one
-    thread."""
+def test_the_users_environment_does_not_reach_a_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """PYTHONPATH and similar variables are removed, the job sets the hash seed, and there is one thread."""
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setenv("MUTATOR_SECRET", "x")
     body = (
@@ -276,8 +274,7 @@ def test_the_environment_is_not_the_users(run: Run, monkeypatch: pytest.MonkeyPa
     assert run(entry(body), hash_seed=42).detail.startswith("ValueError: ('42', '1')")
 
 
-def test_what_a_run_printed_is_kept(run: Run) -> None:
-    """The last lines of a run's output are available to the user."""
+def test_the_last_lines_of_output_are_kept(run: Run) -> None:
     assert "hello" in run(entry("print('hello')")).log
 
 
@@ -292,7 +289,7 @@ def test_grandchildren_end_with_the_run(run: Run, tmp_path: Path) -> None:
 
 
 def ended(pid: int) -> bool:
-    """Whether the process ends within a few seconds; a process that only waits to be reaped has ended."""
+    """Whether the process ends within a few seconds; a zombie has ended."""
     deadline = time.monotonic() + 5.0
     while time.monotonic() < deadline:
         try:
@@ -343,8 +340,7 @@ def ended_now(pid: int) -> bool:
     return not Path(f"/proc/{pid}").exists()
 
 
-def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that fails for lack of disk space raises DiskFull and does not count as a crash."""
+def test_a_full_disk_is_not_a_crash(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(DiskFull):
         run(entry("import errno; raise OSError(errno.ENOSPC, 'No space left on device')"))
     real = os.statvfs
@@ -361,7 +357,6 @@ def test_a_full_disk_is_not_the_targets_failure(run: Run, monkeypatch: pytest.Mo
 
 
 def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManifest, tmp_path: Path) -> None:
-    """`run` yields each job with its execution and leaves no scratch files."""
     work = tmp_path / "work"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -374,10 +369,10 @@ def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManif
     assert list(work.iterdir()) == []
 
 
-def test_engines_run_side_by_side(
+def test_two_threads_may_use_one_engine(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Two threads may use one engine at the same time, each in a separate folder."""
+    """Each works in a separate folder."""
     work = tmp_path / "side"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -395,16 +390,14 @@ def test_engines_run_side_by_side(
     assert found == [Status.OK, Status.OK]
 
 
-def test_a_run_tells_whose_modules_it_imported(run: Run) -> None:
-    """The report lists imported packages. It excludes the target's own, the standard library, and those
-    that Python loaded before."""
+def test_the_report_lists_imported_packages(run: Run) -> None:
+    """It excludes the target's own, the standard library, and those that Python loaded before."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
-def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
-    """The report lists packages whose shared libraries are used, even without an import, because their
-    versions affect results."""
+def test_the_report_lists_packages_of_shared_libraries(run: Run) -> None:
+    """Their versions affect results, even without an import."""
     code = (
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"
@@ -413,11 +406,10 @@ def test_a_run_tells_whose_shared_libraries_it_used(run: Run) -> None:
 
 
 @pytest.mark.parametrize(("limit", "name"), [("AS", "memory_mb"), ("CPU", "cpu_s"), ("FSIZE", "disk_mb")])
-def test_a_limit_of_this_process_that_is_lower(
+def test_lower_limits_of_this_process_are_refused(
     manifest: TargetManifest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: str, name: str
 ) -> None:
-    """An engine is refused if this process's limits are lower than a run's, because runs would end
-    differently."""
+    """Runs would end differently."""
     number, unlimited = getattr(resource, f"RLIMIT_{limit}"), (resource.RLIM_INFINITY, resource.RLIM_INFINITY)
     monkeypatch.setattr(resource, "getrlimit", lambda which: (1, 1) if which == number else unlimited)
 

@@ -10,16 +10,14 @@ from mutator.errors import MutatorError
 from mutator.workspace import Workspace
 
 
-def test_each_engine_can_be_made() -> None:
-    """Every engine in the list has a working factory and is listed under its own name."""
+def test_each_engine_in_the_list_can_be_created() -> None:
     for name, kind in ENGINES.items():
         assert kind.name == name and kind.about
         assert callable(resolve_name(kind.factory))
 
 
-def test_the_default_is_the_fastest_that_pays(toycar: Workspace) -> None:
-    """A small campaign uses the reference engine and a large one the fork engine. An unknown name is
-    refused."""
+def test_the_default_engine_depends_on_the_size_of_the_campaign(toycar: Workspace) -> None:
+    """A small one uses the reference engine and a large one the fork engine. An unknown name is refused."""
     manifest = toycar.manifest("toycar")
     assert choose_engine(None, manifest, 3) == REFERENCE
     assert choose_engine(None, manifest, 1000) == FORK

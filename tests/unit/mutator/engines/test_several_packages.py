@@ -26,8 +26,8 @@ def several(fork: Fork, edit: Edit) -> Fork:
     return fork
 
 
-def test_both_engines_drive_the_same(several: Fork) -> None:
-    """A mutant that imports the probe by its bare name produces the same bytes with either engine."""
+def test_both_engines_give_the_same_bytes(several: Fork) -> None:
+    """The mutant imports the probe by its bare name."""
     job = several.job(at_time(2.0))
     assert {path for path in job.files if path.endswith("_fi.py")} == {"_fi.py"}
     assert b"\nimport _fi  # fi:probe\n" in b"\n" + job.files["toycar/sensing.py"]
@@ -41,8 +41,7 @@ def test_both_engines_drive_the_same(several: Fork) -> None:
         assert (forked.out / name).read_bytes() == (plain.out / name).read_bytes()
 
 
-def test_a_flat_module_from_elsewhere_is_noticed(several: Fork, tmp_path: Path) -> None:
-    """A run that imports a module of the target from another folder is a harness error."""
+def test_a_flat_module_from_another_folder_is_a_harness_error(several: Fork, tmp_path: Path) -> None:
     _ = several.engine
     (tmp_path / "other").mkdir()
     shutil.copy(several.manifest.root / "margin.py", tmp_path / "other")

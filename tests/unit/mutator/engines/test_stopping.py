@@ -55,7 +55,6 @@ def stopping(fork: Fork, edit: Edit) -> Iterator[Fork]:
 
 
 def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Record:
-    """The record of the toy's fault, which brings the car too close."""
     manifest = fork.manifest
     experiment = Experiment(
         fault=fork.fault(),
@@ -75,8 +74,8 @@ def drive(fork: Fork, engine: Engine, after: AfterHazard, at: float = 2.0) -> Re
     return finished.record
 
 
-def test_stopped_runs_are_the_beginnings_of_those_that_go_on(stopping: Fork) -> None:
-    """Every engine stops at the same step. The result equals that of the complete run, cut at that step."""
+def test_a_stopped_run_equals_the_beginning_of_the_complete_one(stopping: Fork) -> None:
+    """Every engine stops at the same step."""
     fork = stopping.engine
     null = build(stopping.manifest, stopping.models, None, always()).files
     work = stopping.folder / "warm"
@@ -116,8 +115,7 @@ def test_a_drive_that_ends_before_the_fault_is_the_same_in_every_engine(
 def test_a_drive_that_ends_after_the_fault_where_golden_ends(
     stopping: Fork, edit: Edit, terminal: str, outcome: Outcome
 ) -> None:
-    """The fork engine returns the reference engine's record, because the fault acted before that end or
-    caused it."""
+    """The fault acted before that end or caused it, so both engines have the same record."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: {terminal}")
     reference, forked = (
         drive(stopping, one, AfterHazard.STOP) for one in (stopping.engine.reference, stopping.engine)
@@ -146,18 +144,17 @@ def test_a_drive_that_ends_after_the_fault_where_golden_ends(
         ("  stepwise: begin\n", "", "no `stepwise`"),
     ],
 )
-def test_what_cannot_be_told_of_one_step_is_refused(
+def test_a_hazard_over_several_steps_cannot_stop_a_run(
     stopping: Fork, edit: Edit, old: str, new: str, message: str
 ) -> None:
-    """A hazard that stops runs must be computable from the values of a single step. The error names what
-    is not."""
+    """The error names what cannot be computed from the values of a single step."""
     edit(MANIFEST, old, new)
     with pytest.raises(MutatorError, match=re.escape(f"cannot stop at a terminal hazard: {message}")):
         stop_source(stopping.toy.manifest("toycar"))
 
 
-def test_a_target_without_a_terminal_hazard_cannot_stop(stopping: Fork, edit: Edit) -> None:
-    """A target without a terminal hazard is refused, because its runs would never stop."""
+def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edit) -> None:
+    """Its runs would never stop."""
     edit(MANIFEST, ", terminal: true", "")
     edit(MANIFEST, ", terminal: speed > 90", "")
     with pytest.raises(MutatorError, match="no terminal hazard"):
@@ -174,15 +171,15 @@ def test_a_target_without_a_terminal_hazard_cannot_stop(stopping: Fork, edit: Ed
         (math.nan, 1.0, False),
     ],
 )
-def test_when_a_drive_is_over(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    """Any terminal condition over the trace's channels, and over values derived from them, ends a drive."""
+def test_any_terminal_condition_ends_a_drive(stopping: Fork, gap: float, speed: float, over: bool) -> None:
+    """It may use the trace's channels and values derived from them."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
-def test_a_drive_is_over_where_its_trace_says_so(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """A run stops by the rule that also judges its trace, even if a value is NaN."""
+def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
+    """This holds even if a value is NaN."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))
@@ -195,18 +192,16 @@ def test_a_drive_is_over_where_its_trace_says_so(stopping: Fork, edit: Edit, ter
         assert over({"time": t[0], "gap": gap[0], "speed": speed[0]}) is expected, numbers
 
 
-def test_a_run_that_does_not_tell_what_it_recorded_is_no_crash(stopping: Fork, edit: Edit) -> None:
-    """Recorded values that are missing before anything is active are an error of the glue, and no fault is
-    blamed."""
+def test_a_glue_without_recorded_values_is_not_a_crash(stopping: Fork, edit: Edit) -> None:
+    """If values are missing before anything is active, no fault is blamed."""
     edit("tree/toycar/go.py", "def recorded(", "def something_else(")
     record = drive(stopping, stopping.engine.reference, AfterHazard.STOP)
     assert record.status is Status.HARNESS_ERROR
     assert "recorded" in record.detail
 
 
-def test_a_campaign_says_so(stopping: Fork, edit: Edit) -> None:
-    """`after_hazard: stop` applies to every experiment and changes its id. A target that cannot stop is
-    not planned."""
+def test_after_hazard_applies_to_the_whole_campaign(stopping: Fork, edit: Edit) -> None:
+    """`after_hazard: stop` changes every experiment's id. A target that cannot stop is not planned."""
     edit("fault_library/campaigns/small.yaml", "chunk: 2", "chunk: 2\nafter_hazard: stop")
     stopped = make_plan(stopping.toy, "small")
     assert {e.after_hazard for e in (*stopped.experiments, stopped.canary)} == {AfterHazard.STOP}
@@ -223,8 +218,8 @@ def test_a_campaign_says_so(stopping: Fork, edit: Edit) -> None:
         make_plan(stopping.toy, "small")
 
 
-def test_a_trace_up_to_a_time() -> None:
-    """Every channel is cut at the given time. A channel with its own times is cut by these."""
+def test_a_trace_is_cut_at_a_time() -> None:
+    """A channel with its own times is cut by these."""
     trace = {"t": np.arange(4.0), "a": np.arange(4.0), "b": np.array([7.0, 8.0]), "b@": np.array([0.5, 2.5])}
     cut = until(trace, 2.0, "t")
     assert {name: values.tolist() for name, values in cut.items()} == {

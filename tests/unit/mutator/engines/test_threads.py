@@ -40,7 +40,6 @@ def test_threads_are_found_by_name() -> None:
         ),
     ],
 )
-def test_each_thread_is_told_with_what_turns_it_off(names: list[str], told: str, remedy: str) -> None:
-    """The message has the number and the names of the threads, and the known ways to prevent them."""
+def test_the_message_names_threads_and_remedies(names: list[str], told: str, remedy: str) -> None:
     assert re.search(told, threads.too_many(names))
     assert remedy in threads.turned_off(names)

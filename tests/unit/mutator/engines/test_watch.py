@@ -73,7 +73,6 @@ print(json.dumps(watcher.found()["noted"]))
 
 @pytest.fixture(scope="module")
 def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, str]]]:
-    """What the watcher finds for each line of a controller."""
     folder = tmp_path_factory.mktemp("tree")
     lines = [*NOTED, *SOUND]
     body = "".join(f"    {line}\n" for line in lines)
@@ -88,7 +87,7 @@ def noted(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[dict[str, 
 
 
 @pytest.mark.parametrize("line", NOTED)
-def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
+def test_sources_of_nondeterminism_are_reported(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
     """Clocks, unseeded draws, salted hashes and threads are reported with file, line and function."""
     (one,) = noted[line]
     assert one["what"].startswith(NOTED[line])
@@ -96,14 +95,13 @@ def test_what_is_not_the_same_in_each_run_is_noted(line: str, noted: dict[str, l
 
 
 @pytest.mark.parametrize("line", SOUND)
-def test_what_is_the_same_in_each_run_is_not(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
-    """Seeded random draws and times that the run is given are not reported."""
+def test_reproducible_values_are_not_reported(line: str, noted: dict[str, list[dict[str, str]]]) -> None:
+    """Examples are seeded draws and times that the run is given."""
     assert noted[line] == []
 
 
-def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
-    """A clock that a package reads is recorded at the target's line that calls the package, with the
-    package's line."""
+def test_a_clock_read_by_a_package_is_reported_at_the_targets_line(tmp_path: Path) -> None:
+    """The package's line is recorded, too."""
     package, tree = tmp_path / "site-packages" / "pid", tmp_path / "tree"
     for folder in (package, tree):
         folder.mkdir(parents=True)
@@ -124,9 +122,8 @@ def test_a_library_is_told_with_the_line_that_called_it(tmp_path: Path) -> None:
     assert (one["line"], one["via"]) == (4, "pid/__init__.py:5")
 
 
-def test_compiled_code_has_its_classes(tmp_path: Path) -> None:
-    """pandas cannot work with a replaced `datetime`, and imports normally. Dates that the tree reads are
-    recorded."""
+def test_pandas_imports_normally_while_watched(tmp_path: Path) -> None:
+    """pandas cannot work with a replaced `datetime`. Dates that the tree reads are recorded."""
     (tmp_path / "controller.py").write_text(
         "import datetime\nimport pandas\n\ndef drive():\n    assert pandas.Timestamp(2020, 1, 1)\n"
         "    datetime.date.today()\n"

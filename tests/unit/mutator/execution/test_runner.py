@@ -55,7 +55,6 @@ def write(out: Path, **channels: np.ndarray) -> None:
 
 @pytest.fixture
 def judged(toycar: Workspace, tmp_path: Path) -> Callable[..., Record]:
-    """The record of an experiment that leaves the given outputs."""
     manifest = toycar.manifest("toycar")
     experiment = make_plan(toycar, "small", Choices(only='fault_type == "distance"', limit=1)).experiments[0]
     (tmp_path / "golden").mkdir()
@@ -84,24 +83,22 @@ RAN = {"a": {"first": 0.25, "last": 0.5, "count": 3}, "b": {"first": 0.2, "last"
 NEVER = {"a": {"first": None, "last": None, "count": 0}}
 
 
-def test_masked(judged: Callable[..., Record]) -> None:
-    """A run that is activated and does not differ from golden is masked. Its activation covers all
-    injections."""
+def test_an_active_run_that_equals_golden_is_masked(judged: Callable[..., Record]) -> None:
+    """The activation covers all injections."""
     record = judged(ran=RAN)
     assert (record.status, record.outcome) == (Status.OK, Outcome.MASKED)
     assert record.activation == Activation(first=0.2, last=0.5, count=5)
     assert record.max_dev == (("gas", 0.0), ("brake", 0.0), ("wheel_turn", 0.0))
 
 
-def test_sdc_from_the_moment_of_activation(judged: Callable[..., Record]) -> None:
-    """A difference in the step of the activation is attributed to the fault."""
+def test_a_difference_in_the_activation_step_is_sdc(judged: Callable[..., Record]) -> None:
     record = judged(ran=RAN, trace={"brake": stepped(4, 0.5)})
     assert (record.outcome, record.t_manifest) == (Outcome.SDC, T[4])
     assert dict(record.max_dev)["brake"] == 0.5
 
 
-def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
-    """Hazards and counted alerts at or after the activation are kept in order of time."""
+def test_hazards_and_alerts_after_the_activation_are_kept(judged: Callable[..., Record]) -> None:
+    """Hazards and alerts are kept in order of time."""
     said = {
         "hazards": {"H1": 0.9, "H3": 0.3, "TOO_FAST": None},
         "alert_events": [{"name": "brake_hard", "t": t} for t in (0.1, 0.6, 0.7)] + [{"name": "x", "t": 0.5}],
@@ -112,22 +109,24 @@ def test_hazards_and_alerts(judged: Callable[..., Record]) -> None:
     assert record.alerts == (("brake_hard", 0.6),)
 
 
-def test_never_active(judged: Callable[..., Record]) -> None:
-    """A mutant that never executed its fault and equals golden is not_activated."""
+def test_a_mutant_that_never_ran_its_fault_is_not_activated(judged: Callable[..., Record]) -> None:
     assert judged(ran=NEVER).outcome is Outcome.NOT_ACTIVATED
 
 
 @pytest.mark.parametrize(("ran", "told"), [(NEVER, "never active"), (RAN, "before 0.2 s")])
-def test_a_difference_that_cannot_be_the_faults(judged: Callable[..., Record], ran: dict, told: str) -> None:
+def test_a_difference_that_the_fault_cannot_cause(
+    judged: Callable[..., Record], ran: dict, told: str
+) -> None:
     record = judged(ran=ran, trace={"gas": stepped(3)})
     assert (record.status, record.outcome) == (Status.HARNESS_ERROR, None)
     assert told in record.detail
 
 
 @pytest.mark.parametrize("outputs", [{"trace": {}}, {"said": []}, {"trace": {"gas": np.zeros(3)}}])
-def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs) -> None:
-    """A run without a usable trace and record has crashed if its fault was active. Otherwise it is a
-    harness error."""
+def test_a_run_without_usable_outputs_is_a_crash_or_a_harness_error(
+    judged: Callable[..., Record], outputs: Outputs
+) -> None:
+    """The run has crashed if its fault was active."""
     record = judged(ran=RAN, **outputs)
     assert (record.status, record.outcome) == (Status.CRASHED, None)
     assert record.activation is not None
@@ -139,15 +138,16 @@ def test_missing_or_bad_outputs(judged: Callable[..., Record], outputs: Outputs)
 @pytest.mark.parametrize(
     ("status", "kept"), [(Status.CRASHED, True), (Status.TIMEOUT, False), (Status.HARNESS_ERROR, False)]
 )
-def test_other_statuses(judged: Callable[..., Record], status: Status, kept: bool) -> None:
-    """The record of a crash keeps the activation. That of a timeout does not, because its count depends on
-    the machine's speed."""
+def test_a_crash_keeps_its_activation_and_a_timeout_does_not(
+    judged: Callable[..., Record], status: Status, kept: bool
+) -> None:
+    """The count of a timeout depends on the machine's speed."""
     record = judged(status, ran=RAN)
     assert (record.status, record.outcome, record.detail) == (status, None, "why")
     assert (record.activation is not None) == kept
 
 
-def test_mutants_that_cannot_be_made_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
+def test_mutants_that_cannot_be_built_are_not_run(toycar: Workspace, tmp_path: Path) -> None:
     """A mutant that does not compile is invalid, and a missing anchor is a harness error. The other
     experiments run."""
     manifest = toycar.manifest("toycar")

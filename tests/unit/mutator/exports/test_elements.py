@@ -52,8 +52,7 @@ def mutants(report: dict[str, Any]) -> Iterator[tuple[str, dict[str, Any]]]:
         yield from ((file["source"], mutant) for mutant in file["mutants"])
 
 
-def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
-    """Every part that the schema requires is present, with its type and range."""
+def test_the_report_follows_the_schema(report: dict[str, Any]) -> None:
     assert re.fullmatch(r"([1-2]\d*|0)(\.(([1-9]\d*)|0)){0,2}", report["schemaVersion"])
     assert all(0 <= report["thresholds"][name] <= 100 for name in ("high", "low"))
     assert all(type(report["thresholds"][name]) is int for name in ("high", "low"))
@@ -72,8 +71,7 @@ def test_the_structure_is_that_of_the_schema(report: dict[str, Any]) -> None:
     assert len(ids) == len(set(ids)) > 0
 
 
-def test_tests_are_drives(report: dict[str, Any]) -> None:
-    """Every drive that a mutant names is listed once, as a test of its scenario."""
+def test_each_drive_is_listed_once_as_a_test(report: dict[str, Any]) -> None:
     tests = [test["id"] for file in report["testFiles"].values() for test in file["tests"]]
     assert len(tests) == len(set(tests))
     named = {test for _, m in mutants(report) for test in (*m["coveredBy"], *m["killedBy"])}
@@ -82,8 +80,8 @@ def test_tests_are_drives(report: dict[str, Any]) -> None:
 
 
 def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
-    """The location in the source is that of the statement. The replacement is the statement with the
-    injected lines."""
+    """The location in the source is that of the statement. The replacement is the statement with the injected
+    lines."""
     for source, mutant in mutants(report):
         start, end = mutant["location"]["start"], mutant["location"]["end"]
         lines = source.splitlines()[start["line"] - 1 : end["line"]]
@@ -98,8 +96,7 @@ def test_a_mutant_replaces_whole_statements(report: dict[str, Any]) -> None:
 def test_a_mutant_of_an_operator_replaces_its_expression(
     toycar: Workspace, tmp_path: Path, write_run: Write, of_operators: Callable[..., Any]
 ) -> None:
-    """An operator's mutant has the operator's name, the exact columns of the expression, and the
-    replacement. A deleted statement is replaced by `pass`."""
+    """The columns are exact. A deleted statement is replaced by `pass`."""
 
     def changed(plan: Plan) -> Plan:
         mutants = of_operators(toycar, "toycar/driver.py", drives=1)(plan)
@@ -136,15 +133,15 @@ def test_a_mutant_of_an_operator_replaces_its_expression(
     assert (omission["mutatorName"], omission["replacement"]) == ("omission", "pass")
 
 
-def test_killed_means_hazard(report: dict[str, Any]) -> None:
-    """A mutant is killed if its fault led to a hazard in a drive. The other mutants survive."""
+def test_a_mutant_with_a_hazard_is_killed(report: dict[str, Any]) -> None:
+    """The other mutants survive."""
     for _, mutant in mutants(report):
         lane = mutant["description"].startswith("sensor/lane/")
         assert mutant["status"] == ("Killed" if lane else "Survived")
         assert mutant["killedBy"] == (mutant["coveredBy"] if lane else [])
 
 
-def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
+def test_a_run_of_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run: Write) -> None:
     run = write_run(toycar, tmp_path / "run")
     (toycar.library.parent / "tree" / "toycar" / "driver.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match="changed since this run was planned: target"):
@@ -167,13 +164,13 @@ def test_another_target_is_refused(toycar: Workspace, tmp_path: Path, write_run:
         ([{"status": Status.HARNESS_ERROR, "outcome": None, "activation": None}, {}], "Survived"),
     ],
 )
-def test_status(
+def test_the_status_follows_from_the_outcomes_of_the_drives(
     became: list[dict[str, Any] | None],
     status: str,
     experiment: Callable[..., Experiment],
     record: Callable[..., Record],
 ) -> None:
-    """The status of a fault follows from the outcomes of its drives. Hazards take precedence."""
+    """Hazards take precedence."""
     drives = [experiment(scenario=f"S{i}") for i in range(len(became))]
     records = {
         e.id: record(e.id, **fields) for e, fields in zip(drives, became, strict=True) if fields is not None

@@ -25,8 +25,7 @@ BECAME: dict[str, dict[str, Any] | None] = {
 
 
 def became(e: Experiment) -> dict[str, Any] | None:
-    """The result of an experiment: lane faults are hazards, silence is a harness error, distance is
-    masked, not activated or not run."""
+    """Make lane faults hazards, silence a harness error, and distance masked, not activated or not run."""
     if e.fault.fault_type in BECAME:
         return BECAME[e.fault.fault_type]
     if e.method.value == "random":
@@ -45,7 +44,6 @@ def run(
 
 
 def cases(file: Path) -> dict[str, list[ET.Element]]:
-    """The cases of each suite, by the last word of the suite's name."""
     root = ET.parse(file).getroot()
     suites = root.findall("testsuite")
     for element in (root, *suites):
@@ -55,9 +53,8 @@ def cases(file: Path) -> dict[str, list[ET.Element]]:
     return {suite.get("name", "").split("/")[1]: suite.findall("testcase") for suite in suites}
 
 
-def test_a_hazard_is_data(run: Path) -> None:
-    """Hazards pass, harness errors are errors, and faults that did not act or run are skipped. The counts
-    agree."""
+def test_hazards_pass_by_default(run: Path) -> None:
+    """Harness errors are errors, and faults that did not act or run are skipped. The counts agree."""
     file = export(run, Format.JUNIT)
     found = cases(file)
     assert set(found) == {"lane", "silence", "distance"}
@@ -82,14 +79,13 @@ def test_hazards_as_failures(run: Path, tmp_path: Path) -> None:
     assert not any(list(c.iter("failure")) for c in found["distance"])
 
 
-def test_an_error_cannot_be_a_failure(run: Path) -> None:
-    """A harness error cannot be selected as a failure, because it says nothing about the controller."""
+def test_a_harness_error_cannot_be_selected_as_a_failure(run: Path) -> None:
+    """Harness errors say nothing about the controller."""
     with pytest.raises(MutatorError, match="harness_error"):
         export(run, Format.JUNIT, parts=Parts(failures=["harness_error"]))
 
 
-def test_tables_are_those_of_the_run(run: Path, tmp_path: Path) -> None:
-    """The CSV and Parquet exports are the run's own tables, up to date."""
+def test_csv_and_parquet_exports_are_the_runs_tables(run: Path, tmp_path: Path) -> None:
     for format, name in ((Format.CSV, "results.csv"), (Format.PARQUET, "results.parquet")):
         file = export(run, format, tmp_path / "new" / name)
         assert file.read_bytes() == (run / name).read_bytes()

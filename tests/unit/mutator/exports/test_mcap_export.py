@@ -56,8 +56,7 @@ FAULTY = Series(  # the run ended after 0.5 s; gas was 1 for one step in between
 
 
 def became(e: Experiment) -> dict[str, Any]:
-    """The result of an experiment: lane faults are hazards with every kind of event, and all others are
-    masked."""
+    """Make lane faults hazards with every kind of event, and mask all others."""
     if e.fault.fault_type != "lane":
         return {}
     return {
@@ -91,9 +90,9 @@ def hazardous(run: Path) -> list[str]:
     return [r.experiment_id for r in RunFolder.open(run).records().values() if r.hazards]
 
 
-def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
-    """Each channel of a run is a topic with a schema and a unit. Each value is a message at its time, each
-    event is a message, and values that are not finite are null."""
+def test_golden_run_faulty_run_and_events_are_read_back(run: Path, tmp_path: Path) -> None:
+    """Each channel of a run is a topic with a schema and a unit. Each value and each event is a message, and
+    values that are not finite are null."""
     only = 'outcome == "hazard" and fault_type == "lane"'
     out = export(run, Format.MCAP, tmp_path / "out", parts=Parts(only=only))
     assert sorted(path.stem for path in out.iterdir()) == sorted(hazardous(run))
@@ -131,7 +130,7 @@ def test_both_runs_and_the_events_come_back(run: Path, tmp_path: Path) -> None:
     ]
 
 
-def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -> None:
+def test_negative_times_are_shifted(run: Path, tmp_path: Path) -> None:
     """Log times cannot be negative. All times are shifted by the same amount, which the metadata give."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
@@ -151,11 +150,10 @@ def test_times_below_0_count_from_the_first_message(run: Path, tmp_path: Path) -
     assert facts["times"] == {"first_s": "-0.5"}
 
 
-def test_a_kept_trace_of_another_run_is_refused(
+def test_a_damaged_or_foreign_trace_is_refused(
     run: Path, tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A stored trace that is damaged, or that is not the campaign's, is an error with its file, because
-    the series would show another result."""
+    """The series would show another result."""
     copy, name = tmp_path / "run", hazardous(run)[0]
     shutil.copytree(run, copy)
     faulty = copy / "traces" / name / "faulty"
@@ -176,9 +174,8 @@ def test_the_same_run_gives_the_same_bytes(run: Path, tmp_path: Path) -> None:
     assert first.read_bytes() == again.read_bytes()
 
 
-def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> None:
-    """The export reports how many experiments it leaves out, with the command that reruns them. An empty
-    export is an error."""
+def test_experiments_without_a_series_are_reported(run: Path, tmp_path: Path) -> None:
+    """The message has the command that reruns them. An empty export is an error."""
     left = 8 - len(hazardous(run))
     with pytest.warns(
         MutatorWarning, match=f"{left} of 8 experiments have no series.*mutator rerun .* --trace"
@@ -200,7 +197,7 @@ def test_experiments_without_a_series_are_told(run: Path, tmp_path: Path) -> Non
         (Format.CSV, Parts(failures=["hazard"]), "failures"),
     ],
 )
-def test_what_a_format_has_no_use_for_is_refused(
+def test_an_option_that_a_format_does_not_use_is_refused(
     run: Path, tmp_path: Path, format: Format, parts: Parts, name: str
 ) -> None:
     with pytest.raises(MutatorError, match=f"leave `{name}` out"):

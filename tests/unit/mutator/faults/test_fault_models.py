@@ -56,9 +56,8 @@ def broken(folder: Path, name: str, old: str, new: str) -> str:
     return str(caught.value).replace(f"{path}:", "")
 
 
-def test_the_models_that_ship(clone: Workspace) -> None:
-    """The expected models ship, each with at least one example. Two wrap statements, and some belong to
-    operators."""
+def test_the_expected_models_ship(clone: Workspace) -> None:
+    """Two wrap statements, and some belong to operators."""
     models = clone.fault_models()
     assert list(models.models) == sorted(NAMES + OF_OPERATORS)
     assert [m.name for m in models if m.kind is SnippetKind.GUARD] == ["omission", "reordering"]
@@ -66,19 +65,16 @@ def test_the_models_that_ship(clone: Workspace) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES + OF_OPERATORS)
-def test_examples_hold(clone: Workspace, name: str) -> None:
-    """Each model's examples produce exactly the stated text, and the original can be restored from it."""
+def test_the_examples_of_the_models_hold(clone: Workspace, name: str) -> None:
+    """The original can be restored from each."""
     models = clone.fault_models()
     model = models.get(name)
     for example in model.examples:
         assert run_example(model, models, example) == example.after
 
 
-def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> None:
-    """The digest covers which models raise on purpose, because verdicts depend on it.
-
-    These models do not run the target's own code as it is written.
-    """
+def test_the_digest_covers_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
+    """Verdicts depend on it. These models do not run the target's own code as it is written."""
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)
     path = folder / "scale.yaml"
@@ -90,8 +86,7 @@ def test_what_raises_is_part_of_the_digest(folder: Path, clone: Workspace) -> No
     assert models.digest != known.digest
 
 
-def test_an_example_that_does_not_hold(folder: Path) -> None:
-    """If a template's output differs from its example, the problem has file and line."""
+def test_a_wrong_example_is_reported_with_its_line(folder: Path) -> None:
     path = folder / "scale.py.j2"
     path.write_text(path.read_text().replace(" * ", " / "))
     (problem,) = check_examples(load_fault_models(folder))
@@ -99,8 +94,7 @@ def test_an_example_that_does_not_hold(folder: Path) -> None:
     assert all(f"self.yaw_rate {sign} _fi.like(" in str(problem) for sign in "*/")
 
 
-def test_an_example_that_fails(folder: Path) -> None:
-    """A template that does not parse is reported as a problem of its examples, without a traceback."""
+def test_a_template_that_does_not_parse_is_reported(folder: Path) -> None:
     (folder / "scale.py.j2").write_text("if {{ target:\n")
     (problem,) = check_examples(load_fault_models(folder))
     assert "scale.yaml:11: the example fails" in str(problem) and "scale.py.j2:1: the template fails" in str(
@@ -108,8 +102,7 @@ def test_an_example_that_fails(folder: Path) -> None:
     )
 
 
-def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
-    """The digest changes with anything that determines a mutant's text."""
+def test_the_digest_covers_everything_that_determines_a_mutant(folder: Path) -> None:
     before = load_fault_models(folder).digest
     for name in ("offset.py.j2", "_fi.py.j2"):
         (folder / name).write_text((folder / name).read_text() + "\n")
@@ -148,18 +141,18 @@ def test_the_digest_covers_templates_and_probe(folder: Path) -> None:
         ),
     ],
 )
-def test_a_mistake_is_answered(folder: Path, name: str, old: str, new: str, said: str) -> None:
-    """A model's YAML is read as strictly as other files."""
+def test_a_mistake_in_a_models_yaml_is_reported(
+    folder: Path, name: str, old: str, new: str, said: str
+) -> None:
     assert said in broken(folder, name, old, new)
 
 
-def test_a_missing_template(folder: Path) -> None:
-    """A YAML file without its template is refused by name."""
+def test_a_missing_template_is_refused_by_name(folder: Path) -> None:
     (folder / "scale.py.j2").unlink()
     with pytest.raises(MutatorError, match=r"scale.py.j2: cannot be read"):
         load_fault_models(folder)
 
 
-def test_an_empty_folder(tmp_path: Path) -> None:
+def test_a_folder_without_models_is_refused(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match="no fault model"):
         load_fault_models(tmp_path)

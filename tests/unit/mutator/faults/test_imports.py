@@ -39,8 +39,7 @@ def answer(toy: Workspace, name: str) -> str:
     return ""
 
 
-def test_a_name_that_the_target_defines(toy: Workspace) -> None:
-    """A spec may import a class of one of the target's modules."""
+def test_a_spec_may_import_a_class_of_the_target(toy: Workspace) -> None:
     assert answer(toy, "toycar.sensor.Sensor") == ""
 
 
@@ -58,22 +57,19 @@ def test_a_name_that_the_target_defines(toy: Workspace) -> None:
         ("toycar.sensor.Sensor()", "'Sensor()' is not defined in toycar/sensor.py"),
     ],
 )
-def test_a_name_that_is_not_there(toy: Workspace, name: str, said: str) -> None:
-    """A name that no module of the target defines is reported at its line."""
+def test_an_undefined_name_is_reported_at_its_line(toy: Workspace, name: str, said: str) -> None:
     assert answer(toy, name).startswith(f"weather.yaml:16: {said}")
 
 
 @pytest.mark.parametrize(
     "line", ["from toycar.road import Rain", "import x as Rain", "Rain = Snow", "def Rain(): 0"]
 )
-def test_names_are_defined_in_many_ways(toy: Workspace, line: str) -> None:
-    """A package that only re-exports a name also defines it."""
+def test_a_reexported_name_is_defined(toy: Workspace, line: str) -> None:
     (Path(toy.manifest("toy").root) / "toycar" / "sky.py").write_text(f"{line}\n")
     check_import(toy.manifest("toy"), "toycar.sky.Rain")
 
 
-def test_a_module_that_does_not_parse(toy: Workspace) -> None:
-    """A target module that is not valid Python is an error at its line, without a traceback."""
+def test_an_invalid_target_module_is_an_error_at_its_line(toy: Workspace) -> None:
     path = Path(toy.manifest("toy").root) / "toycar" / "sky.py"
     path.write_text("class Rain:\n    x = = 1\n")
     with pytest.raises(MutatorError, match="not valid Python: invalid syntax") as caught:

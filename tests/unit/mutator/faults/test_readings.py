@@ -24,7 +24,7 @@ def declare(workspace: Workspace, first: str, second: str) -> None:
 
 
 def test_the_first_reading_is_the_default(toy: Workspace) -> None:
-    """Readings keep the order of the file and are not sorted."""
+    """Readings keep the order of the file."""
     declare(toy, "printed", "measured")
     readings = load_readings(toy.library)
     assert (readings.names, readings.default) == (("printed", "measured"), "printed")
@@ -45,9 +45,8 @@ def test_a_library_without_the_file_has_one_reading(toy: Workspace) -> None:
     assert ids() == before
 
 
-def test_specs_are_written_in_the_names_that_are_declared(toy: Workspace) -> None:
-    """If a library declares other readings, its specs use their names as keys, and its faults have these
-    readings."""
+def test_specs_use_the_declared_readings_as_keys(toy: Workspace) -> None:
+    """The faults have these readings, too."""
     for path in toy.spec_files():
         text = path.read_text().replace("as_described:", "printed:").replace("as_coded:", "measured:")
         path.write_text(text)
@@ -69,8 +68,7 @@ def test_specs_are_written_in_the_names_that_are_declared(toy: Workspace) -> Non
         ("schema: readings/1\nreadings: {a: {abuot: x}}\n", "unknown key 'abuot'"),
     ],
 )
-def test_a_mistake_is_answered_with_its_line(tmp_path: Path, text: str, said: str) -> None:
-    """A missing reading, an invalid name and a misspelt key are reported with their line."""
+def test_a_mistake_is_reported_with_its_line(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / FILE).write_text(text)
     with pytest.raises(MutatorError) as error:
         load_readings(tmp_path)

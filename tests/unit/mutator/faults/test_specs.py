@@ -28,8 +28,8 @@ def of(found: tuple[Fault, ...], variant: str) -> list[Fault]:
     return [fault for fault in found if fault.spec == f"{NAME}/{variant}"]
 
 
-def test_a_spec_is_read(toy: Workspace) -> None:
-    """Variants keep their order. The number of faults is known before any fault is built."""
+def test_a_spec_keeps_the_order_of_its_variants(toy: Workspace) -> None:
+    """The number of faults is known before any fault is built."""
     spec = toy.spec(NAME)
     assert [v.name for v in spec] == ["longer", "silent", "both"]
     assert [v.count for v in spec] == [3, 1, 2]
@@ -38,7 +38,7 @@ def test_a_spec_is_read(toy: Workspace) -> None:
 
 
 def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
-    """An integer range gives integers, in the order of the ranges and in the key's unit."""
+    """Integers follow the order of the ranges and have the key's unit."""
     found = of(faults(toy), "longer")
     assert [f.value // 10 for f in found] == [1, 2, 3]
     assert all(isinstance(f.value, int) and f.unit == "m" and f.aim == "H1" for f in found)
@@ -47,9 +47,8 @@ def test_expansion_draws_one_value_from_each_range(toy: Workspace) -> None:
     ]
 
 
-def test_expansion_converts_units(toy: Workspace) -> None:
-    """A value in km/h is converted for a variable in m/s, with the sign that the spec gives. The table
-    keeps km/h."""
+def test_values_are_converted_to_the_variables_unit(toy: Workspace) -> None:
+    """The spec gives the sign. The table keeps km/h."""
     for fault in of(faults(toy), "both"):
         by = dict(fault.injections[1].params)["by"]
         assert by == pytest.approx(-float(fault.value) / 3.6)
@@ -59,7 +58,7 @@ def test_expansion_converts_units(toy: Workspace) -> None:
 
 def test_both_readings_share_their_draws(toy: Workspace) -> None:
     """As coded, the same number is taken in another unit. A variant without a part for the reading is the
-    same in both readings."""
+    same in both."""
     described, coded = faults(toy), faults(toy, reading="as_coded")
     assert [f.value for f in described] == [f.value for f in coded]
     assert all(f.reading == "as_coded" for f in coded)
@@ -75,9 +74,8 @@ def test_hold_and_changes_belong_to_the_fault(toy: Workspace) -> None:
     assert (silent.value, silent.unit) == (None, "-")
 
 
-def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
-    """A setting of a reading overrides the variant's. A reading that the variant does not mention uses the
-    variant's setting."""
+def test_a_reading_may_override_latching(toy: Workspace) -> None:
+    """A reading that the variant does not mention uses the variant's setting."""
     path = toy.spec(NAME).path
     text = path.read_text()
     both = text.index("as_coded:", text.index("both:"))
@@ -88,8 +86,7 @@ def test_a_fault_may_latch_in_one_reading_alone(toy: Workspace) -> None:
     assert {fault.hold for fault in of(faults(workspace, reading="as_coded"), "silent")} == {Hold.TO_END}
 
 
-def test_ids_are_contents(toy: Workspace) -> None:
-    """The same seed gives the same ids, another seed gives other ids, and no two faults have the same id."""
+def test_ids_depend_on_the_seed_and_are_unique(toy: Workspace) -> None:
     again = [f.id for f in faults(toy)]
     assert again == [f.id for f in faults(toy)]
     assert len(set(again)) == 6
@@ -97,9 +94,8 @@ def test_ids_are_contents(toy: Workspace) -> None:
     assert other != again and other[3] == again[3], "only the fault without a value stays the same"
 
 
-def test_a_cap_is_kept_and_keys_share_draws() -> None:
-    """The cap limits the number of values. The same key and range give the same values, and another key
-    gives others."""
+def test_the_cap_limits_the_number_of_values() -> None:
+    """The same key and range give the same values, and another key gives others."""
     ranges = tuple((float(i), float(i + 9)) for i in range(10, 70, 10))
     draw = Draw(key="k", name="speed", unit="mph", kind="integers", ranges=ranges, cap=60)
     same = Draw(key="k", name="fast", unit="mph", kind="integers", ranges=ranges, cap=60)
@@ -114,8 +110,10 @@ def test_a_cap_is_kept_and_keys_share_draws() -> None:
     [("true", True), ("null", None), ("far", "far"), ("'12'", "12"), ("'it''s #1'", "it's #1")],
 )
 @pytest.mark.parametrize("unit", ["          unit: m\n", ""])
-def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, value: object) -> None:
-    """A variable of any unit may be stuck at a truth value, at None or at a text."""
+def test_a_variable_may_be_stuck_at_a_value_without_a_unit(
+    toy: Workspace, unit: str, written: str, value: object
+) -> None:
+    """Such a value is a truth value, None or a text."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()
@@ -125,8 +123,8 @@ def test_constants_that_are_no_numbers(toy: Workspace, unit: str, written: str, 
     assert dict(of(faults(toy), "longer")[0].injections[0].params) == {"target": "gap", "value": value}
 
 
-def test_constants_that_are_drawn(toy: Workspace) -> None:
-    """A parameter whose text is the name of the draw gets the drawn value, converted."""
+def test_a_parameter_may_name_the_drawn_value(toy: Workspace) -> None:
+    """The value is converted."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text().replace("model: offset", "model: stuck", 1)
     path.write_text(text.replace("by_m: error", "value_m: -error", 1))
@@ -135,7 +133,6 @@ def test_constants_that_are_drawn(toy: Workspace) -> None:
 
 
 def edited(workspace: Workspace, old: str, new: str) -> str:
-    """The error from loading and expanding the spec after one edit, without the file's name."""
     path = workspace.library / "faults" / "sensor" / "distance.yaml"
     text = path.read_text()
     assert text.count(old) >= 1
@@ -317,8 +314,8 @@ def edited(workspace: Workspace, old: str, new: str) -> str:
         ),
     ],
 )
-def test_a_mistake_is_answered(toy: Workspace, old: str, new: str, said: str) -> None:
-    """The message has file and line, the invalid value, the expected one, and a remedy."""
+def test_a_mistake_is_reported_with_a_remedy(toy: Workspace, old: str, new: str, said: str) -> None:
+    """The message has file and line, the invalid value, and the expected one."""
     assert said.replace("{KNOWN}", KNOWN) in edited(toy, old, new)
 
 
@@ -328,7 +325,6 @@ def test_a_spec_outside_the_library_is_loaded_by_path(tmp_path: Path, toy: Works
     assert load_spec(path, toy.readings()).count == toy.spec(path).count == 6
 
 
-def test_an_unknown_reading(toy: Workspace) -> None:
-    """The error lists the library's declared readings."""
+def test_an_unknown_reading_is_refused(toy: Workspace) -> None:
     with pytest.raises(MutatorError, match="reading 'as_built'; expected one of as_described, as_coded"):
         faults(toy, reading="as_built")

@@ -34,14 +34,13 @@ def texts(file: Path) -> list[str]:
     return ["".join(e.itertext()) for e in ET.parse(file).getroot().iter("{http://www.w3.org/2000/svg}text")]
 
 
-def test_a_run_has_one_hazard_several_or_none(frame: pd.DataFrame) -> None:
-    """A bar is divided by the sets of hazards, so that each run is in exactly one part."""
+def test_each_run_is_in_exactly_one_part_of_a_bar(frame: pd.DataFrame) -> None:
+    """A bar is divided by the sets of hazards."""
     assert list(hazards.hazard_sets(frame)) == ["H1", "several", "", "", "", "H2"]
 
 
-def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
-    """The length of a bar is the count, and its label is the number injected. A type that was never
-    activated has no rate."""
+def test_hazard_bars_show_counts(frame: pd.DataFrame) -> None:
+    """The label is the number injected. A type that was never activated has no rate."""
     figure = hazards.draw(frame)
     guided, _, rates = figure.axes
     widths = {c.get_label(): [bar.get_width() for bar in c] for c in guided.containers}
@@ -51,8 +50,8 @@ def test_hazards_stand_with_their_counts(frame: pd.DataFrame) -> None:
     assert drawn == {"guided": [pytest.approx(200 / 3)], "random": [100]}
 
 
-def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.DataFrame) -> None:
-    """The colour shows hazards per activated fault. A cell without activated faults has no colour."""
+def test_the_heat_map_shows_hazards_per_activated_fault(frame: pd.DataFrame) -> None:
+    """A cell without activated faults has no colour."""
     guided = heat_map.draw(frame).axes[0]
     assert sorted(text.get_text() for text in guided.texts) == ["0/0", "2/3"]
     cells = guided.images[0].get_array()
@@ -60,7 +59,7 @@ def test_the_heat_map_tells_counts_and_leaves_unknown_rates_empty(frame: pd.Data
     assert cells.mask.tolist() == [[False, True], [True, True]]
 
 
-def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None:
+def test_times_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
     """Each panel has a bar if a run has both events, labelled with the number of runs. The mean is marked."""
     panels = {axis.get_title(loc="left"): axis for axis in propagation.draw(frame).axes}
     assert [t.get_text() for t in panels["activation to manifest"].texts] == ["3", "1"]
@@ -70,8 +69,8 @@ def test_times_are_of_the_runs_that_had_both_events(frame: pd.DataFrame) -> None
     assert means["random: mean"] == [2.0]
 
 
-def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """The SVG and PNG of a figure that is drawn again have the same bytes. The SVG has names as text."""
+def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame, tmp_path: Path) -> None:
+    """This holds for SVG and PNG. The SVG has names as text."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)
@@ -81,9 +80,8 @@ def test_files_are_the_same_each_time(frame: pd.DataFrame, tmp_path: Path) -> No
     assert "vision_input/blur" in texts(tmp_path / "figures" / "hazards_by_fault_type.svg")
 
 
-def test_nothing_is_drawn_of_what_cannot_be_compared(frame: pd.DataFrame) -> None:
-    """Results with a single fault type or scenario have no figure that compares these. Empty results have
-    no figures."""
+def test_a_single_fault_type_or_scenario_is_not_compared(frame: pd.DataFrame) -> None:
+    """Empty results have no figures."""
     chaff, blur = frame[frame["kind"] == "radar/chaff"], frame[frame["scenario"] == "S2"]
     assert drawings(chaff) == drawings(blur) == drawings(frame[:0]) == ()
     one_scenario = frame.assign(scenario="S1")

@@ -58,9 +58,8 @@ def test_an_svg_names_channels_units_and_marks(tmp_path: Path, manifest: SimpleN
     assert "not_recorded" not in text
 
 
-def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
-    """Lines and marks after the drive's end are grey, and the axes ignore them. Without an end, nothing is
-    grey."""
+def test_everything_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace) -> None:
+    """The axes ignore it. Without an end, nothing is grey."""
     faulty = trace()
     faulty["gas"] = np.where(TIME > 2.0, -500.0, faulty["gas"])
     marks = [Mark(kind=MarkKind.HAZARD, t=t, label="H") for t in (2.0, 2.5)]
@@ -76,27 +75,25 @@ def test_what_comes_after_the_end_of_the_drive_is_grey(manifest: SimpleNamespace
     assert (len(whole.lines), whole.get_ylim()[0] < -500.0) == (2, True)
 
 
-def test_the_same_run_draws_the_same_svg(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """A plot drawn again has the same bytes."""
+def test_a_plot_drawn_again_has_the_same_bytes(tmp_path: Path, manifest: SimpleNamespace) -> None:
     for name in ("a.svg", "b.svg"):
         save(draw_run(trace(), trace(0.1), manifest, title="x"), [tmp_path / name])
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
 
 
-def test_a_png_is_a_png(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """The file's suffix decides the format."""
+def test_the_files_suffix_decides_the_format(tmp_path: Path, manifest: SimpleNamespace) -> None:
     save(draw_run(trace(), trace(), manifest, title="x"), [tmp_path / "p.png"])
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_runs_without_a_common_channel_are_refused(tmp_path: Path, manifest: SimpleNamespace) -> None:
-    """Runs without a common channel are an error that names the manifest. No empty figure is drawn."""
+    """The error names the manifest. No empty figure is drawn."""
     with pytest.raises(MutatorError, match=re.escape("m.yaml")):
         draw_run(trace(), {"t": TIME}, manifest, title="x")
 
 
-def test_marks_come_from_the_record_in_order_of_time() -> None:
-    """A record's marks are its activation, manifestation, alerts and hazards, earliest first."""
+def test_marks_of_a_record_are_sorted_by_time() -> None:
+    """Marks are the activation, the manifestation, alerts and hazards."""
     record = Record(
         experiment_id="0" * 16,
         status=Status.OK,

@@ -59,7 +59,7 @@ def candidates(**sources: str) -> tuple[LoopCandidate, ...]:
     return loop_candidates(Survey(root=None, packages=(), modules=modules))  # type: ignore[arg-type]
 
 
-def test_the_controllers_step_comes_first() -> None:
+def test_the_controllers_step_ranks_first() -> None:
     """A method with a step's name, in a class with state and called in a loop, ranks before the world or a
     helper."""
     first, *others = candidates(car=CAR)
@@ -67,15 +67,14 @@ def test_the_controllers_step_comes_first() -> None:
     assert {one.name for one in others} == {"World.advance", "clip", "run"}
 
 
-def test_what_it_needs() -> None:
-    """The candidate lists the arguments without a default, keyword ones included, of the step and of the
-    constructor."""
+def test_required_arguments_are_listed() -> None:
+    """Those of the step and of the constructor are listed, keyword ones included."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")
 
 
-def test_values_are_numbers_that_have_a_name() -> None:
+def test_values_are_named_numbers() -> None:
     """Texts, items and unpacked tuples are not listed. Arithmetic on a name that is assigned once comes
     first. A name that is assigned several times is distinguished."""
     first, *_ = candidates(car=CAR)
@@ -96,8 +95,7 @@ def test_values_of_inner_functions_are_not_the_steps() -> None:
     assert {value.name for value in step.values} == {"x", "y", "z"}
 
 
-def test_a_file_named_for_a_controller_counts() -> None:
-    """If two functions are equal, the one in a file named after a controller comes first."""
+def test_of_two_equal_functions_the_one_in_a_controllers_file_ranks_first() -> None:
     source = "def step(x):\n    y = x + 1\n    return y\n"
     assert [one.path for one in candidates(a=source, pilot=source)] == ["pilot.py", "a.py"]
 
@@ -112,7 +110,6 @@ def test_a_file_named_for_a_controller_counts() -> None:
         "async def step(x):\n    y = x + 1\n    return y\n",
     ],
 )
-def test_nothing_to_step(source: str) -> None:
-    """Modules without functions that do something have no candidate. A coroutine is no candidate, because
-    calling it runs nothing."""
+def test_modules_without_a_step_have_no_candidate(source: str) -> None:
+    """A coroutine is no candidate, because calling it runs nothing."""
     assert candidates(a=source) == ()

@@ -15,8 +15,6 @@ Tree = Callable[..., Path]
 
 @pytest.fixture
 def tree(tmp_path: Path) -> Tree:
-    """Write files below a folder, given as path and text."""
-
     def write(**files: str) -> Path:
         for name, text in files.items():
             path = tmp_path / "tree" / name.replace("__", "/").replace("_py", ".py")
@@ -28,9 +26,8 @@ def tree(tmp_path: Path) -> Tree:
     return write
 
 
-def test_packages_and_flat_modules(tree: Tree) -> None:
-    """Packages and flat modules are distinguished. Tests, setup scripts and folders without Python are
-    ignored."""
+def test_packages_and_flat_modules_are_distinguished(tree: Tree) -> None:
+    """Tests, setup scripts and folders without Python are ignored."""
     folder = tree(
         pkg__a_py="",
         loose_py="",
@@ -46,8 +43,7 @@ def test_packages_and_flat_modules(tree: Tree) -> None:
     assert [module.name for module in found.modules] == ["loose", "pkg.a"]
 
 
-def test_a_package_itself(tree: Tree) -> None:
-    """If the folder of a package is given, the root is the folder above it."""
+def test_the_root_of_a_package_is_the_folder_above_it(tree: Tree) -> None:
     folder = tree(pkg__a_py="x = 1\n")
     (folder / "pkg" / "__init__.py").touch()
     found = look_at(str(folder / "pkg"))
@@ -55,8 +51,7 @@ def test_a_package_itself(tree: Tree) -> None:
     assert [module.name for module in found.modules] == ["pkg", "pkg.a"]
 
 
-def test_a_src_layout(tree: Tree) -> None:
-    """The root of a project with its package in src/ is that folder."""
+def test_src_is_the_root_of_a_project_with_a_src_layout(tree: Tree) -> None:
     folder = tree(src__pkg__a_py="", setup_py="")
     found = look_at(str(folder))
     assert (found.root, found.packages) == (folder / "src", ("pkg",))
@@ -66,9 +61,8 @@ def test_an_empty_folder(tree: Tree) -> None:
     assert look_at(str(tree())).packages == ()
 
 
-def test_what_cannot_be_read_is_told(tree: Tree) -> None:
-    """A file with a syntax error, or one that is not text, is left out and listed with position and
-    reason."""
+def test_an_unreadable_file_is_listed_with_its_position(tree: Tree) -> None:
+    """The file has a syntax error or is not text."""
     folder = tree(bad_py="x = 1\ndef (:\n", good_py="")
     (folder / "binary.py").write_bytes(b"\0\xff")
     found = look_at(str(folder))
@@ -83,8 +77,8 @@ def test_nothing_is_imported(tree: Tree) -> None:
     assert "harm" not in sys.modules
 
 
-def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
-    """Pipes, dangling links and files whose names are not module names are left out."""
+def test_files_that_cannot_be_imported_are_left_out(tree: Tree) -> None:
+    """Pipes, dangling links and files whose names are not module names cannot be imported."""
     folder = tree(pkg__a_py="")
     for name in ("b-c.py", "class.py"):
         (folder / "pkg" / name).touch()
@@ -95,14 +89,14 @@ def test_what_cannot_be_imported_is_no_module(tree: Tree) -> None:
     assert [module.path for module in found.modules] == ["pkg/a.py"]
 
 
-def test_its_warnings_are_its_own(tree: Tree, recwarn: pytest.WarningsRecorder) -> None:
-    """Python's warnings about the controller's code are not shown."""
+def test_warnings_about_the_controllers_code_are_not_shown(
+    tree: Tree, recwarn: pytest.WarningsRecorder
+) -> None:
     look_at(str(tree(odd_py="x = '\\d'\ny = 1 is 1\n")))
     assert not recwarn.list
 
 
-def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
-    """Hidden folders, and virtual environments of any name below a package, are left out."""
+def test_environments_and_hidden_folders_are_left_out(tree: Tree) -> None:
     folder = tree(pkg__a_py="", pkg__own__lib_py="")
     (folder / "pkg" / "own" / "pyvenv.cfg").touch()
     (folder / "pkg" / ".hidden").mkdir()
@@ -110,8 +104,8 @@ def test_environments_and_hidden_folders_are_no_source(tree: Tree) -> None:
     assert [module.path for module in look_at(str(folder)).modules] == ["pkg/a.py"]
 
 
-def test_an_installed_package() -> None:
-    """`installed:NAME` finds a package without importing it, and adds its requirement."""
+def test_an_installed_package_is_found_without_importing_it() -> None:
+    """The package's requirement is added."""
     found = look_at("installed:typer")
     assert found.packages == ("typer",)
     assert found.requires and found.requires.startswith("typer>=")
@@ -127,9 +121,7 @@ def test_an_installed_package() -> None:
         ("installed:math", "no installed package 'math'"),
     ],
 )
-def test_what_is_not_there_is_told(target: str, words: str) -> None:
-    """A missing folder or package, or one without Python source, is reported as a user's error with a
-    remedy."""
+def test_a_missing_folder_or_package_is_a_users_error(target: str, words: str) -> None:
     with pytest.raises(MutatorError, match=words) as told:
         look_at(target)
     assert told.value.remedy

@@ -20,9 +20,8 @@ def _number(path: Path, text: str) -> int:
     return next(i for i, line in enumerate(path.read_text().splitlines(), 1) if text in line)
 
 
-def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
-    """The lines of each step are recorded, without those of constructors and lines that do not run. The
-    run equals the golden run byte for byte."""
+def test_lines_are_recorded_from_the_first_observation_on(toycar: Workspace, tmp_path: Path) -> None:
+    """Lines of constructors are left out. The run equals the golden run byte for byte."""
     manifest = toycar.manifest("toycar")
     base = prepare_base(manifest, tmp_path / "base")
     engine = ReferenceEngine(manifest, base, tmp_path, LIMITS)
@@ -42,9 +41,10 @@ def test_lines_are_noted_from_the_first_observation_on(toycar: Workspace, tmp_pa
     assert "toycar/show.py" not in noted.lines
 
 
-def test_lines_are_measured_once(toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The second time, the lines come from the cache. A damaged entry is measured again, and a failed run
-    is an error."""
+def test_executed_lines_are_cached(
+    toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A damaged entry is measured again, and a failed run is an error."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     manifest = toycar.manifest("toycar")
     drive = GoldenDrive(scenario=toycar.scenario("A"), changes=(), seed=7)

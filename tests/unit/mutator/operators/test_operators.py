@@ -92,8 +92,7 @@ CHANGES = {
 
 @pytest.fixture
 def make(tmp_path: Path, clone: Workspace) -> Make:
-    """The mutations of a function `f` with this source as its body, by all operators or by the given ones,
-    without duplicates of equal code."""
+    """The mutations of a function `f` with this source as its body, by all operators or by the given ones."""
     models = clone.fault_models()
 
     def made(body: str, *operators: str, head: str = "def f(self, a, b):") -> list[Mutation]:
@@ -111,8 +110,7 @@ def test_changes_of_operator(operator: str, make: Make) -> None:
         assert [one.text for one in make(body, operator)] == expected, body
 
 
-def test_yield_is_not_calculated_again(make: Make) -> None:
-    """An expression with `yield` is not mutated in a way that would suspend the function twice."""
+def test_a_yield_is_not_evaluated_twice(make: Make) -> None:
     assert not make("return (yield a) + b", "arithmetic", "return")
 
 
@@ -125,7 +123,7 @@ def test_equal_code_is_dropped(make: Make) -> None:
     ]
 
 
-def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
+def test_functions_with_the_same_name_keep_their_first_values(make: Make) -> None:
     """A property and its setter share a name. Each keeps the first value of its local names."""
     setter = "@f.setter\n    def f(self, a):\n        c = a\n        self.a = c"
     made = make(
@@ -136,8 +134,7 @@ def test_functions_of_one_name_keep_their_first_values(make: Make) -> None:
     assert [one.text for one in made] == ["self.a = c -> left out"]
 
 
-def test_a_byte_order_mark_is_no_code(tmp_path: Path, clone: Workspace) -> None:
-    """A file that begins with a byte order mark and a function has mutants that compile."""
+def test_mutants_of_a_file_with_a_byte_order_mark_compile(tmp_path: Path, clone: Workspace) -> None:
     (tmp_path / "m.py").write_bytes("\ufeffdef f(a):\n    return a + 1\n".encode())
     tree = read_tree(tmp_path, ["m.py"])
     file, models = parsed(tree, "m.py"), clone.fault_models()
@@ -150,9 +147,8 @@ def test_long_change_shows_what_differs(make: Make) -> None:
     assert long.text == ".. aaaaaaaaaaaaaaaaaa(b, limit=a) -> .. aaaaaaaaaaaaaaaaaa(b)"
 
 
-def test_places_and_executed_lines(toycar: Workspace) -> None:
-    """Places are files and functions, optionally with globs. Lines that are not executed are left out and
-    counted."""
+def test_places_are_files_and_functions_with_globs(toycar: Workspace) -> None:
+    """Lines that are not executed are left out and counted."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
 
     def found(place: str, executed: dict[str, list[int]] | None = None) -> Found:
@@ -175,9 +171,8 @@ def test_places_and_executed_lines(toycar: Workspace) -> None:
         operators_named(["arith"])
 
 
-def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
-    """A sample has each operator's share in each function, to within one mutant. The same seed gives the
-    same faults."""
+def test_samples_are_stratified_and_reproducible(toycar: Workspace) -> None:
+    """A sample has each operator's share in each function, to within one mutant."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/**"])
     drawn = sampled(found, len(found.mutations) // 3, 4)
@@ -188,9 +183,8 @@ def test_sample_is_stratified_and_stable(toycar: Workspace) -> None:
     assert all(abs(taken[name] - count / 3) < 1.4 for name, count in spec.items())
 
 
-def test_mutants_of_operators_build(toycar: Workspace) -> None:
-    """Every mutant of the toy can be built, with the same bytes as in a direct build. The ids are all
-    different."""
+def test_every_mutant_of_the_toy_can_be_built(toycar: Workspace) -> None:
+    """The bytes are those of a direct build. The ids are all different."""
     manifest, models = toycar.manifest("toycar"), toycar.fault_models()
     found = find_mutations(manifest, models, list(Operator), ["toycar/sensing.py", "toycar/driver.py"])
     faults = [one.fault("as_described") for one in found.mutations]

@@ -65,8 +65,8 @@ class StepLimit(RuntimeError):
 }
 
 
-def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The list has the named module and those imported after it, even a module that is imported again."""
+def test_modules_from_a_named_one_on_are_listed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module that is imported again is listed, too."""
     for name in ("early", "_fi", "late"):
         monkeypatch.setitem(sys.modules, name, types.ModuleType(name))
     assert imported_since("_fi") == ["late", "_fi"]
@@ -75,8 +75,7 @@ def test_modules_since_one_was_imported(monkeypatch: pytest.MonkeyPatch) -> None
     assert imported_since("_fi") == ["early", "late", "_fi"]
 
 
-def test_a_module_that_never_came_hides_none() -> None:
-    """If the probe was never imported, all modules are listed."""
+def test_without_the_probe_all_modules_are_listed() -> None:
     assert set(imported_since("never.imported")) == set(sys.modules)
 
 
@@ -107,7 +106,7 @@ def described() -> Callable[..., dict[str, Any]]:
         ("interrupting", (), "Loud", "its text cannot be told (KeyboardInterrupt)", [[("a.py", 37)]]),
     ],
 )
-def test_exceptions_are_described(
+def test_exceptions_are_described_with_place_and_causes(
     described: Callable[..., dict[str, Any]],
     name: str,
     arguments: tuple[object, ...],
@@ -115,8 +114,7 @@ def test_exceptions_are_described(
     message: str,
     stacks: list[list[tuple[str, int]]],
 ) -> None:
-    """An exception is described by its type, its text, and the tree's lines that it passed, each once and
-    innermost first. Its causes follow."""
+    """The tree's lines that an exception passed are listed once each, innermost first."""
     found = described(name, *arguments)
     assert found["ended"] == "error"
     error = found["error"]
@@ -124,14 +122,16 @@ def test_exceptions_are_described(
     assert [[at[:2] for at in stack] for stack in error["stacks"]] == stacks
 
 
-def test_what_is_in_a_group_counts(described: Callable[..., dict[str, Any]]) -> None:
+def test_members_of_an_exception_group_are_examined(described: Callable[..., dict[str, Any]]) -> None:
     error = described("several")["error"]
     assert error["kind"] == "ExceptionGroup"
     assert [("a.py", 3), ("a.py", 15)] in [[at[:2] for at in stack] for stack in error["stacks"]]
 
 
-def test_the_limit_of_steps_is_no_error(described: Callable[..., dict[str, Any]]) -> None:
-    """The probe's own limit exception is distinguished from another exception with the same class name."""
+def test_only_the_probes_own_limit_exception_is_the_step_limit(
+    described: Callable[..., dict[str, Any]],
+) -> None:
+    """The target may have a class with the same name."""
     assert described("stop") == {"ended": "steps"}
 
 
@@ -146,9 +146,8 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         (OSError(errno.EACCES, "no"), False),
     ],
 )
-def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
-    """An error for lack of space is recognized in any wording and anywhere in a chain of causes, even a
-    cyclic one."""
+def test_a_full_disk_is_recognized_in_any_error(error: Exception, is_told: bool) -> None:
+    """The wording may vary, and the chain of causes may be cyclic."""
     assert describe(error, TREE, None)["disk_full"] is is_told
     later = ValueError("later")
     later.__cause__ = KeyError("x")
@@ -158,14 +157,12 @@ def test_a_full_disk_is_told(error: Exception, is_told: bool) -> None:
     assert describe(later, TREE, None)["disk_full"] is is_told
 
 
-def test_a_full_disk_in_a_group_is_told(described: Callable[..., dict[str, Any]]) -> None:
-    """A group of exceptions reports a full disk if one of its members does. A group without a text reports
-    none."""
+def test_a_full_disk_in_an_exception_group_is_recognized(described: Callable[..., dict[str, Any]]) -> None:
     assert described("several")["disk_full"]
     assert not described("unspeakable")["disk_full"]
 
 
-def test_the_first_activation_is_noted(tmp_path: Path) -> None:
+def test_the_first_activation_is_reported(tmp_path: Path) -> None:
     """When an injection is first active, the file is deleted and the probe is restored."""
     inactive = tmp_path / "inactive"
     inactive.touch()
@@ -179,8 +176,8 @@ def test_the_first_activation_is_noted(tmp_path: Path) -> None:
     assert probe.active is original
 
 
-def test_a_probe_is_asked() -> None:
-    """The probe's report is passed on, and its exception ends the run. Any other value is not a report."""
+def test_the_probes_report_is_passed_on() -> None:
+    """Its exception ends the run. Any other value is not a report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

@@ -1,5 +1,5 @@
-"""Putting new code into loaded modules: all the ways in which a module can hold a function, and the
-reasons to refuse."""
+"""Swapping code in loaded modules: all the ways in which a module can hold a function, and the reasons to
+refuse."""
 
 import sys
 import types
@@ -81,7 +81,6 @@ def loaded() -> Iterator[types.ModuleType]:
 
 
 def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.CodeType, types.CodeType]]:
-    """The functions that differ after some text is replaced in the module's source."""
     before = compile(LOADED, "car.py", "exec", dont_inherit=True)
     after = compile(LOADED.replace(old, new), "car.py", "exec", dont_inherit=True)
     return [
@@ -104,11 +103,11 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
         ("setter", lambda m: setattr(car := m.Car(), "speed", 1) or car.speed[0][0]),
     ],
 )
-def test_everyone_who_holds_a_function_gets_the_new_code(
+def test_functions_of_every_form_run_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """Functions of every form run the new code: plain, wrapped, cached, static, class and private ones,
-    methods and properties. This holds even after many calls of the old code."""
+    """The forms are plain, wrapped, cached, static, class and private functions, methods and properties. They
+    run the new code even after many calls of the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":
@@ -118,15 +117,15 @@ def test_everyone_who_holds_a_function_gets_the_new_code(
     assert vars(loaded)["_fi"] is PROBE
 
 
-def test_who_took_the_function_before_has_the_new_code(loaded: types.ModuleType) -> None:
-    """An imported name and a bound method keep their function object, which has the new code."""
+def test_imported_names_and_bound_methods_run_the_new_code(loaded: types.ModuleType) -> None:
+    """Both keep their function object, which has the new code."""
     plain, method = loaded.plain, loaded.Car().method
     swap_code(functions('"old plain"', '"new plain"'), PROBE)
     swap_code(functions('"old method"', '"new method"'), PROBE)
     assert (plain(), method()) == ("new plain", "new method")
 
 
-def test_another_function_of_that_name_is_left_alone(loaded: types.ModuleType) -> None:
+def test_another_function_with_the_same_name_is_not_swapped(loaded: types.ModuleType) -> None:
     vars(loaded)["plain"] = lambda: "mine"
     changed = functions('"old', '"new')
     with pytest.raises(SwapRefused, match=r"some_loaded_car\.plain is not found"):
@@ -139,8 +138,8 @@ def test_code_shared_by_two_functions_is_not_swapped(loaded: types.ModuleType) -
         swap_code(functions('"old twice"', '"new twice"'), PROBE)
 
 
-def test_a_running_function_is_not_swapped(loaded: types.ModuleType) -> None:
-    """A function on the stack is not swapped, because it would continue with its old code."""
+def test_a_function_on_the_stack_is_not_swapped(loaded: types.ModuleType) -> None:
+    """The function would continue with its old code."""
 
     def work() -> None:
         swap_code(functions('"old walk"', '"new walk"'), PROBE)
@@ -150,7 +149,7 @@ def test_a_running_function_is_not_swapped(loaded: types.ModuleType) -> None:
         loaded.walk()
 
 
-def test_a_module_that_is_not_loaded(loaded: types.ModuleType) -> None:
+def test_a_module_that_is_not_loaded_is_not_swapped(loaded: types.ModuleType) -> None:
     changed = [("car_nobody_loaded", path, old, new) for _, path, old, new in functions('"old', '"new')]
     with pytest.raises(SwapRefused, match="car_nobody_loaded is not loaded"):
         swap_code(changed, PROBE)

@@ -1,5 +1,4 @@
-"""Which worker gets which piece of work next. Each piece is done once, none is lost, and another worker
-does the proof."""
+"""Which worker gets which piece of work next. Another worker does the proof."""
 
 import random
 from collections import Counter
@@ -73,9 +72,8 @@ def drained(board: Board, workers: tuple[str, ...] = ("alpha", "beta")) -> list[
     return done
 
 
-def test_all_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """Two workers do each planned experiment once. Each piece has one golden run and only faults of that
-    run."""
+def test_each_experiment_is_done_once(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Each piece has one golden run and only faults of that run."""
     done = [piece for _, piece in drained(board(folder, clock))]
     assert sorted(name for piece in done for name in piece.lines) == sorted(ids)
     for piece in done:
@@ -92,15 +90,14 @@ def test_the_proof_is_done_by_the_other_worker(folder: RunFolder, clock: Clock, 
     assert all(ran[name] != worker for name, worker in proved.items())
 
 
-def test_a_worker_alone_proves_what_it_ran(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """A single worker does the proof of its own experiments."""
+def test_a_single_worker_does_its_own_proof(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
     alone = board(folder, clock, tuple(ids[:2]))
     alone.leave("beta")
     done = drained(alone, ("alpha",))
     assert [piece.kind for _, piece in done][-2:] == [Kind.PROVE, Kind.PROVE]
 
 
-def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> None:
+def test_a_worker_prefers_its_current_golden_run(folder: RunFolder, clock: Clock) -> None:
     done = drained(board(folder, clock))
     for worker in ("alpha", "beta"):
         keys = [piece.golden for name, piece in done if name == worker]
@@ -108,8 +105,8 @@ def test_a_worker_stays_with_its_golden_run(folder: RunFolder, clock: Clock) -> 
         assert changes <= len(folder.goldens)
 
 
-def test_pieces_get_shorter_towards_the_end(folder: RunFolder, clock: Clock) -> None:
-    """The last pieces have one run each if a run takes longer than the shortest piece."""
+def test_the_last_pieces_are_shorter(folder: RunFolder, clock: Clock) -> None:
+    """Each has one run if a run takes longer than the shortest piece."""
     there = board(folder, clock)
     first = taken(there, "alpha")
     there.done(first, "alpha", 2.0 * first.runs)
@@ -134,8 +131,10 @@ def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Cloc
     assert there.is_empty
 
 
-def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """If an unknown experiment kills workers, it is identified and given up. All others are done."""
+def test_an_experiment_that_kills_workers_is_identified(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    """That experiment is given up; all others are done."""
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:
@@ -151,9 +150,10 @@ def test_what_takes_its_worker_down_twice_is_found(folder: RunFolder, clock: Clo
     assert sorted([*done.elements(), deadly]) == sorted(ids)
 
 
-def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """An experiment that is known to kill workers is set apart at once, and given up when it kills a
-    second one."""
+def test_a_known_deadly_experiment_is_given_up_after_its_second_worker(
+    folder: RunFolder, clock: Clock, ids: list[str]
+) -> None:
+    """The experiment is set apart from the others at once."""
     there = board(folder, clock)
     piece = taken(there, "alpha")
     deadly = piece.ids[-1]
@@ -163,9 +163,8 @@ def test_who_is_known_to_have_died_of_what(folder: RunFolder, clock: Clock, ids:
     assert there.died(apart, "beta", deadly) is not None
 
 
-def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock) -> None:
-    """A worker retries an experiment that killed it only if no other worker is left. It does not repeat
-    that experiment when it is late."""
+def test_a_worker_does_not_retry_what_killed_it(folder: RunFolder, clock: Clock) -> None:
+    """The last worker left is an exception."""
     there = board(folder, clock)
     deadly = taken(there, "alpha")
     there.died(deadly, "alpha")
@@ -180,7 +179,7 @@ def test_what_took_a_worker_down_goes_to_another(folder: RunFolder, clock: Clock
     assert taken(there, "alpha").number == deadly.number
 
 
-def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, clock: Clock) -> None:
+def test_a_worker_that_repeats_a_piece_continues_when_another_dies(folder: RunFolder, clock: Clock) -> None:
     for first in ("alpha", "beta"):
         there = board(folder, clock)
         late = taken(there, "alpha")
@@ -194,9 +193,8 @@ def test_who_repeats_a_piece_goes_on_when_another_dies_of_it(folder: RunFolder, 
         assert there.is_empty
 
 
-def test_a_worker_waits_longer_for_others_where_runs_are_long(folder: RunFolder, clock: Clock) -> None:
-    """An idle worker leaves the proof of its own runs to a worker that is still busy, if its piece is not
-    late."""
+def test_an_idle_worker_leaves_the_proof_to_a_busy_one(folder: RunFolder, clock: Clock) -> None:
+    """The busy worker's piece must not be late."""
     there = board(folder, clock, taken(board(folder, clock), "alpha").ids[:1])
     first = taken(there, "alpha")
     there.done(first, "alpha", 60.0 * first.runs)
@@ -209,8 +207,8 @@ def test_a_worker_waits_longer_for_others_where_runs_are_long(folder: RunFolder,
     assert taken(there, "beta").kind is Kind.PROVE
 
 
-def test_random_losses_lose_nothing(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
-    """After any sequence of results, deaths and duplicates, each experiment is done once."""
+def test_no_experiment_is_lost_or_repeated_at_random(folder: RunFolder, clock: Clock, ids: list[str]) -> None:
+    """Results, deaths and duplicates come in random order."""
     draw, there, done = random.Random(5), board(folder, clock), Counter[str]()
     out: list[tuple[str, Piece]] = []
     while not there.is_empty:

@@ -62,9 +62,10 @@ def with_slurm(folder: Path, monkeypatch: pytest.MonkeyPatch, sbatch: str) -> No
         ("  cores: 2\n", "", r"some.yaml:4: .*cores and memory"),
     ],
 )
-def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: str, tmp_path: Path) -> None:
-    """Unknown kinds, keys and options are refused with their line, and so are values that the class
-    rejects."""
+def test_an_invalid_file_is_refused_with_its_line(
+    before: str, after: str, error: str, tmp_path: Path
+) -> None:
+    """The reason is an unknown kind, key or option, or a value that the class rejects."""
     with pytest.raises(MutatorError, match=error):
         run(opened(tmp_path, SLURM.replace(before, after)))
 
@@ -78,16 +79,16 @@ def test_a_wrong_file_is_refused_with_its_line(before: str, after: str, error: s
         SLURM.replace("kind: slurm", "kind: kubernetes"),
     ],
 )
-def test_a_scheduler_that_others_reach_is_not_started(text: str, tmp_path: Path) -> None:
-    """The error names the file and the line of the options, and nothing is sent to the queueing system."""
+def test_an_open_scheduler_is_not_started(text: str, tmp_path: Path) -> None:
+    """The error names the file and the line of the options. Nothing is sent to the queueing system."""
     with pytest.raises(
         MutatorError, match=r"some.yaml:4: the network .* neither encrypted nor on the loopback"
     ):
         run(opened(tmp_path, text))
 
 
-def test_ctrl_c_stays_what_it_is() -> None:
-    """dask_jobqueue is not allowed to install its signal handler, which works only in the main thread."""
+def test_the_signal_handler_of_dask_jobqueue_is_not_installed() -> None:
+    """The handler works only in the main thread."""
     code = (
         "import signal, threading\n"
         "from mutator.execution.cluster.cluster_files import _class\n"
@@ -99,8 +100,8 @@ def test_ctrl_c_stays_what_it_is() -> None:
     assert done.stdout == "SLURMCluster\n"
 
 
-def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The error names the missing extra. It is raised after the check that an open network is allowed."""
+def test_kubernetes_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The error is raised after the check that an open network is allowed."""
     monkeypatch.setitem(sys.modules, "dask_kubernetes", None)
     monkeypatch.setitem(sys.modules, "dask_kubernetes.operator", None)
     with pytest.raises(MutatorError, match=r"no package dask_kubernetes.*'.\[kubernetes\]'"):
@@ -108,7 +109,7 @@ def test_kubernetes_is_an_extra_of_its_own(tmp_path: Path, monkeypatch: pytest.M
 
 
 def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Four workers on two cores each are two jobs with single-threaded workers. No job is left at the end."""
+    """Four workers on two cores each are two jobs with single-threaded workers."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job$$; echo Submitted batch job $$")
     dashboard = run(opened(tmp_path, SLURM))
     assert dashboard.startswith("http://127.0.0.1:")
@@ -121,10 +122,10 @@ def test_jobs_are_submitted_and_cancelled(tmp_path: Path, monkeypatch: pytest.Mo
     assert sorted((tmp_path / "cancelled").read_text().split()) == sorted(jobs)
 
 
-def test_workers_over_tls_are_told_of_the_certificates(
+def test_security_true_creates_certificates_for_the_cluster(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """`security: true` creates certificates for this cluster only and does not need `--insecure-network`."""
+    """`--insecure-network` is not needed."""
     with_slurm(tmp_path, monkeypatch, "cp $1 job; echo Submitted batch job 7")
     options = f"  security: true\n  shared_temp_directory: {tmp_path}\n  interface: lo"
     run(opened(tmp_path, SLURM.replace("  scheduler_options: {host: 127.0.0.1}", options)))
@@ -134,18 +135,16 @@ def test_workers_over_tls_are_told_of_the_certificates(
 
 
 @pytest.mark.parametrize("script", ["echo no such partition >&2; exit 1", "echo this is no answer"])
-def test_a_job_that_is_refused_ends_it(
+def test_the_message_of_a_refused_job_is_reported(
     script: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    """The error contains the queueing system's message. Nothing else is printed."""
     with_slurm(tmp_path, monkeypatch, script)
     with pytest.raises(MutatorError, match=r"some.yaml:4: .*(no such partition|this is no answer)"):
         run(opened(tmp_path, SLURM))
     assert not [record for record in caplog.records if record.levelname == "ERROR"]
 
 
-def test_a_machine_without_the_command_is_told_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the command is missing, the error says to submit jobs where the queueing system is installed."""
+def test_a_missing_queueing_command_is_an_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(MutatorError, match=r"some.yaml:2: .*sbatch.*; submit from a machine"):
         run(opened(tmp_path, SLURM))

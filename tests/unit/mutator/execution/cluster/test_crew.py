@@ -29,9 +29,8 @@ STRETCH = Stretch(python="CPython 3.11.7", packages={"numpy": "2.4.6"}, platform
         ({"host": "beta", "cpu": "another"}, ""),
     ],
 )
-def test_versions_decide(change: dict[str, object], objection: str) -> None:
-    """A worker is refused, with the reason, if it differs in a way that would stop its machine from
-    resuming the run."""
+def test_a_worker_with_other_versions_is_refused(change: dict[str, object], objection: str) -> None:
+    """The limits are those for resuming a run on another machine."""
     assert Crew(STRETCH, accept=False).objection(FACTS | change) == objection
 
 
@@ -41,8 +40,8 @@ def test_other_versions_can_be_accepted() -> None:
     assert crew.objection(FACTS | {"mutator": "0.0.1"})
 
 
-def test_rates_are_told_by_machine() -> None:
-    """Two workers on one machine are reported with one rate. Refused workers are reported by number."""
+def test_rates_are_reported_by_machine() -> None:
+    """Refused workers are reported by number."""
     now = [0.0]
     crew = Crew(STRETCH, accept=False, now=lambda: now[0])
     for name, host in (("a", "alpha"), ("b", "alpha"), ("c", "beta")):
@@ -57,8 +56,8 @@ def test_rates_are_told_by_machine() -> None:
     assert crew.told().startswith("2 workers on alpha")
 
 
-def test_a_worker_is_described_by_machine_and_versions() -> None:
-    """A worker reports its name, host, processor, versions, and the kernel of its BLAS."""
+def test_a_worker_reports_its_machine_and_versions() -> None:
+    """This includes the kernel of its BLAS."""
     assert describe("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )

@@ -84,14 +84,12 @@ class Workers:
         self._open: list[asyncio.Future[Any]] = []
 
     async def identity(self, n_workers: int) -> dict[str, Any]:
-        """Return what Dask's scheduler returns."""
         told = {name: {"id": name, "name": name, "nthreads": 1} for name in self.workers}
         return {"workers": {f"tcp://{name}": one for name, one in told.items()}}
 
     def submit(
         self, function: Callable[..., Any], *given: Any, workers: Sequence[str], **more: Any
     ) -> Answer:
-        """Submit a task, with Dask's signature."""
         future = asyncio.get_running_loop().create_future()
         self._open.append(future)
         if function.__name__ == "work":
@@ -113,7 +111,6 @@ class Workers:
 
 @pytest.fixture
 def folder(toycar: Workspace, tmp_path: Path) -> RunFolder:
-    """A plan of twelve experiments."""
     return freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
 
 
@@ -140,7 +137,6 @@ def session(toycar: Workspace, folder: RunFolder, monkeypatch: pytest.MonkeyPatc
 
 
 def dealt(session: Any, workers: Workers, queued: int | None = None) -> tuple[dict[str, Record], list[str]]:
-    """Return the records in the run folder at the end, and the remarks."""
     remarks: list[str] = []
 
     async def deal() -> None:
@@ -157,35 +153,32 @@ def errors(records: dict[str, Record]) -> list[str]:
 
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED, Ending.UNFIT, Ending.UNLIKE])
-def test_a_sick_worker_takes_no_experiment_with_it(session: Any, ending: Ending) -> None:
-    """If pieces fail on one worker only, the other worker completes them. The failing worker is refused by
-    name with the reason, and no experiment is blamed."""
+def test_no_experiment_is_blamed_for_a_failing_worker(session: Any, ending: Ending) -> None:
+    """The other worker completes the pieces. The failing worker is refused by name with the reason."""
     records, remarks = dealt(session, Workers(odd=sick(ending), alpha=healthy))
     assert (len(records), errors(records), session.problem) == (12, [], "")
     assert [one for one in remarks if one.startswith("worker odd at ") and one.endswith("the reason")]
 
 
 @pytest.mark.parametrize("ending", [Ending.DIED, Ending.FAILED])
-def test_a_deadly_experiment_takes_no_worker_with_it(session: Any, ending: Ending) -> None:
-    """An experiment that fails on every worker gets a harness error with the reason. Both workers
-    continue."""
+def test_an_experiment_that_fails_everywhere_is_a_harness_error(session: Any, ending: Ending) -> None:
+    """Both workers continue."""
     deadly = list(plan_file.ids(session.folder.path))[5]
     records, remarks = dealt(session, Workers(alpha=sick(ending, deadly), beta=sick(ending, deadly)))
     assert (len(records), errors(records), session.problem, remarks) == (12, [deadly], "", [])
     assert records[deadly].detail.endswith("twice: the reason")
 
 
-def test_a_scheduler_that_lost_the_command_is_asked_anew(session: Any) -> None:
-    """If the command's connection breaks for a moment, the scheduler forgets all tasks, and the command
-    submits its work again."""
+def test_work_is_submitted_again_after_a_lost_connection(session: Any) -> None:
+    """The scheduler forgets all tasks when the command's connection breaks."""
     workers = Workers(alpha=healthy, beta=healthy)
     workers.cut_at = 2
     records, remarks = dealt(session, workers)
     assert (len(records), errors(records), session.problem, remarks) == (12, [], "", [])
 
 
-def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> None:
-    """A cluster file requests two workers. If the first one is refused, the work waits for the second one."""
+def test_work_waits_for_a_queued_worker_after_a_refusal(session: Any) -> None:
+    """The cluster file requests two workers, and the first one is refused."""
     workers = Workers(odd=sick(Ending.UNLIKE))
 
     async def late() -> None:
@@ -202,14 +195,15 @@ def test_a_refused_worker_is_not_the_last_while_others_queue(session: Any) -> No
     assert (len(session.folder.records()), session.problem) == (12, "")
 
 
-def test_a_refused_worker_is_the_last_where_nobody_queues(session: Any) -> None:
-    """Without a queue, the command ends and reports the reason."""
+def test_without_a_queue_a_refused_worker_ends_the_command(session: Any) -> None:
     dealt(session, Workers(odd=sick(Ending.UNLIKE)))
     assert session.problem == "no worker is left that may do the work: the reason"
 
 
-def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    """No experiment is given up while results are being written, because both append to the same file."""
+def test_no_experiment_is_given_up_while_results_are_written(
+    session: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both append to the same file."""
     inside, most = [0], [0]
 
     def slow(real: Callable[..., None]) -> Callable[..., None]:
@@ -231,7 +225,7 @@ def test_one_writer_at_a_time(session: Any, monkeypatch: pytest.MonkeyPatch) -> 
     assert most == [1]
 
 
-def test_a_remark_that_is_an_error_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_in_a_remark_ends_the_work(session: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     class Place:
         @asynccontextmanager
         async def open(self, *, insecure: bool):  # type: ignore[no-untyped-def]

@@ -37,7 +37,7 @@ def children(host: Host) -> list[int]:
 
 @contextmanager
 def attended(host: Host) -> Iterator[threading.Event]:
-    """Attend the host in a thread; set the event to say that it is no longer wanted."""
+    """Attend the host in a thread, until the event says that it is no longer wanted."""
     unwanted = threading.Event()
     thread = threading.Thread(target=host.attend, args=(lambda: not unwanted.is_set(),))
     thread.start()
@@ -67,9 +67,8 @@ def host(sent: tuple[Bundle, Piece], tmp_path: Path) -> Host:
     return Host.lay_out(sent[0].data, str(tmp_path / "place"), "alpha")
 
 
-def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """Two pieces run in the same process. When the host is no longer wanted, the process and its folder
-    are removed."""
+def test_the_process_and_its_folder_are_removed_with_the_host(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """Two pieces run in the same process."""
     piece = sent[1]
     with attended(host):
         first = host.run(piece.packed(), lambda: True)
@@ -82,9 +81,8 @@ def test_a_piece_is_run_and_all_goes_with_the_host(host: Host, sent: tuple[Bundl
     assert children(host) == [] and not host.folder.exists()
 
 
-def test_a_process_that_dies_is_told_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """If the process is killed, the result says how it ended and at which experiment. The next piece gets
-    a new process."""
+def test_a_killed_process_is_reported_with_its_experiment(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """The next piece gets a new process."""
     with attended(host):
         killer = threading.Thread(target=lambda: os.kill(_first(host), signal.SIGKILL))
         killer.start()
@@ -101,11 +99,8 @@ def _first(host: Host) -> int:
     return found[0]
 
 
-def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
-    host: Host, sent: tuple[Bundle, Piece]
-) -> None:
-    """If a worker's process does not start, for example on a full disk, the result says why and does not
-    blame the piece."""
+def test_a_process_that_does_not_start_blames_no_piece(host: Host, sent: tuple[Bundle, Piece]) -> None:
+    """The result says why, for example a full disk."""
     (host.folder / "meta.json").unlink()
     with attended(host):
         result = host.run(sent[1].packed(), lambda: True)
@@ -113,8 +108,7 @@ def test_a_process_that_cannot_begin_is_not_the_fault_of_a_piece(
     assert "meta.json" in result.text
 
 
-def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece]) -> None:
-    """A cancelled piece and its process end within a second."""
+def test_a_cancelled_piece_ends_within_a_second(host: Host, sent: tuple[Bundle, Piece]) -> None:
     asked: list[float] = []
 
     def wanted() -> bool:
@@ -127,7 +121,7 @@ def test_work_that_nobody_wants_is_stopped(host: Host, sent: tuple[Bundle, Piece
         assert children(host) == []
 
 
-def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
+def test_damaged_data_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp_path: Path) -> None:
     """A damaged bundle is not unpacked, and a damaged piece is not started."""
     with pytest.raises(MutatorError, match="damaged parcel"):
         Host.lay_out(sent[0].data[:-1] + b"?", str(tmp_path / "other"), "alpha")
@@ -138,13 +132,11 @@ def test_damaged_parcels_are_refused(sent: tuple[Bundle, Piece], host: Host, tmp
 
 @pytest.fixture
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The empty cache of golden runs on this machine."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     return tmp_path / "cache" / "mutator" / "goldens"
 
 
 def run_once(sent: tuple[Bundle, Piece], place: Path) -> Result:
-    """Run the piece on a new host; return its result."""
     host = Host.lay_out(sent[0].data, str(place), "alpha")
     with attended(host):
         return host.run(sent[1].packed(), lambda: True)
@@ -154,12 +146,10 @@ def written(entry: Path) -> int:
     return (entry / "log.npz").stat().st_mtime_ns
 
 
-def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path) -> None:
-    """A second host uses the golden run that the first one cached. A damaged golden run is rerun and
-    replaced.
-
-    The records are the same each time.
-    """
+def test_hosts_of_a_machine_share_golden_runs(
+    sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
+) -> None:
+    """A damaged golden run is rerun and replaced. The records are the same each time."""
     first = run_once(sent, tmp_path / "a")
     (entry,) = cache.iterdir()
     before = written(entry)
@@ -170,11 +160,10 @@ def test_a_machine_drives_a_golden_run_once(sent: tuple[Bundle, Piece], cache: P
     assert [*cache.iterdir()] == [entry] and (entry / "log.npz").read_bytes() != b"damaged"
 
 
-def test_a_kept_golden_run_must_be_the_campaigns(
+def test_a_cached_golden_run_must_match_the_campaign(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """A cached golden run is not used if its digest is not the campaign's, or if it belongs to other
-    sources."""
+    """Its digest must be the campaign's, and its sources must be the same."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")

@@ -9,15 +9,14 @@ from mutator.execution.cluster.parcel import pack, unpack
 from mutator.execution.cluster.pieces import Ending, Result
 
 
-def test_parts_come_back() -> None:
-    """Names and bytes are read back in order, including empty and binary ones."""
+def test_parts_are_read_back_in_order() -> None:
+    """Parts may be empty or binary."""
     parts = {"a": b"", "b/c": bytes(range(256)), "line": b"x\ny"}
     assert unpack(pack(parts)) == parts
     assert list(unpack(pack(parts))) == list(parts)
 
 
-def test_damage_is_found() -> None:
-    """Any changed, missing or additional byte is reported."""
+def test_any_damage_is_found() -> None:
     data, draw = pack({"a": b"some bytes", "b": b"more"}), random.Random(1)
     for _ in range(100):
         at = draw.randrange(len(data))
@@ -27,7 +26,7 @@ def test_damage_is_found() -> None:
                 unpack(wrong)
 
 
-def test_a_result_comes_back() -> None:
+def test_a_result_is_read_back() -> None:
     result = Result(
         number=7,
         ending=Ending.DONE,

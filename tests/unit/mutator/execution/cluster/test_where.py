@@ -27,12 +27,11 @@ async def opened(place: Where, insecure: bool = False) -> None:
 
 
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:8786", "tls://far.example:1", "tls://[::1]:8786"])
-def test_an_address_is_a_scheduler(address: str) -> None:
-    """TCP and TLS addresses are accepted, with a host name or a host number."""
+def test_tcp_and_tls_addresses_are_accepted(address: str) -> None:
     assert parse(address) == Scheduler(address=address)
 
 
-def test_local_names_how_many_workers() -> None:
+def test_local_gives_the_number_of_workers() -> None:
     assert parse("local:4") == Local(workers=4)
 
 
@@ -43,7 +42,7 @@ def test_local_names_how_many_workers() -> None:
         *("http://x:1", "tcp://x", "tcp://x:0", "tcp://x:65536", "tcp://:1", "tls://a b:1", "tcp://u@x:1"),
     ],
 )
-def test_what_means_no_cluster_is_refused(text: str) -> None:
+def test_an_invalid_where_is_refused(text: str) -> None:
     """The error names the argument, the value found, and the valid values."""
     with pytest.raises(MutatorError) as caught:
         parse(text)
@@ -53,7 +52,7 @@ def test_what_means_no_cluster_is_refused(text: str) -> None:
 
 
 def test_parsing_needs_no_dask() -> None:
-    """`parse` checks only the text and works without the extra."""
+    """The extra may be missing."""
     code = (
         "import sys; from mutator.execution.cluster.where import parse; parse('local:2'); print(*sys.modules)"
     )
@@ -61,9 +60,8 @@ def test_parsing_needs_no_dask() -> None:
     assert not {"dask", "distributed", "tornado"} & set(done.stdout.split())
 
 
-def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
-    """The address is read from the file that `dask scheduler --scheduler-file` writes. An error names the
-    file."""
+def test_the_address_is_read_from_a_scheduler_file(tmp_path: Path) -> None:
+    """`dask scheduler --scheduler-file` writes it."""
     file = tmp_path / "scheduler.json"
     file.write_text(json.dumps({"type": "Scheduler", "address": "tcp://10.0.0.1:8786", "workers": {}}))
     found = parse(str(file))
@@ -75,8 +73,7 @@ def test_a_scheduler_file_has_the_address(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["", "[]", "{}", '{"address": 7}', '{"address": "http://x:1"}', "\xff", "[" * 9999]
 )
-def test_what_is_no_scheduler_file_is_refused(text: str, tmp_path: Path) -> None:
-    """The error names the file, even if it is missing."""
+def test_an_invalid_scheduler_file_is_refused_by_name(text: str, tmp_path: Path) -> None:
     file = tmp_path / "scheduler.json"
     with pytest.raises(MutatorError, match=r"scheduler.json: cannot be read"):
         parse(str(file))
@@ -104,8 +101,8 @@ def test_only_the_loopback_and_tls_are_closed(address: str, closed: bool) -> Non
     assert connecting.is_closed(address) is closed
 
 
-def test_an_open_network_is_refused_before_dask_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No connection is attempted. The remedy names TLS and the argument that allows open networks."""
+def test_an_open_network_is_refused_before_connecting(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The remedy names TLS and the argument that allows open networks."""
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(
         MutatorError, match=r"neither encrypted nor on the loopback.*tls://.*`insecure_network`"
@@ -126,16 +123,14 @@ def test_a_scheduler_that_listens_elsewhere_is_refused_over_the_loopback(
     run(opened(parse("tcp://127.0.0.1:8786"), insecure=True))
 
 
-def test_the_extra_is_named_where_it_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without Dask, the error says how to install it."""
+def test_without_dask_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     for text in ("local:1", "tcp://127.0.0.1:1"):
         with pytest.raises(MutatorError, match=r"no package distributed; pip install '.\[cluster\]'"):
             run(opened(parse(text)))
 
 
-def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The attempt to connect ends after a limited time, and the error has the reason."""
+def test_connecting_to_a_silent_scheduler_times_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(connecting, "CONNECT_S", 2.0)
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # no other process listens there
@@ -144,8 +139,7 @@ def test_a_scheduler_that_does_not_answer_is_given_up(monkeypatch: pytest.Monkey
             run(opened(parse(address)))
 
 
-def test_tls_needs_certificates() -> None:
-    """The error for missing certificate files says how to name them."""
+def test_missing_certificates_are_an_error_with_a_remedy() -> None:
     import dask
 
     with pytest.raises(
@@ -160,7 +154,7 @@ def test_tls_needs_certificates() -> None:
         run(opened(parse("tls://127.0.0.1:1")))
 
 
-def test_local_workers_work_and_end() -> None:
+def test_local_workers_run_and_end() -> None:
     """The cluster has one single-threaded worker process on the loopback, in a separate folder. Both are
     removed afterwards."""
 
