@@ -73,7 +73,7 @@ class Run:
         self.__step_s = 0.0
         self.step_s = step_s
         if self.__steps < 1:
-            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected one step at least")
+            raise GlueError(f"a run of {duration_s} s in steps of {step_s} s: expected at least one step")
         self.__ended = False
         self.__hazards: dict[str, float | None] = {}
         self.__alerts: list[dict[str, Any]] = []
@@ -148,7 +148,7 @@ class Run:
     def write(self, out: Path) -> None:
         """Write the trace, then the record, to the folder `out`. Equal runs write equal bytes."""
         if not self.__rows:
-            raise GlueError("nothing is recorded; expected one step at least: `end` is for a step to call")
+            raise GlueError("nothing is recorded; expected at least one step: call `end` only from `step`")
         out.mkdir(parents=True, exist_ok=True)
         columns = np.array(self.__rows, dtype=np.float64).T
         np.savez(out / TRACE, **dict(zip((TIME, *self.__channels), columns, strict=True)))

@@ -63,12 +63,10 @@ class Workspace:
         templates: str | Path | None = None,
         target: str | Path | None = None,
     ) -> "Workspace":
-        """Find library, templates and target, each in the first of these places that names or contains it:
-
-        * the argument, or `root`, which holds library and templates
-        * MUTATOR_LIBRARY, MUTATOR_TEMPLATES and MUTATOR_TARGET, or MUTATOR_ROOT
-        * the nearest folder upward that holds fault_library/
-        * what ships with the harness.
+        """Find library, templates and target, each in the first of these places that names or contains it: 1.
+        the argument, or `root`, which holds library and templates; 2. MUTATOR_LIBRARY, MUTATOR_TEMPLATES and
+        MUTATOR_TARGET, or MUTATOR_ROOT; 3. the nearest folder upward that holds fault_library/; 4. what ships
+        with the harness.
 
         MutatorError if a named folder does not exist.
         """

@@ -87,7 +87,7 @@ def _unpacked(archive: Path, home: Path) -> Path:
     if changed := _changed(archive, folder):
         more = f" and {len(changed) - _SHOWN} more" if len(changed) > _SHOWN else ""
         raise MutatorError(
-            f"no longer as it ships: {', '.join(changed[:_SHOWN])}{more}",
+            f"changed since installation: {', '.join(changed[:_SHOWN])}{more}",
             where=folder,
             expected="the files that were installed with mutator, unedited",
             remedy="delete this folder to unpack it again; make edits in a library of `mutator init DIR`",

@@ -22,7 +22,7 @@ class OperatorChoice:
 
     operators: Sequence[str]  #: names of mutation operators
     places: Sequence[str]  #: `PATH::FUNCTION` or `PATH`, with `*` in a name and `**` for folders
-    #: count only lines that the golden run of this scenario executes; None: all lines
+    #: only lines that the golden run of this scenario executes; None: all lines
     scenario: str | None = None
     sample: int | None = None  #: number of mutants to draw; None: all
     seed: int = 0  #: seed of the draw and of the golden run

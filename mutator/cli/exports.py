@@ -42,7 +42,7 @@ def export(
         str | None,
         typer.Option(
             metavar="ENDING,...",
-            help="JUnit: endings that count as failures: hazard, sdc, masked, crashed, timeout. "
+            help="JUnit: endings to report as failures: hazard, sdc, masked, crashed, timeout. "
             "Default: none.",
         ),
     ] = None,

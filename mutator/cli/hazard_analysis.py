@@ -101,7 +101,7 @@ def _show(terminal: Terminal, analysis: "Analysis") -> None:
         (name, ", ".join(f.at), ", ".join(f.faults) or f"none: {f.no_fault}")
         for name, f in analysis.factors.items()
     )
-    _section(terminal, "what stands for them", ["id", "in the target", "faults"], rows)
+    _section(terminal, "places and faults of the causal factors", ["id", "in the target", "faults"], rows)
 
 
 def _show_structure(terminal: Terminal, analysis: "Analysis") -> None:

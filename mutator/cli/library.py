@@ -221,7 +221,7 @@ def doctor(as_json: Json = False, *, place: Place) -> None:
     run.
     """
     terminal = Terminal(as_json)
-    with terminal.wait("looking around"):
+    with terminal.wait("checking"):
         try:
             findings = mutator.doctor(place.workspace())
         except MutatorError as e:

@@ -90,7 +90,7 @@ def print_changes(terminal: Terminal, review: "Review", group: "Group") -> None:
     if changes := review.changes(group):
         terminal.diff(changes)
     elif review.changed(group):
-        terminal.say("what the reviewer saw then was not kept")
+        terminal.say("the diff that the reviewer saw was not kept")
     else:
         terminal.say("nothing has changed since" if review.decision(group.id) else "no decision yet")
     terminal.say()

@@ -137,7 +137,7 @@ def verdict(experiments: Sequence[Experiment], records: Mapping[str, Record]) ->
         names = sorted({name for e in hazardous for name, _ in known[e].hazards})
         status, reason = "Killed", f"{', '.join(names)} in {len(hazardous)} of {drives}"
     elif not known:
-        status, reason = "Pending", f"none of {drives} was run yet"
+        status, reason = "Pending", f"none of {drives} has run"
     elif of[Status.INVALID_MUTANT]:
         status, reason = "CompileError", of[Status.INVALID_MUTANT][0].detail
     elif of[Status.CRASHED]:

@@ -135,7 +135,7 @@ def _units() -> Iterator[str]:
     yield ""
     yield (
         "The longest suffix applies: `by_per_m` is `by` in 1/m. Numbers are converted between units of the "
-        "same quantity by a\nfactor. degC and K also differ by an offset, so they count as two quantities: "
+        "same quantity by a\nfactor. degC and K also differ by an offset, so they are two quantities: "
         "use the variable's unit.\n"
     )
 

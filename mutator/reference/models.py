@@ -60,7 +60,7 @@ def fault_models_page(workspace: Workspace) -> str:
 
 def _model(model: FaultModel) -> Iterator[str]:
     yield f"## {model.name}\n"
-    does = _DOES[model.kind] + (" Its exceptions count as the target's." if model.raises else "")
+    does = _DOES[model.kind] + (" Its exceptions are attributed to the target." if model.raises else "")
     yield f"{' '.join(model.about.split())} {does}\n"
     params = [param for param in model.params if param.type != "seed"]
     if params:

@@ -111,7 +111,7 @@ def _target(manifest: TargetManifest) -> Iterator[str]:
             escape=False
         )
         yield ""
-    yield f"Alerts that count: {', '.join(manifest.alerts) or 'none'}.\n"
+    yield f"Alerts: {', '.join(manifest.alerts) or 'none'}.\n"
     changes = [(f"`{name}`", f"`{' '.join(words)}`") for name, words in manifest.changes.items()]
     yield Table(heads=("change of the scenario", "arguments it adds"), rows=changes).as_markdown(escape=False)
     yield ""

@@ -228,7 +228,7 @@ def _complaint(job: Job) -> str:
     lines = job.text.splitlines()
     errors = [line.removeprefix("error: ") for line in lines if line.startswith("error: ")]
     differs = [line for line in lines if line.startswith("DIFFERS")]
-    return (errors or differs or [job.message or "it ended without output"])[-1]
+    return (errors or differs or [job.message or "no output"])[-1]
 
 
 def _time(moment: datetime | None) -> str | None:

@@ -181,7 +181,7 @@ class Reviews:
         }
         if other:
             names = ", ".join(other)
-            raise Moved(f"{names}: another diff than the page shows; load the page again", other)
+            raise Moved(f"{names}: the diff has changed; reload the page", other)
 
     def _found(self, chosen: Selection) -> tuple[Group, ...]:
         workspace = self.workspace

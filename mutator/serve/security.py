@@ -68,7 +68,7 @@ class Guarded:
         query = parse_qs(scope["query_string"].decode("latin-1"), keep_blank_values=True)
         if scope["path"] == "/" and scope["method"] == "GET" and "token" in query:
             if not all(self._is_token(given) for given in query["token"]):
-                return _refusal("another token than that of this server: use the address that it printed")
+                return _refusal("wrong token: open the address that the server printed")
             answer = RedirectResponse("/", 303)
             answer.set_cookie(self._cookie, self._token, httponly=True, samesite="strict")
             return answer

@@ -209,7 +209,7 @@ def test_what_has_changed_is_shown_as_a_diff(cli: Cli, root: Path, known: dict[s
     assert "-    {{ target }} = {{ target }} {{ by | signed }}\n" in shown
     assert shown.count("gap = gap") == 2
     shutil.rmtree(root / "fault_library/reviews/seen")
-    assert "what the reviewer saw then was not kept" in cli("review", "show", gap, "--changes").out
+    assert "the diff that the reviewer saw was not kept" in cli("review", "show", gap, "--changes").out
 
 
 def test_a_mistake_in_the_file_is_told_at_its_line(cli: Cli, root: Path, known: dict[str, str]) -> None:

@@ -101,7 +101,7 @@ def test_flags_replace_keys_of_the_scenario(arguments: list[str], flags: list[st
         (["3"], "argument '3'"),
         (["--seed", "-1"], "--seed -1; expected a whole number"),
         (["--seed"], "no --seed"),
-        (["--duration_s", "0.01"], "one step at least"),
+        (["--duration_s", "0.01"], "at least one step"),
         (["--duration_s", "0"], "duration_s is 0; expected more than 0 s"),
         (["--duration_s", "long"], "duration_s is 'long'; expected a number"),
     ],

@@ -79,7 +79,7 @@ def delete(folder: Path) -> None:
 def test_a_changed_copy_is_refused(archive: Path, change: Callable[[Path], None], named: str) -> None:
     change(shipped_folder())
     with pytest.raises(
-        MutatorError, match=rf"no longer as it ships: .*{named}.*delete this folder.*mutator init"
+        MutatorError, match=rf"changed since installation: .*{named}.*delete this folder.*mutator init"
     ):
         as_in_a_new_process()
 
