@@ -79,8 +79,10 @@ def lines(kind: AnchorKind, name: str, function: str = "A.run", nth: int | None 
         (AnchorKind.BEFORE_RETURN, "", 2, 32),
     ],
 )
-def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line: int) -> None:
-    """Anchors cover assignments of every form, calls that are the value of a statement, and returns."""
+def test_anchors_find_statements_of_every_form(
+    kind: AnchorKind, name: str, nth: int | None, line: int
+) -> None:
+    """The forms are assignments, calls that are the value of a statement, and returns."""
     assert lines(kind, name, nth=nth) == (line, line)
 
 
@@ -94,9 +96,8 @@ def test_statements_are_found(kind: AnchorKind, name: str, nth: int | None, line
         ("a['i'], i, a[j]", ["a['i']", "i", "a[j]"]),
     ],
 )
-def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]) -> None:
-    """If a statement sets an index after the item that uses it, the index's value at the item is unknown
-    afterwards."""
+def test_an_item_whose_index_is_set_later_has_no_name(targets: str, named: list[str]) -> None:
+    """The index's value at the item is unknown afterwards."""
     for source in (
         f"def f(self):\n    {targets} = g()\n",
         f"def f(self):\n    for {targets} in g():\n        h()\n",
@@ -105,9 +106,8 @@ def test_an_item_that_becomes_another_has_no_name(targets: str, named: list[str]
         assert [name for one in function.statements for name in one.assigns] == named
 
 
-def test_heads_of_blocks_count_last() -> None:
-    """After the head of a block became a candidate, an anchor with or without `nth` still means the same
-    statement."""
+def test_the_head_of_a_block_is_the_last_candidate() -> None:
+    """An anchor from before heads were candidates, with or without `nth`, keeps its statement."""
     source = "def f(xs):\n    for x in xs:\n        pass\n    x = 1\n"
     source += "    with xs as y:\n        y = 2\n        y = 3\n"
 
@@ -120,8 +120,7 @@ def test_heads_of_blocks_count_last() -> None:
 
 
 def test_functions_are_found_by_qualified_name() -> None:
-    """The statements of a nested function belong to it, whether or not its name is written with
-    `<locals>`."""
+    """The qualified name of a nested function may be written with or without `<locals>`."""
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "a", "A.run.<locals>.inner") == (28, 28)
     assert lines(AnchorKind.AFTER_ASSIGN, "self._width", "A.width") == (11, 11)
@@ -157,7 +156,7 @@ def test_functions_are_found_by_qualified_name() -> None:
         (AnchorKind.BEFORE_CALL, "x", "empty", None, ["another anchor: there is none of this kind"]),
     ],
 )  # fmt: skip
-def test_no_hit_or_several_is_an_error(
+def test_no_match_or_several_is_an_error(
     kind: AnchorKind, name: str, function: str, nth: int | None, pieces: list[str]
 ) -> None:
     """The error names the place, the candidates or the reason, and a remedy."""
@@ -186,9 +185,8 @@ def test_entry_goes_below_the_docstring() -> None:
         ("", 1),
     ],
 )
-def test_where_an_import_goes(source: str, line: int) -> None:
-    """The import goes after the docstring, the head comments and `from __future__` imports, and before
-    decorators."""
+def test_the_import_goes_below_the_head_of_the_file(source: str, line: int) -> None:
+    """The head has the docstring, comments and `from __future__` imports."""
     assert parsed(source).import_line + 1 == line
 
 
@@ -203,8 +201,7 @@ def test_where_an_import_goes(source: str, line: int) -> None:
         (b"import os\n\nx = 1  # fi:ab12\n", "m.py:3: the name _fi or a `# fi:` tag is in use"),
     ],
 )
-def test_a_file_that_cannot_be_a_target(source: bytes, piece: str) -> None:
-    """A file that does not parse, or that already has injected lines, is refused by name."""
+def test_an_invalid_or_injected_file_is_refused_by_name(source: bytes, piece: str) -> None:
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source, Path("root"))
     assert piece in str(caught.value)

@@ -54,9 +54,8 @@ def one(**location: object) -> Fault:
 
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
-def test_golden_diffs(toy: Workspace, variant: str) -> None:
-    """The diff of each kind of fault equals the stored one exactly. Of the probe, only the head is
-    compared."""
+def test_diffs_equal_the_stored_ones(toy: Workspace, variant: str) -> None:
+    """Of the probe, only the head is compared."""
     fault = None if variant == "null" else toy_faults(toy)[variant]
     made = build(toy, fault)
     patch = made.patch.replace(made.id, "<id>")
@@ -70,8 +69,7 @@ def test_golden_diffs(toy: Workspace, variant: str) -> None:
 
 @pytest.mark.parametrize("variant", ["longer", "silent", "both", "null"])
 def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
-    """The original bytes can be restored from changed files. The probe is the only new file, and every
-    file compiles."""
+    """The probe is the only new file, and every file compiles."""
     manifest = toy.manifest("toy")
     made = build(toy, None if variant == "null" else toy_faults(toy)[variant])
     assert set(made.files) - set(manifest.tree.files) == {"toycar/_fi.py"}
@@ -83,8 +81,7 @@ def test_only_tagged_lines_differ(toy: Workspace, variant: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["toycar/_fi.py", "toycar/_fi/__init__.py"])
-def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
-    """A module or package of the target with the probe's name is refused with its path."""
+def test_a_module_with_the_probes_name_is_refused(toy: Workspace, name: str) -> None:
     path = toy.manifest("toy").root / name
     path.parent.mkdir(exist_ok=True)
     path.write_text("x = 1\n")
@@ -92,8 +89,8 @@ def test_a_target_that_has_the_probes_name(toy: Workspace, name: str) -> None:
         build(toy, None)
 
 
-def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
-    """The patched copy, the written tree and the digest agree. The target is unchanged."""
+def test_patch_tree_and_digest_agree(toy: Workspace, tmp_path: Path) -> None:
+    """The target is unchanged."""
     manifest = toy.manifest("toy")
     before = manifest.tree.digest
     made = build(toy, toy_faults(toy)["both"])
@@ -107,9 +104,8 @@ def test_patch_and_tree_are_one(toy: Workspace, tmp_path: Path) -> None:
     assert toy.manifest("toy").tree.digest == before
 
 
-def test_ids_say_what_a_mutant_is(toy: Workspace) -> None:
-    """The same fault, trigger, target and templates give the same id and bytes. Any difference gives
-    another id."""
+def test_ids_depend_on_everything_that_makes_a_mutant(toy: Workspace) -> None:
+    """These are the fault, the trigger, the target and the templates. Equal ids mean equal bytes."""
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])
@@ -132,7 +128,6 @@ def test_a_fault_that_latches_overrides_the_trigger(toy: Workspace) -> None:
 
 
 def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str, object]:
-    """Run the mutated toy; return its positions and the probe's report."""
     write_tree(toy.manifest("toy"), made, place / "tree")
     program = (
         "import json; from toycar.world import World; from toycar import _fi; w = World(); gaps = []\n"
@@ -146,8 +141,8 @@ def run(toy: Workspace, made: Mutant, place: Path, steps: int = 100) -> dict[str
     return dict(json.loads(done.stdout))
 
 
-def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
-    """The null mutant changes nothing and observes its trigger. Faults act from their trigger on."""
+def test_faults_act_from_their_trigger_on(toy: Workspace, tmp_path: Path) -> None:
+    """The null mutant changes nothing and observes its trigger."""
     null = run(toy, build(toy, None), tmp_path / "null")
     assert null["report"]["injections"] == {}
     assert null["report"]["triggered"]["first"] == 0.5
@@ -176,15 +171,14 @@ def test_mutants_run(toy: Workspace, tmp_path: Path) -> None:
     ],
 )
 def test_locations_are_checked_again(toy: Workspace, location: dict[str, object], said: str) -> None:
-    """The locations of a fault are checked when it is built, even if it was not expanded from a spec."""
+    """The fault was not expanded from a spec, which would have checked it."""
     with pytest.raises(MutatorError) as caught:
         build(toy, one(**location))
     assert said in str(caught.value)
 
 
-def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
-    """If the injected lines are not allowed at their place, the mutant is invalid, and the error names
-    line and file."""
+def test_lines_that_do_not_compile_make_an_invalid_mutant(toy: Workspace, tmp_path: Path) -> None:
+    """The error names line and file."""
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text("nonlocal {{ target }}\n")
     broken = Workspace(library=toy.library, templates=templates)
@@ -194,16 +188,15 @@ def test_a_mutant_that_does_not_compile(toy: Workspace, tmp_path: Path) -> None:
         build(broken, one())
 
 
-def test_triggers_are_checked_again(toy: Workspace) -> None:
-    """A probe is not built with an invalid condition, or with a hold for a time that has no length."""
+def test_an_invalid_trigger_is_refused(toy: Workspace) -> None:
+    """A condition is invalid, or a hold for a time has no length."""
     with pytest.raises(MutatorError, match="is not a truth value"):
         build(toy, None, Trigger(name="x", condition="__import__('os')"))
     with pytest.raises(MutatorError, match="without a time; expected hold_s"):
         build(toy, None, Trigger(name="x", condition="True", hold=Hold.FOR))
 
 
-def test_a_target_with_a_probe_of_its_own(toy: Workspace) -> None:
-    """A tree that already has a file at the probe's path is refused."""
+def test_a_file_at_the_probes_path_is_refused(toy: Workspace) -> None:
     (toy.manifest("toy").root / "toycar" / "_fi.py").write_text("x = 1\n")
     with pytest.raises(MutatorError, match=r"the target has a file toycar/_fi.py"):
         build(toy, None)

@@ -61,9 +61,9 @@ def changed(source: str, *changes: tuple[FaultLocation, str]) -> str:
     return data.decode()
 
 
-def test_what_anchors_reach() -> None:
-    """Every value of a function has a name for each of its roles. Exceptions are values that name an
-    object, values in a string, and values that begin or end where no tag fits."""
+def test_every_value_has_a_name_for_each_role() -> None:
+    """Exceptions are values that name an object, values in a string, and values that begin or end where no
+    tag fits."""
     named = {
         kind: [
             (name, which) if which else name
@@ -109,8 +109,8 @@ def test_what_anchors_reach() -> None:
         (location("return_value", "", function="Control.inner.<locals>.deeper"), 23),
     ],
 )
-def test_an_anchor_names_one_expression(place: FaultLocation, line: int) -> None:
-    """A name matches regardless of spaces and quotes. An empty name matches any expression."""
+def test_an_anchor_matches_regardless_of_spaces_and_quotes(place: FaultLocation, line: int) -> None:
+    """An empty name matches any expression."""
     assert parsed().span(place)[0] + 1 == line
 
 
@@ -127,16 +127,15 @@ def test_an_anchor_names_one_expression(place: FaultLocation, line: int) -> None
         (location("value", "a", function="deeper"), ["no function 'deeper'"]),
     ],
 )
-def test_none_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
+def test_no_match_or_several_is_an_error(place: FaultLocation, pieces: Iterable[str]) -> None:
     """The error names the line, the candidates, and what to do."""
     with pytest.raises(MutatorError) as caught:
         parsed().resolve_value(place)
     assert all(piece in str(caught.value) for piece in pieces), str(caught.value)
 
 
-def test_a_changed_line_keeps_the_old_one() -> None:
-    """A changed expression stays in its place. Over several lines, its first and last lines change. Two
-    expressions in one line share its tag."""
+def test_a_changed_expression_stays_in_its_place() -> None:
+    """Over several lines, its first and last lines change. Two expressions in one line share its tag."""
     source = "def f(a, b):  # go\r\n    c = a, b\r\n    return g(a,  # first\r\n        b) + c  # sum\r\n"
     at = {"function": "f"}
     assert changed(source, (location("assigned_value", "c", **at), "None")) == source.replace(
@@ -167,8 +166,7 @@ def test_a_changed_line_keeps_the_old_one() -> None:
     ],
 )
 def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
-    """A tuple is changed as a whole, also in an index, on one line or several, and with or without
-    parentheses around its elements."""
+    """A tuple may be an index, span several lines, and have parentheses around its elements or none."""
     place = location("return_value", "", function="f")
     line = changed(f"def f(a, b):\n    return {value}\n", (place, "0")).splitlines()[1]
     assert line == f'    return (0 if _fi.active("a0") else {kept})  # fi:a0 was:    return {value}'
@@ -180,8 +178,8 @@ def test_a_tuple_is_changed_as_a_whole(value: str, kept: str) -> None:
     )
 
 
-def test_what_python_cannot_write_has_no_anchor() -> None:
-    """A number with thousands of digits has no name. Other expressions in its file can be changed."""
+def test_a_huge_number_has_no_anchor() -> None:
+    """Python cannot write a number with thousands of digits. Other expressions in its file can be changed."""
     source = f"def f(a):\n    b = g(0x{'f' * 5000})\n    return a\n"
     assert 'return (0 if _fi.active("a0") else a)' in changed(
         source, (location("return_value", "a", function="f"), "0")
@@ -189,22 +187,21 @@ def test_what_python_cannot_write_has_no_anchor() -> None:
     assert [one.text for one in parsed(source).expressions["f"]] == ["a"]
 
 
-def test_one_value_in_another_is_refused() -> None:
-    """Two injections into one expression are refused, because their effects could not be separated."""
+def test_two_injections_into_one_expression_are_refused() -> None:
+    """Their effects could not be separated."""
     with pytest.raises(MutatorError, match="two injections into one expression"):
         changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
 
 
-def test_names_are_those_of_its_own_function() -> None:
-    """Functions with the same name, such as those of a property, have separate lists of names."""
+def test_functions_with_the_same_name_have_separate_names() -> None:
+    """Examples are the functions of a property."""
     source = "class A:\n    def x(self): return self.a\n    def x(self, value): return value + 1\n"
     file = parse_file("m.py", source.encode(), Path())
     first, second = (location("return_value", "", nth=nth, function="A.x") for nth in (1, 2))
     assert (file.names(first), file.names(second)) == ({"self"}, {"self", "value"})
 
 
-def test_a_file_in_another_encoding() -> None:
-    """Columns count bytes of the file's encoding, although Python counts other units."""
+def test_columns_count_bytes_of_the_files_encoding() -> None:
     source = '# coding: latin-1\ndef f(é):\n    return "ü" + é + 1\n'
     file = parse_file("m.py", source.encode("latin-1"), Path())
     place = location("value", "'ü' + é", function="f")
@@ -217,15 +214,14 @@ def test_a_file_in_another_encoding() -> None:
 
 
 def test_an_f_string_is_changed_as_a_whole() -> None:
-    """An f-string is one value, even if it has several parts. The values inside it have no anchors."""
+    """The values inside an f-string have no anchors."""
     source = b'def f(x):\n    return g(f"{x:.2f} m", f"{x}" "b")\n'
     found = parse_file("m.py", source, Path()).expressions["f"]
     assert [one.text for one in found if one.text.startswith("f")] == ["f'{x:.2f} m'", "f'{x}b'"]
 
 
-def test_what_sets_a_name_is_a_value() -> None:
-    """A condition that consists of a `:=` has an anchor, with or without parentheses. While no fault is
-    active, it sets its name as before."""
+def test_a_named_expression_as_a_condition_has_an_anchor() -> None:
+    """While no fault is active, `:=` sets its name as before."""
     source = "def f(a):\n    while n := a.pop():\n        if (m := n + 1): return g(k := m)\n"
     places = [
         location("condition", "(n := a.pop())", function="f"),

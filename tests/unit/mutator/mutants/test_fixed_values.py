@@ -133,9 +133,10 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 
 
 @pytest.mark.parametrize("place", PLACES)
-def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], place: str) -> None:
-    """A constant or default is changed from the first active step to the next inactive one, and restored
-    when a run starts again. Each active step counts once."""
+def test_a_fixed_value_changes_while_the_fault_is_active(
+    load: Callable[..., tuple[Any, Any]], place: str
+) -> None:
+    """It is restored at the next inactive step and when a run starts again. Each active step counts once."""
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -147,9 +148,8 @@ def test_set_while_active_and_put_back(load: Callable[..., tuple[Any, Any]], pla
     assert fi.report()["injections"]["a"] == {"first": 1.0, "last": 1.0, "count": 1}
 
 
-def test_all_stand_beside_each_other(clone: Workspace) -> None:
-    """A tagged line follows the statement that sets the value, in the same block. If there are several,
-    the innermost comes first."""
+def test_tagged_lines_follow_the_statement_that_sets_the_value(clone: Workspace) -> None:
+    """If there are several in a block, the innermost comes first."""
     lines = mutant(clone, *dict.fromkeys(one for one, _ in PLACES.values())).decode().splitlines()
     tagged = [i for i, line in enumerate(lines) if "# fi:" in line][1:]
     assert [lines[i - 1].strip() for i in tagged if i - 1 not in tagged] == [
@@ -179,16 +179,15 @@ def test_all_stand_beside_each_other(clone: Workspace) -> None:
         (at("COUNT"), "a function sets it, too"),
     ],
 )
-def test_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
-    """A missing value is refused with a list of the existing ones. A value that the program sets in
-    another way is refused with the reason."""
+def test_an_unsuitable_value_is_refused(clone: Workspace, location: FaultLocation, words: str) -> None:
+    """The error for a missing value lists the existing ones. A value that the program sets in another way is
+    refused with the reason."""
     with pytest.raises(MutatorError, match=words):
         mutant(clone, location)
 
 
 def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
-    """A model that changes no value is refused. A parameter that names a variable is refused, too, because
-    a constant belongs to no function."""
+    """A parameter that names a variable is refused, too, because a constant belongs to no function."""
     file = parse_file("m.py", SOURCE.encode(), Path("x"))
     for model, params in (("omission", ()), ("offset", (("by", 1.0), ("target", "LOW")))):
         with pytest.raises(MutatorError, match=r"cannot change the value|expected no variable"):
@@ -197,9 +196,8 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
             )
 
 
-def test_importers(tmp_path: Path) -> None:
-    """Modules that import a constant are found, also through other modules. Imports inside functions are
-    ignored."""
+def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
+    """They may import it through other modules. Imports inside functions are ignored."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",
@@ -219,8 +217,8 @@ def test_importers(tmp_path: Path) -> None:
 
 
 def test_importers_that_cannot_be_set_are_listed(tmp_path: Path) -> None:
-    """A star import, a class, and a name that the module sets itself are reported in one error, each with
-    its line."""
+    """A star import, a class, and a name that the module sets itself are reported in one error, each with its
+    line."""
     texts = {
         "limits": "LIMIT = 5\n",
         "a": "from limits import *\n",

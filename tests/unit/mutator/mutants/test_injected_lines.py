@@ -7,8 +7,8 @@ from mutator.web import asset
 from mutator.workspace import Workspace
 
 
-def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
-    """The import, the observation, the guards, and the ids in them are recognized."""
+def test_injected_lines_are_recognized(clone: Workspace) -> None:
+    """They are the import, the observation and the guards, with their ids."""
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (
@@ -32,8 +32,8 @@ def test_calls_and_tags_are_found_again(clone: Workspace) -> None:
         assert list(injected_lines.tagged_additions(f"+{line}\n", 0, 999)) == [(1, len(line) + 1)]
 
 
-def test_what_is_no_tag(clone: Workspace) -> None:
-    """A tag is lower-case text at the end of a line. A similar comment belongs to the target."""
+def test_a_similar_comment_is_not_a_tag(clone: Workspace) -> None:
+    """A tag is lower-case text at the end of a line."""
     for line in (
         b"x = 1",
         b"x = 1  # fi",
@@ -46,8 +46,8 @@ def test_what_is_no_tag(clone: Workspace) -> None:
     assert injected_lines.instrumented_line(b"wi_fi = 1\nx_fi = 2  # fi:A\n") is None
 
 
-def test_pages_are_told_the_tags() -> None:
-    """The script that shows diffs contains no tag. The page gives it the mark and the probe's tags."""
+def test_pages_get_the_tags_from_python() -> None:
+    """The script that shows diffs contains no tag."""
     words = injected_lines.tag_words()
     for tag in words["probe"]:
         assert injected_lines.tagged("x", tag) == f"x  {words['mark']}{tag}"

@@ -48,7 +48,6 @@ class _Car:
 def injected(
     models: FaultModels, function: str, anchor: Anchor | None = None, model: str = "stuck", **params: Value
 ) -> str:
-    """The source with one injection, by default at the entry of the function."""
     file = parse_file("m.py", SOURCE.encode(), Path("root"))
     place = FaultLocation(path="m.py", function=function, anchor=anchor or Anchor(kind=AnchorKind.ENTRY))
     given = {"value": 1.0, **params} if model == "stuck" else params
@@ -70,9 +69,9 @@ def injected(
         ("outer", "limit", 16, "'limit' is not known in outer"),
     ],
 )
-def test_a_name_from_outside(function: str, target: str, line: int, said: str) -> None:
-    """A variable that the function does not know, or only reads from an outer scope, is refused with its
-    line."""
+def test_setting_an_unknown_or_outer_variable_is_refused(
+    function: str, target: str, line: int, said: str
+) -> None:
     with pytest.raises(MutatorError) as caught:
         injected(MODELS, function, target=target)
     error = caught.value
@@ -93,15 +92,15 @@ def test_a_name_from_outside(function: str, target: str, line: int, said: str) -
         ("_Car.drive", None, "self.__gap"),
     ],
 )
-def test_a_name_that_may_be_set(function: str, anchor: Anchor | None, target: str) -> None:
-    """A fault can set variables of the function, attributes, and names declared global or nonlocal."""
+def test_local_declared_and_attribute_names_may_be_set(
+    function: str, anchor: Anchor | None, target: str
+) -> None:
     line = f"{target} = _fi.like({target}, 1.0)  # fi:ab12\n"
     assert line in injected(MODELS, function, anchor, target=target)
 
 
 @pytest.fixture
 def models(tmp_path: Path) -> FaultModels:
-    """The fault models, with a `stuck` that also sets its own names."""
     workspace = Workspace.find(root=Path(__file__).parents[4])
     templates = Path(shutil.copytree(workspace.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
@@ -111,8 +110,8 @@ def models(tmp_path: Path) -> FaultModels:
     return Workspace(library=workspace.library, templates=templates).fault_models()
 
 
-def test_names_of_a_template(models: FaultModels) -> None:
-    """A template may set its own names unless the function uses the same names."""
+def test_a_template_may_set_its_own_names(models: FaultModels) -> None:
+    """The function must not use the same names."""
     assert "for y in [1]:" in injected(models, "outer", target="x")
     with pytest.raises(
         MutatorError, match=r"root/m.py:6: .* set 'y', a name that the function uses"
@@ -124,9 +123,8 @@ def test_names_of_a_template(models: FaultModels) -> None:
     assert "z = 1.0" in injected(models, "sets", Anchor(kind=AnchorKind.AFTER_ASSIGN, name="z"), target="z")
 
 
-def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
-    """A template may not set a name inside an expression, because the name would become a local one of the
-    function."""
+def test_an_expression_that_sets_a_name_is_refused(tmp_path: Path) -> None:
+    """The name would become a local one of the function."""
     templates = Path(shutil.copytree(MODELS.folder, tmp_path / "templates"))
     (templates / "sign_flip.py.j2").write_text("(limit := -{{ original }})\n")
     place = Anchor(kind=AnchorKind.RETURN_VALUE)
@@ -134,8 +132,8 @@ def test_a_value_that_sets_a_name(tmp_path: Path) -> None:
         injected(load_fault_models(templates), "reads", place, "sign_flip")
 
 
-def test_a_name_that_is_imported() -> None:
-    """An image effect is refused if the function uses the name of the class that the effect imports."""
+def test_an_imported_name_that_the_function_uses_is_refused() -> None:
+    """An image effect imports a class."""
     params = {"amount": 1.0, "camera": None, "scene": None, "seed": 1, "target": "x"}
     params |= {"camera": "x", "scene": "x"}
     with pytest.raises(MutatorError, match="set 'Rain', a name that the function uses"):
@@ -145,8 +143,7 @@ def test_a_name_that_is_imported() -> None:
     )
 
 
-def test_a_refusal_is_not_forgotten() -> None:
-    """An injection that was refused is refused again for the same file."""
+def test_a_refused_injection_is_refused_again() -> None:
     file = parse_file("m.py", SOURCE.encode(), Path("root"))
     place = FaultLocation(path="m.py", function="reads", anchor=Anchor(kind=AnchorKind.ENTRY))
     injection = Injection(location=place, model="stuck", params=(("target", "limit"), ("value", 1.0)))

@@ -44,8 +44,8 @@ def mutant(clone: Workspace, anchor: Anchor, model: str = "offset", **given: Any
 
 
 def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list[list[int]], Any]:
-    """Run steps at these times with a fault active from 1 to 3. Return each step's view of three lanes,
-    and the probe's report."""
+    """Run steps at these times with a fault active from 1 to 3. Return the three lanes of each step and the
+    probe's report."""
     nowhere = FaultLocation(path="", function="f", anchor=Anchor(kind=AnchorKind.ENTRY))
     observation = Observation(location=nowhere, time="t", values=(), derived=())
     trigger = Trigger(name="test", condition="t >= 1 and t < 3")
@@ -76,31 +76,30 @@ def drive(clone: Workspace, data: bytes, times: tuple[float, ...]) -> tuple[list
         ({"where": "index > 0", "every": 3}, [[1, 2, 3], [1, 12, 3]], 1),
     ],
 )
-def test_what_acts(
+def test_a_fault_acts_on_selected_instances_and_executions(
     clone: Workspace, anchor: Anchor, given: dict[str, Any], active: list[list[int]], count: int
 ) -> None:
-    """The fault acts on instances for which the condition holds. Executions count from the activation,
-    only for such instances, and only executions that acted count as activations."""
+    """Executions count from the activation, only for instances for which the condition holds, and only
+    executions that acted count as activations."""
     seen, told = drive(clone, mutant(clone, anchor, **given), (0.0, 1.0, 2.0, 3.0))
     assert seen == [[1, 2, 3], *active, [1, 2, 3]]
     assert told["count"] == count
 
 
-def test_executions_count_anew_in_each_stretch(clone: Workspace) -> None:
+def test_executions_are_counted_from_zero_in_each_active_period(clone: Workspace) -> None:
     seen, told = drive(clone, mutant(clone, AFTER, call=2), (0.0, 1.0, 3.0, 0.0, 1.0, 2.0))
     assert [step[1] for step in seen] == [2, 12, 2, 2, 12, 2]
     assert told["count"] == 1, "of the newest run"
 
 
-def test_a_guard_leaves_out_one(clone: Workspace) -> None:
-    """A statement is omitted for one instance only."""
+def test_a_guard_omits_one_instance(clone: Workspace) -> None:
     data = mutant(clone, SENT, "omission", where="index == 0")
     assert drive(clone, data, (0.0, 1.0, 3.0))[0] == [[1, 2, 3], [2, 3], [1, 2, 3]]
 
 
-def test_how_it_reads(clone: Workspace) -> None:
-    """The condition's names are read only while the fault is active. The probe counts an execution after
-    all other checks."""
+def test_the_injected_line_checks_the_fault_first(clone: Workspace) -> None:
+    """The condition's names are read only while the fault is active. The probe counts an execution after all
+    other checks."""
     lines = {
         AFTER: b'if _fi.on() and (index == 2) and _fi.every("a", 5) and _fi.active("a"):  # fi:a',
         VALUE: b'gap = (lane["gap"] + 10 if _fi.on() and (index == 2) and _fi.every("a", 5) and '
@@ -113,9 +112,8 @@ def test_how_it_reads(clone: Workspace) -> None:
     assert b'        if not (_fi.call("a", 3) and _fi.active("a")):  # fi:a guard:1' in guarded
 
 
-def test_tags_know_what_asks(clone: Workspace) -> None:
-    """A line that selects an instance also asks the probe. The selection belongs to the injected part of
-    the line."""
+def test_the_tag_of_a_selecting_line_asks_the_probe(clone: Workspace) -> None:
+    """The selection belongs to the injected part of the line."""
     for anchor, model in ((AFTER, "offset"), (SENT, "omission")):
         data = mutant(clone, anchor, model, where="lane['gap'] == 2 or (index == 1)", call=2)
         tags = [tag for line in data.splitlines() if (tag := injected_lines.tag_of(line)) and tag.id == "a"]
@@ -144,15 +142,14 @@ def test_tags_know_what_asks(clone: Workspace) -> None:
         "",
     ],
 )
-def test_other_conditions_are_refused(text: str) -> None:
-    """A condition that calls, calculates or sets anything, or uses the probe, is refused."""
+def test_a_condition_with_side_effects_is_refused(text: str) -> None:
+    """It calls, calculates or sets something, or uses the probe."""
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
 
-def test_unknown_names_and_models_that_ask_twice_are_refused(clone: Workspace) -> None:
-    """A name unknown in the function is reported with the known ones. A model that acts longer than the
-    fault is active is refused."""
+def test_unknown_names_and_lasting_models_are_refused(clone: Workspace) -> None:
+    """The error lists the known names. A lasting model acts longer than the fault is active."""
     with pytest.raises(MutatorError, match=r"m.py:3: 'side' in `where` is not known in drive; .*index"):
         mutant(clone, AFTER, where="side == 'left'")
     params = (("per_step", 1.0), ("stays", True), ("target", "gap"))
@@ -166,8 +163,7 @@ def read(**given: Any) -> InjectionSpec:
     return model.injection(Source(path=Path("spec.yaml"), data={}, lines={}), ())
 
 
-def test_as_yaml_writes_them() -> None:
-    """A condition is stored in Python's canonical form, regardless of its spaces and quotes."""
+def test_a_condition_is_stored_in_canonical_form() -> None:
     found = read(where='name=="left"  and not (index < 2)', every=3)
     assert (found.where, found.call, found.every) == ("name == 'left' and (not index < 2)", None, 3)
 
@@ -185,8 +181,7 @@ def test_as_yaml_writes_them() -> None:
         ({"at": {"file": "m.py", "function": "f", "default": "x"}, "call": 1}, "`call` at a default"),
     ],
 )
-def test_refused_in_yaml(given: dict[str, Any], words: str) -> None:
-    """Invalid conditions, contradictions, and settings that select all instances are refused with the
-    reason."""
+def test_invalid_selections_in_yaml_are_refused(given: dict[str, Any], words: str) -> None:
+    """These are invalid conditions, contradictions, and settings that select all instances."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

@@ -46,7 +46,6 @@ VALUES: dict[str, Value] = {
 
 
 def value(param: ParamSchema) -> Value:
-    """A parameter's value that the template accepts."""
     if param.type == "variable":
         return "gap"
     if param.type == "choice":
@@ -66,8 +65,8 @@ def shipped() -> Workspace:
     return Workspace.find(root=Path(__file__).parents[4])
 
 
-def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
-    """A place is listed with its line. If its name is ambiguous, it also has `nth`."""
+def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> None:
+    """Each place has its line."""
     found = [(one.line, {k: v for k, v in one.at.items() if k not in ("file", "function")}) for one in listed]
     assert found[:3] == [
         (1, {"constant": "LIMIT"}),
@@ -92,8 +91,8 @@ def test_anchors_as_specs_write_them(listed: list[ListedPlace]) -> None:
     assert (9, {"after_assign": "gap", "nth": 2}) not in found, "it shares the line of its `if`"
 
 
-def test_each_is_found_again(listed: list[ListedPlace]) -> None:
-    """Every listed anchor is valid in a spec, finds its own line, and is listed once."""
+def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> None:
+    """It is valid in a spec and is listed once."""
     source = Source(path=Path("spec.yaml"), data={}, lines={})
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))
@@ -124,9 +123,8 @@ def test_models_work_where_they_are_listed(shipped: Workspace, listed: list[List
     assert tried[True] > 300
 
 
-def test_one_function(shipped: Workspace) -> None:
-    """Only the places of the function are listed. The error for an unknown function lists the existing
-    ones."""
+def test_places_of_one_function(shipped: Workspace) -> None:
+    """The error for an unknown function lists the existing ones."""
     file = parse_file("m.py", SOURCE, Path("x"))
     found = places_of(file, shipped.fault_models(), "other")
     assert {one.location.function for one in found} == {"other"}
@@ -134,9 +132,8 @@ def test_one_function(shipped: Workspace) -> None:
         places_of(file, shipped.fault_models(), "Sensor.mesure")
 
 
-def test_a_statement_that_yields_is_not_repeated(shipped: Workspace) -> None:
-    """Models that repeat a statement are not listed for a statement with `yield`, because the order of
-    yields matters."""
+def test_models_that_repeat_a_yield_are_not_listed(shipped: Workspace) -> None:
+    """The order of yields matters."""
     file = parse_file("m.py", b"def f(a):\n    b = yield a\n    c = b\n    return c\n", Path("x"))
     places = [one for one in places_of(file, shipped.fault_models()) if "before_assign" in one.at]
     models = {one.line: one.models for one in places}

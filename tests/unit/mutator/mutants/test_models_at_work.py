@@ -62,7 +62,6 @@ def toy(clone: Workspace) -> Make:
 
 
 def counting() -> Callable[[], int]:
-    """A function that returns the number of calls so far: 1, 2, ..."""
     calls: list[None] = []
 
     def count() -> int:
@@ -76,32 +75,30 @@ def counting() -> Callable[[], int]:
     ("kind", "name"),
     [(AnchorKind.AFTER_ASSIGN, "y"), (AnchorKind.ASSIGNED_VALUE, "y"), (AnchorKind.VALUE, "x")],
 )
-def test_a_stale_value(toy: Make, kind: AnchorKind, name: str) -> None:
-    """The value is the one from two steps ago, or the first one until then. Each active stretch starts
-    again."""
+def test_a_stale_value_is_two_steps_old(toy: Make, kind: AnchorKind, name: str) -> None:
+    """Until then, it is the first one. Each active period starts again."""
     params = {"target": "y"} if kind is AnchorKind.AFTER_ASSIGN else {}
     made = toy("def f(x):\n    y = x\n    return y\n", kind, name, "stale", steps=2, **params)
     assert made.run(".xxxx.xx", counting()) == [1, 2, 2, 2, 3, 6, 7, 7]
 
 
-def test_steps_are_counted_and_not_executions(toy: Make) -> None:
-    """If a statement runs twice in a step, the newest value of an earlier step is used."""
+def test_staleness_counts_steps_and_not_executions(toy: Make) -> None:
+    """The newest value of an earlier step is used."""
     made = toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "x", "stale", steps=1)
     count, f = counting(), made.names["f"]
     made.names["f"] = lambda x: (f(x), f(count()))
     assert made.run("xxx", count) == [(1, 1), (2, 2), (4, 4)]
 
 
-def test_a_slow_call(toy: Make) -> None:
-    """While a slow call lasts, no other call is made. When it ends, its result is returned, and the next
-    call begins."""
+def test_a_slow_call_returns_its_result_when_it_ends(toy: Make) -> None:
+    """No other call is made until then."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=2 * STEP_S)
     count = counting()
     assert made.run("..xxxxxx..xxx", lambda: count) == [1, 2, 3, 3, 3, 3, 4, 4, 6, 7, 8, 8, 8]
 
 
-def test_a_call_that_fails_is_none_that_was_made(toy: Make) -> None:
-    """An exception in the call propagates, and the next step repeats the call."""
+def test_a_failed_call_is_repeated_in_the_next_step(toy: Make) -> None:
+    """The exception propagates."""
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "slow_call", duration=1.0)
     with pytest.raises(ZeroDivisionError):
         made.run("x", lambda: lambda: 1 / 0)
@@ -109,8 +106,7 @@ def test_a_call_that_fails_is_none_that_was_made(toy: Make) -> None:
 
 
 @pytest.mark.parametrize("kind", [AnchorKind.BEFORE_CALL, AnchorKind.AFTER_CALL])
-def test_a_message_sent_twice(toy: Make, kind: AnchorKind) -> None:
-    """The statement runs twice while the fault is active."""
+def test_a_message_is_sent_twice(toy: Make, kind: AnchorKind) -> None:
     sent: list[int] = []
     made = toy("def f(x):\n    put(\n        x  # it\n    )\n", kind, "put", "repetition")
     made.names["put"] = sent.append
@@ -118,21 +114,18 @@ def test_a_message_sent_twice(toy: Make, kind: AnchorKind) -> None:
     assert sent == [1, 2, 2, 3]
 
 
-def test_a_statement_that_assigns_may_be_repeated(toy: Make) -> None:
-    """A repeated assignment sets only its own names."""
+def test_a_repeated_assignment_sets_only_its_own_names(toy: Make) -> None:
     made = toy("def f(x):\n    x += 1\n    return x\n", AnchorKind.AFTER_ASSIGN, "x", "repetition")
     assert made.run(".x", lambda: 0) == [1, 2]
 
 
-def test_a_value_that_is_calculated_twice(toy: Make) -> None:
-    """The result of the second calculation is used."""
+def test_the_second_of_two_calculations_is_used(toy: Make) -> None:
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "repetition")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, 3, 4]
 
 
-def test_a_message_that_is_dropped(toy: Make) -> None:
-    """An omitted statement has no effect."""
+def test_a_dropped_message_is_not_sent(toy: Make) -> None:
     sent: list[int] = []
     made = toy("def f(x):\n    put(x)\n", AnchorKind.BEFORE_CALL, "put", "omission")
     made.names["put"] = sent.append
@@ -155,7 +148,6 @@ REORDERED = """def f(x):
 
 
 def test_two_statements_exchanged(toy: Make) -> None:
-    """While the fault is active, the next statement runs first. Otherwise nothing changes."""
     source = REORDERED.replace("y = x", "x = x * 2").replace("y = y +", "y = x +")
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "x", "reordering")
     assert made.run(".x.", lambda: 1) == [12, 11, 12]
@@ -164,8 +156,8 @@ def test_two_statements_exchanged(toy: Make) -> None:
     )
 
 
-def test_the_target_raises_where_order_matters(toy: Make) -> None:
-    """Reading a name that is not set yet raises the usual error."""
+def test_exchanged_statements_raise_the_usual_error(toy: Make) -> None:
+    """A name is read before it is set."""
     source = "def f(x):\n    y = x\n    z = y\n    return z\n"
     made = toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
     assert made.run(".", lambda: 1) == [1]
@@ -189,20 +181,19 @@ def test_statements_that_cannot_be_exchanged(toy: Make, source: str, said: str) 
         toy(source, AnchorKind.BEFORE_ASSIGN, "y", "reordering")
 
 
-def test_no_statement_to_repeat(toy: Make) -> None:
-    """The entry of a function is refused, because it has no statement to repeat."""
+def test_the_entry_of_a_function_cannot_be_repeated(toy: Make) -> None:
     with pytest.raises(MutatorError, match="not at a statement that is alone on its lines"):
         toy("def f(x):\n    return x\n", AnchorKind.ENTRY, "", "repetition")
 
 
 def test_a_return_is_not_repeated(toy: Make) -> None:
-    """A return statement is refused, because it ends the function. Its result can be repeated."""
+    """The result of a return statement can be repeated."""
     with pytest.raises(MutatorError, match=r"`return g\(x\)` ends its block"):
         toy("def f(x):\n    return g(x)\n", AnchorKind.BEFORE_CALL, "g", "repetition")
 
 
-def test_arguments_that_are_swapped(toy: Make) -> None:
-    """The two values are exchanged, with or without keywords. The other arguments keep their order."""
+def test_two_arguments_are_swapped(toy: Make) -> None:
+    """They may have keywords. The other arguments keep their order."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
     made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
     assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
@@ -212,8 +203,9 @@ def test_arguments_that_are_swapped(toy: Make) -> None:
     ("call", "first", "second"),
     [("g(x)", 1, 2), ("g(x, y)", 2, 2), ("g(x, *y)", 1, 2), ("g(x, **y)", 2, 1), ("g()", 1, 2)],
 )
-def test_arguments_that_cannot_be_swapped(toy: Make, call: str, first: int, second: int) -> None:
-    """An exchange needs two different arguments without stars."""
+def test_only_two_different_arguments_without_stars_can_be_swapped(
+    toy: Make, call: str, first: int, second: int
+) -> None:
     with pytest.raises(MutatorError, match="expected two different ones, counted from 1, without stars"):
         toy(
             f"def f(x, y):\n    return {call}\n",
@@ -227,8 +219,8 @@ def test_arguments_that_cannot_be_swapped(toy: Make, call: str, first: int, seco
 
 @pytest.mark.parametrize("model", ["slow_call", "swapped_arguments"])
 @pytest.mark.parametrize(("kind", "name"), [(AnchorKind.VALUE, "x + 1"), (AnchorKind.AFTER_ASSIGN, "y")])
-def test_no_call(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
-    """A model that needs a call is refused at other places. The error names the anchor that it needs."""
+def test_a_model_of_a_call_needs_a_call_anchor(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
+    """The error names the anchor."""
     params: dict[str, Value] = {"duration": 1.0} if model == "slow_call" else {"first": 1, "second": 2}
     with pytest.raises(
         MutatorError, match=rf"m.py:2: model {model} needs more than .*; expected a call: an anchor `result`"
@@ -239,8 +231,8 @@ def test_no_call(toy: Make, model: str, kind: AnchorKind, name: str) -> None:
 @pytest.mark.parametrize(
     ("holds", "taken"), [("inverted", [1, 2, 2]), ("always", [1, 1, 1]), ("never", [2, 2, 2])]
 )
-def test_a_wrong_branch(toy: Make, holds: str, taken: list[int]) -> None:
-    """While the fault is active, a condition is negated, true or false. It is still evaluated."""
+def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: list[int]) -> None:
+    """It is still evaluated."""
     asked: list[int] = []
     source = "def f(x):\n    if ask(x):\n        return 1\n    return 2\n"
     made = toy(source, AnchorKind.CONDITION, "ask(x)", "wrong_branch", holds=holds)
@@ -259,23 +251,22 @@ def test_a_wrong_branch(toy: Make, holds: str, taken: list[int]) -> None:
         (AnchorKind.VALUE, "x"),
     ],
 )
-def test_an_exception(toy: Make, kind: AnchorKind, name: str) -> None:
-    """While the fault is active, the exception is raised, both at a statement and in an expression."""
+def test_an_exception_is_raised_while_active(toy: Make, kind: AnchorKind, name: str) -> None:
+    """This works both at a statement and in an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
     with pytest.raises(TimeoutError, match="injected fault"):
         made.run(".x", lambda: 1)
 
 
-def test_none_is_what_a_call_gives(toy: Make) -> None:
+def test_a_call_returns_none_while_active(toy: Make) -> None:
     made = toy("def f(get):\n    return get()\n", AnchorKind.RESULT, "get", "none")
     count = counting()
     assert made.run(".x.", lambda: count) == [1, None, 3]
 
 
-def test_a_drift_of_an_expression(toy: Make) -> None:
-    """The drift grows with every active step. A drift that stays after the fault needs a statement, so an
-    expression is refused."""
+def test_the_drift_of_an_expression_grows(toy: Make) -> None:
+    """A drift that stays after the fault needs a statement."""
     source = "def f(x):\n    return x\n"
     made = toy(source, AnchorKind.RETURN_VALUE, "", "drift", per_step=0.5)
     assert made.run(".xx.x", lambda: 1) == [1, 1.5, 2.0, 1, 2.5]
@@ -305,10 +296,10 @@ def test_a_drift_of_an_expression(toy: Make) -> None:
         ),
     ],
 )
-def test_parameters_that_do_not_go_together(
+def test_contradicting_parameters_are_refused(
     toy: Make, model: str, params: dict[str, Value], said: str
 ) -> None:
-    """Each contradiction between parameters is refused with a specific message."""
+    """Each contradiction has its own message."""
     with pytest.raises(MutatorError, match=said):
         toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", model, **params)
 
@@ -316,8 +307,8 @@ def test_parameters_that_do_not_go_together(
 @pytest.mark.parametrize(
     ("value", "index"), [(b"ab", 2), (b"ab", -3), (b"", 0), ("ab", 0), (3, 0), (bytearray(), 0)]
 )
-def test_bytes_that_are_not_there(toy: Make, value: Any, index: int) -> None:
-    """If the value does not have the byte, an error is raised. The value is not passed on unchanged."""
+def test_a_missing_byte_is_an_error(toy: Make, value: Any, index: int) -> None:
+    """The value is not passed on unchanged."""
     made = toy(
         "def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", "byte_corruption", index=index, mask=1
     )

@@ -29,20 +29,20 @@ IDS = st.text("0123456789abcdef", min_size=8, max_size=8)
         ("é5 = 5", "é5 = 0"),
     ],
 )
-def test_what_counts_as_a_number(text: str, kept: str) -> None:
-    """Decimal integers of usual length become a zero with the same form. All other text is unchanged."""
+def test_usual_decimal_integers_become_zero(text: str, kept: str) -> None:
+    """The zero has the same form. All other text is unchanged."""
     assert normalized(text, ()) == kept
 
 
-def test_ids_stay_apart() -> None:
+def test_different_ids_stay_different() -> None:
     ids = ("00000001", "deadbeef")
     text = "a('00000001'); b('deadbeef', '00000001')"
     assert normalized(text, ids) == "a('0f0f0000'); b('0f0f0001', '0f0f0000')"
     assert normalized(text, ids) != normalized("a('00000001'); b('00000001', 'deadbeef')", ids)
 
 
-def test_where_the_value_matters() -> None:
-    """If compiling depends on the id or the number, the normalized source does not compile."""
+def test_a_source_that_depends_on_the_value_does_not_compile() -> None:
+    """The value is that of the id or the number."""
     assert compiles(b"x = 12345678")
     assert not compiles(normalized("x = 12345678", ["12345678"]).encode())
     assert not compiles(normalized("match x:\n    case {1: a, 2: b}:\n        pass", ()).encode())
@@ -53,7 +53,7 @@ def test_where_the_value_matters() -> None:
 @settings(deadline=None)
 @given(st.sampled_from(AROUND), NUMBERS)
 @example("x = {}", "07")
-def test_numbers(around: str, number: str) -> None:
+def test_a_source_compiles_with_any_number_if_its_normalized_form_does(around: str, number: str) -> None:
     text = around.replace("{{", "\0").replace("{}", number).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, ()).encode()):
         compile(text, "x", "exec")
@@ -65,8 +65,7 @@ def test_numbers(around: str, number: str) -> None:
 @example("x = {}", "12345678")
 @example("x = {}", "abcdefab")
 @example("x = 1{}", "00000000")
-def test_ids(around: str, name: str) -> None:
-    """If the normalized source compiles, so does the source with any id."""
+def test_a_source_compiles_with_any_id_if_its_normalized_form_does(around: str, name: str) -> None:
     text = around.replace("{{", "\0").replace("{}", name).replace("\0", "{").replace("}}", "}")
     if compiles(normalized(text, [name]).encode()):
         compile(text, "x", "exec")

@@ -31,7 +31,7 @@ BODY = "def f(x):\n    x = 1\n    return x\n"
         ("x = 1\nreturn\n", 2, "not valid Python: 'return' outside function"),
     ],
 )
-def test_files_that_are_refused(source: str, line: int | None, said: str) -> None:
+def test_unreadable_files_are_refused(source: str, line: int | None, said: str) -> None:
     """The error names the file, the first invalid line, the reason and the remedy."""
     with pytest.raises(MutatorError) as caught:
         parse_file("m.py", source.encode("latin-1" if "latin" in source else "utf-8"), Path("root"))
@@ -53,7 +53,6 @@ def test_files_that_are_refused(source: str, line: int | None, said: str) -> Non
         "",
     ],
 )
-def test_files_that_are_not(source: str) -> None:
-    """Files with byte order marks, CRLF, continued lines, form feeds or odd spaces are accepted, because
-    all of these are preserved."""
+def test_unusual_files_are_accepted(source: str) -> None:
+    """LibCST preserves byte order marks, CRLF, continued lines, form feeds and odd spaces."""
     assert parse_file("m.py", source.encode(), Path("root")).data == source.encode()

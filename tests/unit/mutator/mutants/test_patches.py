@@ -15,8 +15,7 @@ BODY = "".join(f"    y{i} = {i}\n" for i in range(10))
 
 
 def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
-    """Return the patch and the new bytes for insertions after assignments to `names` and an import of the
-    probe."""
+    """Return the patch and the new bytes."""
     file = parse_file("pack/m.py", data, Path("root"))
     edits = [splicing.probe_import(file, "pack")]
     for name in names:
@@ -43,8 +42,9 @@ def make(data: bytes, names: list[str], guard: bool) -> tuple[str, bytes]:
         ("# coding: latin-1\ndef f():\n    x = '\xe9'\n", ["x"]),
     ],
 )
-def test_patch_applies_and_reverses(tmp_path: Path, text: str, names: list[str], guard: bool) -> None:
-    """GNU patch turns the original into exactly the mutated bytes, and restores it with `-R`."""
+def test_gnu_patch_applies_and_reverses_a_patch(
+    tmp_path: Path, text: str, names: list[str], guard: bool
+) -> None:
     if shutil.which("patch") is None:
         pytest.skip("no patch on this machine")
     data = text.encode("latin-1" if "latin" in text else "utf-8")
@@ -60,21 +60,21 @@ def test_patch_applies_and_reverses(tmp_path: Path, text: str, names: list[str],
     assert source.read_bytes() == data
 
 
-def test_hunks_are_joined_when_close() -> None:
-    """Changes with up to six lines between them share a hunk."""
+def test_close_changes_share_a_hunk() -> None:
+    """Up to six lines may lie between them."""
     far, _ = make(f"{LONG}def f():\n    x = 1\n{BODY}    z = 3\n{LONG}".encode(), ["x", "z"], False)
     near, _ = make(f"{LONG}def f():\n    x = 1\n    y = 2\n    z = 3\n{LONG}".encode(), ["x", "z"], False)
     assert far.count("@@ -") == 3
     assert near.count("@@ -") == 2
 
 
-def test_names_with_spaces() -> None:
-    """As patch requires, a file name with a space is followed by a tab."""
+def test_a_tab_follows_a_file_name_with_a_space() -> None:
+    """`patch` requires the tab."""
     assert "+++ b/a file.py\t\n" in patches.new_file("a file.py", "x = 1\n")
 
 
 @pytest.mark.parametrize(("end", "told"), [("\n", ""), ("", "\\ No newline at end of file\n")])
-def test_a_new_file(end: str, told: str) -> None:
-    """For a new file, every line is an added one, even if it is empty. A missing line end is marked."""
+def test_every_line_of_a_new_file_is_added(end: str, told: str) -> None:
+    """A missing line end is marked."""
     head = "diff --git a/m.py b/m.py\nnew file mode 100644\n--- /dev/null\n+++ b/m.py\n@@ -0,0 +1,3 @@\n"
     assert patches.new_file("m.py", f"a = 1\n\nb = 2{end}") == f"{head}+a = 1\n+\n+b = 2\n{told}"

@@ -29,8 +29,8 @@ def parsed(source: str = SOURCE) -> ParsedFile:
     return parse_file("m.py", source.encode(), Path("root"))
 
 
-def test_both_parsers_tell_the_same_places() -> None:
-    """A statement of any kind and a function have one place, whatever precedes them on their line."""
+def test_both_parsers_agree_on_places() -> None:
+    """It does not matter what precedes a statement on its line."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -44,8 +44,8 @@ def test_both_parsers_tell_the_same_places() -> None:
 
 
 @pytest.mark.parametrize("kind", [AnchorKind.AFTER_ASSIGN, AnchorKind.BEFORE_RETURN, AnchorKind.ENTRY])
-def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If `ast` finds the anchored statement one line further down, the statement is refused with its line."""
+def test_a_statement_at_another_line_is_refused(kind: AnchorKind, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`ast` finds the anchored statement one line further down."""
     later = places_by_ast(ast.parse("\ndef f(x):\n    x = 1\n    return x\n"))
     monkeypatch.setattr("mutator.mutants.anchors.places_by_ast", lambda tree: later)
     file = parsed("def f(x):\n    x = 1\n    return x\n")
@@ -56,8 +56,8 @@ def test_a_statement_that_is_elsewhere(kind: AnchorKind, monkeypatch: pytest.Mon
     assert caught.value.line == {"after_assign": 2, "before_return": 3, "entry": 1}[kind]
 
 
-def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The statement is refused even if the check of the whole file's bytes is left out."""
+def test_a_line_that_libcst_loses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """This does not depend on the check of the whole file's bytes."""
 
     def unchecked(data: bytes, where: Path) -> object:
         module = cst.parse_module(data)
@@ -81,9 +81,8 @@ def test_a_line_that_libcst_loses(monkeypatch: pytest.MonkeyPatch) -> None:
         ("x = (1,\n 2) # \\", 2),
     ],
 )
-def test_where_a_line_of_statements_ends(line: str, after: int) -> None:
-    """Lines that backslashes add after the last statement belong to it. A backslash in a comment adds no
-    line."""
+def test_backslashes_extend_the_last_statement(line: str, after: int) -> None:
+    """A backslash in a comment adds no line."""
     module = cst.parse_module(line + "\n")
     positions = MetadataWrapper(module, unsafe_skip_copy=True).resolve(PositionProvider)
     first = module.body[0]

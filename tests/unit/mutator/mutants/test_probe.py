@@ -53,16 +53,16 @@ def drive(fi: Any, lead_speeds: str, start: float = 0.0) -> str:
         (Hold.TO_END, 0.0, 0.5, ".......xxx"),
     ],
 )
-def test_hold_and_arming(clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str) -> None:
-    """Once armed, a fault is active while its condition holds, for a time after that, or to the end of the
-    run."""
+def test_a_fault_is_held_as_requested(
+    clone: Workspace, hold: Hold, seconds: float, armed: float, expected: str
+) -> None:
+    """Once armed, it is active while its condition holds, for a time after that, or to the end of the run."""
     fi = probe(clone, hold=hold.value, hold_s=seconds, armed_after_s=armed)
     assert drive(fi, "..xxx..xx.") == expected
 
 
-def test_report(clone: Workspace) -> None:
-    """The report has the times of the trigger's activity and of each injection's executions, even for an
-    injection that never ran."""
+def test_the_report_has_times_and_counts(clone: Workspace) -> None:
+    """An injection that never ran is in the report, too."""
     fi = probe(clone)
     drive(fi, "..xx.x")
     assert fi.report() == {
@@ -81,8 +81,8 @@ def test_nothing_before_the_first_observation(clone: Workspace) -> None:
     assert fi.report()["triggered"] is None
 
 
-def test_a_new_run_starts_afresh(clone: Workspace) -> None:
-    """If time goes back to the previous run's start or earlier, the probe discards that run's state."""
+def test_a_new_run_discards_the_state_of_the_previous_one(clone: Workspace) -> None:
+    """A run is new if time goes back to the previous run's start or earlier."""
     fi = probe(clone, hold="to_end")
     assert drive(fi, ".x.", start=0.9) == ".xx"
     assert drive(fi, "..x", start=0.9) == "..x"
@@ -101,11 +101,10 @@ def test_a_new_run_starts_afresh(clone: Workspace) -> None:
         ((math.nan,), "time neither goes on nor starts again: at nan s"),
     ],
 )
-def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...], said: str) -> None:
-    """An observation at the time of the previous one, or at an earlier time within the run, is an error.
-
-    The probe also puts the error into its report, in case the target catches it.
-    """
+def test_time_that_does_not_advance_is_an_error(
+    clone: Workspace, times: tuple[float, ...], said: str
+) -> None:
+    """The error is also in the report, in case the target catches it."""
     fi = probe(clone)
     *before, last = times
     for t in before:
@@ -116,8 +115,8 @@ def test_time_goes_on_or_starts_again(clone: Workspace, times: tuple[float, ...]
         fi.report()
 
 
-def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
-    """An observed value that is not a number is an error of the probe, which is also in the report."""
+def test_an_observed_value_that_is_not_a_number_is_an_error(clone: Workspace) -> None:
+    """The error is also in the report."""
     fi = probe(clone)
     with pytest.raises(TypeError, match="NoneType"):
         fi.observe(t=0.0, d_rel=None, v_ego=20.0, v_lead=15.0)
@@ -125,8 +124,8 @@ def test_what_cannot_be_observed_is_told_again(clone: Workspace) -> None:
         fi.report()
 
 
-def test_step_limit(clone: Workspace) -> None:
-    """A run stops in the step after its limit. The full limit applies to the next run."""
+def test_a_run_stops_in_the_step_after_its_limit(clone: Workspace) -> None:
+    """The full limit applies to the next run."""
     fi = probe(clone)
     fi.limit(3)
     drive(fi, "...")
@@ -135,8 +134,7 @@ def test_step_limit(clone: Workspace) -> None:
     assert drive(fi, "...") == "..."
 
 
-def test_values_have_any_name(clone: Workspace) -> None:
-    """Observed values may have the names of the probe's variables."""
+def test_observed_values_may_be_named_like_variables_of_the_probe(clone: Workspace) -> None:
     names = ("run", "values", "error", "active", "float", "map")
     read = tuple(Value(name=name, text=f"now.{name}", unit="-", about="x") for name in names)
     observed = replace(clone.manifest("openpilot").observation, values=read, derived=())
@@ -148,15 +146,15 @@ def test_values_have_any_name(clone: Workspace) -> None:
 
 
 def test_derived_variables(clone: Workspace) -> None:
-    """Headway is infinite at standstill, relative speed is the own speed minus the lead's, and division
+    """Headway is infinite at standstill, relative speed is the car's speed minus the lead's, and division
     never raises."""
     fi = probe(clone, condition="hwt > 1e6 and rs == -3 and 1 / v_ego > 5")
     fi.observe(t=0.0, d_rel=10.0, v_ego=0.0, v_lead=3.0)
     assert fi.active("a")
 
 
-def test_probe_and_planner_agree(clone: Workspace) -> None:
-    """For observations with edge cases of every kind, the probe decides as `trigger.evaluate` does."""
+def test_the_probe_decides_as_the_planner_does(clone: Workspace) -> None:
+    """The reference is `trigger.evaluate`."""
     stream = random.Random(1)
     conditions = ["hwt <= 2 and rs > 0", "d_rel / rs < 3 or not t > 1", "1 <= v_ego / v_lead < abs(rs) * 2"]
     for condition in conditions:
@@ -173,7 +171,6 @@ def test_probe_and_planner_agree(clone: Workspace) -> None:
 
 
 def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
-    """`steps` grows by one in each active observation, regardless of how often an injection runs."""
     fi = probe(clone)
     drive(fi, "xx.x")
     for _ in range(5):
@@ -181,8 +178,8 @@ def test_drift_counts_steps_not_executions(clone: Workspace) -> None:
     assert fi.steps() == 3
 
 
-def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> None:
-    """Stored values and the active time are reset when the fault becomes active again."""
+def test_stored_values_are_reset_at_each_activation(clone: Workspace) -> None:
+    """The active time is reset, too."""
     fi = probe(clone)
     seen = []
     for i, mark in enumerate(".xxx.xx"):
@@ -192,8 +189,8 @@ def test_held_and_elapsed_belong_to_a_stretch_of_activity(clone: Workspace) -> N
     assert seen == [(1, 0.0), (1, 0.1), (1, 0.2), (5, 0.0), (5, 0.1)]
 
 
-def test_delay(clone: Workspace) -> None:
-    """The first value is returned until another value is old enough. From then on, the delay is constant."""
+def test_the_delay_becomes_constant(clone: Workspace) -> None:
+    """The first value is returned until another value is old enough."""
     fi = probe(clone, condition="t >= 0.2")
     seen = []
     for i in range(8):
@@ -203,9 +200,8 @@ def test_delay(clone: Workspace) -> None:
     assert seen == [2, 2, 2, 3, 4, 5]
 
 
-def test_kept_for_a_whole_run(clone: Workspace) -> None:
-    """An injection's stored values are kept between its active stretches, separate from other injections,
-    and are discarded at the end of the run."""
+def test_stored_values_of_a_run_outlast_an_activation(clone: Workspace) -> None:
+    """They are separate from those of other injections, and are discarded at the end of the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -217,9 +213,8 @@ def test_kept_for_a_whole_run(clone: Workspace) -> None:
     assert seen == [(0, 0, 1), (0, 0, 1), (1, 2, 3), (1, 2, 3)]
 
 
-def test_noise_repeats_with_every_run(clone: Workspace) -> None:
-    """Noise depends only on its seed, so different seeds give different noise. The shared generator is
-    unchanged."""
+def test_noise_depends_only_on_its_seed(clone: Workspace) -> None:
+    """The shared generator is unchanged."""
     fi = probe(clone, condition="True")
     state = random.getstate()
     runs = []
@@ -260,9 +255,9 @@ FLIPS = [
 
 
 @pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
-def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
-    """Flipping a bit changes a number, or each number of an array, and keeps its type. The original value
-    is not modified, and a second flip restores it."""
+def test_a_bit_flip_keeps_the_type(clone: Workspace, value: Any, bit: int, result: Any) -> None:
+    """It changes a number, or each number of an array. The original value is not modified, and a second flip
+    restores it."""
     fi, before = probe(clone), copy.deepcopy(value)
     flipped = fi.flip_bit(value, bit)
     assert np.array_equal(flipped, result)
@@ -283,9 +278,8 @@ def test_bit_flips(clone: Workspace, value: Any, bit: int, result: Any) -> None:
         (np.array(["a"]), 0),
     ],
 )
-def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None:
-    """A bit outside the type is an error that names the type. A value without such a type is an error,
-    too."""
+def test_a_bit_outside_the_type_is_an_error(clone: Workspace, value: Any, bit: int) -> None:
+    """A value without such a type is an error, too."""
     with pytest.raises(ValueError, match=f"{value.dtype.name} has no bit {bit} to flip"):
         probe(clone).flip_bit(value, bit)
 
@@ -309,9 +303,10 @@ def test_bits_that_are_not_there(clone: Workspace, value: Any, bit: int) -> None
         (None, 2.0, float),
     ],
 )
-def test_a_number_like_the_value(clone: Workspace, value: Any, number: float, kind: type) -> None:
-    """A whole number becomes an integer if the value is an integer, a numpy integer, or an array of
-    integers. Otherwise it stays as it is."""
+def test_a_whole_number_takes_the_type_of_an_integer_value(
+    clone: Workspace, value: Any, number: float, kind: type
+) -> None:
+    """The value may be an integer, a numpy integer, or an array of integers."""
     found = probe(clone).like(value, number)
     assert type(found) is kind
     assert found == number or math.isnan(number)

@@ -22,7 +22,6 @@ MUTANT, IDS = "0123456789abcdef", ("0a1b2c3d", "4e5f6071")
 
 
 def source(clone: Workspace, trigger: Trigger = TRIGGER) -> str:
-    """The text of a probe, rendered as in a mutant."""
     models, observation = clone.fault_models(), clone.manifest("openpilot").observation
     values = contract.template_values(MUTANT, trigger, trigger.hold, IDS, observation, 0.1)
     return render(models.probe, values, models.folder / "_fi.py.j2")
@@ -35,13 +34,12 @@ def module(clone: Workspace) -> Any:
 
 
 def see(fi: Any, *, near: bool) -> None:
-    """Observe one step and return whether the first injection is active."""
     fi.observe(t=1.0 if near else 0.5, d_rel=20.0 if near else 200.0, v_ego=20.0, v_lead=15.0)
     assert fi.active(IDS[0]) is near
 
 
-def test_the_decision_is_the_probes(clone: Workspace) -> None:
-    """A probe's decision, evaluated without a run, agrees with `observe` in the first active step."""
+def test_the_evaluated_decision_agrees_with_observe(clone: Workspace) -> None:
+    """Both are asked in the first active step."""
     code = compile(source(clone), "_fi", "exec")
     armed_t, holds = contract.decision(code)
     module: dict[str, Any] = {}
@@ -54,8 +52,8 @@ def test_the_decision_is_the_probes(clone: Workspace) -> None:
         assert module["_run"].active == (values[0] >= armed_t and holds(*values))
 
 
-def test_settings_are_all_that_differs(clone: Workspace) -> None:
-    """The probes of two triggers differ only in their settings, which can be found by name."""
+def test_probes_of_two_triggers_differ_only_in_their_settings(clone: Workspace) -> None:
+    """The settings can be found by name."""
     other = Trigger(name="x", condition="t >= 3.0", hold=Hold.FOR, hold_s=2.5, armed_after_s=1.0)
     rests, found = [], []
     for trigger in (TRIGGER, other):
@@ -76,14 +74,13 @@ def test_settings_are_all_that_differs(clone: Workspace) -> None:
     }
 
 
-def test_a_hold_time_is_needed(clone: Workspace) -> None:
+def test_holding_for_a_time_needs_the_time(clone: Workspace) -> None:
     observation = clone.manifest("openpilot").observation
     with pytest.raises(MutatorError, match="without a time"):
         contract.template_values("m", Trigger(name="x", condition="True"), Hold.FOR, (), observation, 0.1)
 
 
-def test_a_condition_asks_for_what_the_target_observes(clone: Workspace) -> None:
-    """Other names are refused with the known ones."""
+def test_a_condition_with_an_unknown_name_is_refused(clone: Workspace) -> None:
     observation, trigger = clone.manifest("openpilot").observation, Trigger(name="x", condition="speed > 1.0")
     with pytest.raises(MutatorError, match=r"unknown name 'speed' in 'speed > 1.0'; .* d_rel, v_ego, v_lead"):
         contract.template_values("m", trigger, Hold.WHILE, (), observation, 0.1)
@@ -100,9 +97,8 @@ def test_no_activation(report: dict[str, Any]) -> None:
     assert contract.activation_of(report) is None
 
 
-def test_reports_are_read(clone: Workspace) -> None:
-    """All injections count together. The report of a mutant that never triggers is read like a probe's
-    report."""
+def test_activations_of_all_injections_are_added(clone: Workspace) -> None:
+    """The report of a mutant that never triggers is read like a probe's report."""
     early = {"first": 0.25, "last": 0.75, "count": 1}
     report = {"injections": {"a": RAN, "b": early, "c": NEVER}}
     assert contract.activation_of(report) == Activation(first=0.25, last=2.0, count=4)
@@ -121,8 +117,7 @@ SOUND = {
 }
 
 
-def test_sound_reports(clone: Workspace) -> None:
-    """Valid reports of active and inactive faults give no findings."""
+def test_valid_reports_have_no_findings(clone: Workspace) -> None:
     assert contract.report_problem(SOUND, "m", ("a", "b")) == ""
     fi = module(clone)
     for near in (False, True):
@@ -159,7 +154,7 @@ def test_sound_reports(clone: Workspace) -> None:
         ({"triggered": None}, "its trigger was not"),
     ],
 )
-def test_damaged_reports(change: Any, said: str) -> None:
-    """Wrong keys, types and numbers in a report are found, and so are contradictions."""
+def test_damaged_reports_are_found(change: Any, said: str) -> None:
+    """Keys, types and numbers may be wrong, or contradict each other."""
     report = SOUND | change if isinstance(change, dict) else change
     assert said in contract.report_problem(report, "m", ("a", "b"))

@@ -59,9 +59,9 @@ def rendered(template: str, kind: SnippetKind = SnippetKind.INSERT, **params: Va
         (True, "True", "+ True"),
     ],
 )
-def test_values_are_literals(value: float, plain: str, added: str) -> None:
-    """Numbers are written exactly, and non-finite ones in a form that Python reads. A whole number has no
-    decimal point, so that an integer variable stays an integer."""
+def test_numbers_become_exact_literals(value: float, plain: str, added: str) -> None:
+    """Non-finite ones have a form that Python reads. A whole number has no decimal point, so that an integer
+    variable stays an integer."""
     assert rendered("{{ target }} = {{ by }}\n", by=value) == (f"x = {plain}",)
     assert rendered("{{ target }} = y {{ by | signed }}\n", by=value) == (f"x = y {added}",)
 
@@ -69,8 +69,7 @@ def test_values_are_literals(value: float, plain: str, added: str) -> None:
 @pytest.mark.parametrize(
     "name", ["x y", "x;y", "import", "x.class", "1x", "", "_fi.active", "x\ny", 3.0, None]
 )
-def test_names_are_checked(name: Value) -> None:
-    """A variable is accepted only as a chain of identifiers."""
+def test_a_variable_is_a_chain_of_identifiers(name: Value) -> None:
     with pytest.raises(MutatorError):
         rendered("{{ target }} = 1\n", target=name)
 
@@ -84,8 +83,7 @@ def test_imported_names_are_checked(name: Value) -> None:
         snippet(made, {"what": name}, "ab12")
 
 
-def test_text_is_no_number() -> None:
-    """Text is refused where a number is expected, even a harmless name."""
+def test_text_is_refused_as_a_number() -> None:
     with pytest.raises(MutatorError, match="'os' for 'by'; expected a number"):
         rendered("{{ target }} = {{ by }}\n", by="os")
 
@@ -119,8 +117,7 @@ def test_text_is_no_number() -> None:
         ("", ["one statement a line"]),
     ],
 )
-def test_a_template_that_fails(template: str, pieces: list[str]) -> None:
-    """The error names the template, the line if it is known, and the reason."""
+def test_a_template_error_names_template_line_and_reason(template: str, pieces: list[str]) -> None:
     with pytest.raises(MutatorError) as caught:
         rendered(template)
     for piece in pieces:
@@ -144,25 +141,23 @@ def test_a_guard_opens_a_block() -> None:
         ("not {{ original }} or 1", "not y or 1"),
     ],
 )
-def test_a_value_holds_together(template: str, text: str) -> None:
-    """A template's expression remains one operand of the `if` that asks the probe. Brackets are added if
-    it needs them."""
+def test_an_expression_stays_one_operand(template: str, text: str) -> None:
+    """Brackets are added if it needs them."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     assert changed_value(made, {"by": 1.0}, "ab12", "y") == text
 
 
 @pytest.mark.parametrize("template", ["{{ original }} # why", "1\n", "yield 1", "x = 1", ""])
-def test_a_value_is_an_expression(template: str) -> None:
-    """A value must be one expression on one line, without a comment, which would hide the rest of the
-    line."""
+def test_a_value_must_be_one_expression_without_a_comment(template: str) -> None:
+    """A comment would hide the rest of the line."""
     made = replace(model(template, SnippetKind.VALUE), expression=template)
     with pytest.raises(MutatorError, match="expected one expression on one line"):
         changed_value(made, {"by": 1.0}, "ab12", "y")
 
 
 @pytest.mark.parametrize("target", ["x # why", "x\n", "x[\n0]", " x", None])
-def test_a_target_is_a_name_and_nothing_else(target: Value) -> None:
-    """A target must be a plain name. A comment in it would disable the assignment."""
+def test_a_target_must_be_a_plain_name(target: Value) -> None:
+    """A comment in it would disable the assignment."""
     made = replace(model("-{{ original }}", SnippetKind.VALUE), expression="-{{ original }}")
     for one in (made, model("{{ target }} = {{ target }} + 1")):
         with pytest.raises(MutatorError, match="for 'target'"):
@@ -183,8 +178,8 @@ CONSTANT = ParamSchema(name="value", type="constant", about="", optional=True)
         ({}, "x = 0"),
     ],
 )
-def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
-    """A constant is written with `repr` on one line. None is distinguished from a missing constant."""
+def test_constants_are_written_with_repr(given: dict[str, Value], line: str) -> None:
+    """None is distinguished from a missing constant."""
     template = "x = {% if value is none %}0{% else %}{{ value }}{% endif %}\n"
     assert snippet(replace(model(template), params=(CONSTANT,)), given, "ab12") == (line,)
 
@@ -255,10 +250,10 @@ def test_constants_are_literals(given: dict[str, Value], line: str) -> None:
         ("wrong_branch", {"holds": "never"}, True, False),
     ],
 )
-def test_values_keep_their_kind(
+def test_integers_stay_integers(
     clone: Workspace, name: str, params: dict[str, Value], value: Any, result: Any
 ) -> None:
-    """A fault keeps the type of a variable: an integer stays one if the parameters are whole numbers."""
+    """The parameters must be whole numbers."""
     models = clone.fault_models()
     given = {"target": "x", **{key: int(v) if key == "bit" else v for key, v in params.items()}}
     given = {key: v for key, v in given.items() if v is not None or key == "value"}

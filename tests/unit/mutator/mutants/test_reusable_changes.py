@@ -50,9 +50,8 @@ def change(text: str, code: str, name: str, guard: bool) -> tuple[ReusableChange
 
 @pytest.mark.parametrize("guard", [False, True])
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
-    """The reusable change of one mutant, filled with the lines of another of the same kind, equals the
-    other mutant's change."""
+def test_a_reusable_change_equals_the_spliced_one(text: str, guard: bool) -> None:
+    """The reusable change of one mutant is filled with the lines of another of the same kind."""
     code = "if _fi.active('{}', {}):" if guard else "x = _fi.held('{}', {})"
     reusable, _, _, compiles = change(text, code.format("00000001", 3.25), "00000001", guard)
     other, made, lines, _ = change(text, code.format("abcdefab", 1e-300), "abcdefab", guard)
@@ -62,9 +61,8 @@ def test_a_filled_change_is_the_spliced_one(text: str, guard: bool) -> None:
 
 
 @pytest.mark.parametrize("text", TEXTS)
-def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
-    """This also holds if a value changes in the line before the inserted lines, even in the last line of
-    the file."""
+def test_a_value_changes_in_the_line_before_inserted_lines(text: str) -> None:
+    """The line may be the last one of the file."""
     file = parse_file("m.py", text.encode("latin-1" if "latin" in text else "utf-8"), Path("root"))
 
     def changed(name: str, value: str) -> tuple[ReusableChange, Change, list[bytes]]:
@@ -86,12 +84,11 @@ def test_a_changed_value_in_front_of_inserted_lines(text: str) -> None:
     assert reusable.filled(lines) == made
 
 
-def test_a_change_that_compiles_only_with_some_values() -> None:
+def test_a_change_that_compiles_only_with_some_values_is_not_reused() -> None:
     assert not change(TEXTS[0], "x = 12345678", "12345678", False)[3]
 
 
 def fault(value: Value, **location: object) -> Fault:
-    """A fault `gap = value` in the toy's sensor, or at another location."""
     anchor = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="gap")
     place = FaultLocation(**{"path": SENSOR, "function": "Sensor.measure", "anchor": anchor, **location})
     injection = Injection(location=place, model="stuck", params=(("target", "gap"), ("value", value)))
@@ -107,9 +104,8 @@ def fault(value: Value, **location: object) -> Fault:
     )
 
 
-def test_a_change_is_spliced_once(toy: Workspace) -> None:
-    """The change is reused for another number, but not for another sign, another type or a non-finite
-    value."""
+def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
+    """It is not reused for another sign, another type or a non-finite value."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
     known = known_changes(manifest.tree, SENSOR)
     counts = []
@@ -121,8 +117,7 @@ def test_a_change_is_spliced_once(toy: Workspace) -> None:
     assert counts == [1, 1, 1, 2, 3, 4, 5]
 
 
-def test_errors_are_those_of_splicing(toy: Workspace, tmp_path: Path) -> None:
-    """A mutant that cannot be built gets the same error after another mutant of its kind was built."""
+def test_a_reused_change_gives_the_same_errors(toy: Workspace, tmp_path: Path) -> None:
     templates = Path(shutil.copytree(toy.templates, tmp_path / "templates"))
     (templates / "stuck.py.j2").write_text(
         "match {{ target }}:\n    case {1: a, {{ value }}: b}:\n        {{ target }} = a\n"

@@ -18,8 +18,7 @@ def genexpr(x=(i for i in 'ab')): return (µ for µ in x)
 
 
 def test_names_of_functions() -> None:
-    """A function knows its variables and the outer names that it uses. It does not know names that only
-    inner functions use."""
+    """Names that only inner functions use are unknown."""
     names = function_names(SOURCE.encode())
     go = names[4, "go"]
     assert {"self", "x", "__own", "limit", "inner", "max"} <= go
@@ -28,8 +27,8 @@ def test_names_of_functions() -> None:
     assert names[9, "genexpr"] == {"x"} | (names[9, "genexpr"] & {"μ"})
 
 
-def test_sources_of_any_encoding() -> None:
-    """The file's declared encoding or byte order mark is used."""
+def test_the_files_encoding_is_used() -> None:
+    """A byte order mark may declare it."""
     latin = "# coding: latin-1\ndef f(\xe9): return \xe9\n".encode("latin-1")
     assert function_names(latin) == {(2, "f"): {"\xe9"}}
     assert function_names("\ufeffdef f(\xe9): pass\r\n".encode()) == {(1, "f"): {"\xe9"}}
@@ -71,9 +70,11 @@ CLASS = "class C:\n    def f(self):\n        #\n        return __x\n"
         (CLASS, "__y = 1", None),
     ],
 )  # fmt: skip
-def test_names_that_move(source: str, inserted: str, moved: tuple[str, str, str, str] | None) -> None:
-    """Any binding makes a name local to its function and hides it from inner functions, unless the name
-    was local or declared before. Attributes, arguments and comprehensions have separate names."""
+def test_any_binding_makes_a_name_local(
+    source: str, inserted: str, moved: tuple[str, str, str, str] | None
+) -> None:
+    """The binding also hides the name from inner functions, unless it was local or declared before.
+    Attributes, arguments and comprehensions have separate names."""
     place = next(i for i, line in enumerate(source.splitlines(), 1) if line.strip() == "#")
     made = source.replace("#", inserted)
     found = next(moved_names(source.replace("#", "pass").encode(), made.encode(), {place}), None)

@@ -26,7 +26,7 @@ def edit(
 
 
 def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool = False) -> bytes:
-    """The mutated bytes. The function checks that they compile and that the original can be restored."""
+    """The mutated bytes, which must compile and allow the original to be restored."""
     file = parsed(text)
     result = splicing.joined(splicing.apply_edits(file, [edit(file, kind, name, guard=guard)]))
     compile(result, "m.py", "exec")
@@ -34,9 +34,8 @@ def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool
     return result
 
 
-def test_after_and_before() -> None:
-    """Lines are inserted directly after or before the statement, with its indentation and with a tag on
-    each."""
+def test_lines_are_inserted_next_to_the_statement() -> None:
+    """They have its indentation and a tag each."""
     text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
     assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
         "def f(x):\n    # why\n    x = 1  # set\n"
@@ -78,8 +77,7 @@ def test_after_and_before() -> None:
         pytest.param("def f(x):\n    x = 1\n    \n", id="blank line with spaces"),
     ],
 )
-def test_shapes_of_source(text: str | bytes) -> None:
-    """The new lines follow the assignment, no other line changes, and the original can be restored."""
+def test_inserting_changes_no_other_line(text: str | bytes) -> None:
     result = spliced(text, AnchorKind.AFTER_ASSIGN)
     data = text if isinstance(text, bytes) else text.encode()
     added = [line for line in result.splitlines() if b"fi:ab12" in line]
@@ -91,7 +89,7 @@ def test_shapes_of_source(text: str | bytes) -> None:
 
 
 def test_a_guard_indents_the_statement_it_wraps() -> None:
-    """All lines of the wrapped statement move in by one level. Blank lines stay blank."""
+    """Blank lines stay blank."""
     text = "def f(x):\n    g(\n        1,\n\n  2)  # why\n    return x\n"
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:4\n'
@@ -99,9 +97,8 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
     )
 
 
-def test_a_guard_leaves_strings_alone() -> None:
-    """If a string spans lines, only its first line moves, because moving the others would change the
-    string."""
+def test_a_guard_does_not_indent_the_inside_of_a_string() -> None:
+    """This would change the string."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -120,8 +117,8 @@ def test_a_guard_leaves_strings_alone() -> None:
         "def f(x):\n    return g(1)\n",
     ],
 )
-def test_guards_in_all_shapes(text: str) -> None:
-    """Tabs, mixed indentation, CRLF and missing final newlines are restored exactly."""
+def test_guards_can_be_undone_in_files_of_every_form(text: str) -> None:
+    """Examples are tabs, mixed indentation, CRLF and missing final newlines."""
     assert b"guard:" in spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True)
 
 
@@ -134,16 +131,14 @@ def test_guards_in_all_shapes(text: str) -> None:
         ("def f(x):\n    g(1)\n", AnchorKind.ENTRY),
     ],
 )
-def test_a_guard_needs_its_statement_alone(text: str, kind: AnchorKind) -> None:
-    """A statement that shares its line cannot be wrapped, nor can anything that is not a statement."""
+def test_only_a_statement_alone_on_its_lines_can_be_wrapped(text: str, kind: AnchorKind) -> None:
     file = parsed(text)
     with pytest.raises(MutatorError, match="a guard needs a statement that is alone"):
         edit(file, kind, "" if kind is AnchorKind.ENTRY else "g", guard=True)
 
 
 def test_edits_at_one_boundary() -> None:
-    """Lines after a statement come before the lines that precede the next statement. A guard stays with
-    its statement."""
+    """A guard stays with its statement."""
     file = parsed("def f(x):\n    if x:\n        x = 1\n    g(1)\n    return x\n")
     edits = [
         edit(file, AnchorKind.BEFORE_CALL, "g", guard=True),
@@ -159,7 +154,7 @@ def test_edits_at_one_boundary() -> None:
     assert b"guard:1\n        g(1)\n" in result
 
 
-def test_two_guards_around_one_statement() -> None:
+def test_two_guards_around_one_statement_are_refused() -> None:
     file = parsed("def f(x):\n    g(1)\n")
     guard = edit(file, AnchorKind.BEFORE_CALL, "g", guard=True)
     with pytest.raises(MutatorError, match="two guards around one statement"):
@@ -167,7 +162,6 @@ def test_two_guards_around_one_statement() -> None:
 
 
 def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
-    """Without a final newline in the source, the result has none, whichever edit its last line comes from."""
     file = parsed("def f(x):\n    x = g(1)")
     edits = [edit(file, AnchorKind.AFTER_ASSIGN), edit(file, AnchorKind.AFTER_CALL, "g")]
     result = splicing.joined(splicing.apply_edits(file, edits))
@@ -175,8 +169,7 @@ def test_two_edits_at_the_end_of_a_file_without_newline() -> None:
     assert splicing.unsplice(result) == file.data
 
 
-def test_names_that_the_encoding_lacks() -> None:
-    """A snippet that cannot be written in the file's encoding is refused."""
+def test_a_snippet_that_the_encoding_lacks_is_refused() -> None:
     file = parsed("# coding: ascii\ndef f(x):\n    x = 1\n")
     site = file.resolve(
         FaultLocation(path="m.py", function="f", anchor=Anchor(kind=AnchorKind.AFTER_ASSIGN, name="x"))
@@ -185,8 +178,8 @@ def test_names_that_the_encoding_lacks() -> None:
         splicing.insertion(file, site, ["gr\xf6\xdfe = 1"], "ab12")
 
 
-def test_the_probe_is_imported() -> None:
-    """The import is inserted below the docstring and `__future__` imports, and has the probe's tag."""
+def test_the_import_of_the_probe_is_tagged() -> None:
+    """It goes below the docstring and `__future__` imports."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (
@@ -195,8 +188,7 @@ def test_the_probe_is_imported() -> None:
 
 
 def test_a_byte_order_mark_stays_first() -> None:
-    """Nothing is inserted before the byte order mark. An import below a docstring is allowed; any other is
-    refused."""
+    """An import below a docstring is allowed; any other is refused."""
     file = parsed(b"\xef\xbb\xbf'Doc.'\nx = 1\n")
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     compile(result, "m.py", "exec")

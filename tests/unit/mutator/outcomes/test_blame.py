@@ -59,12 +59,10 @@ def execution(
         ((PROBE, ELSEWHERE), Status.HARNESS_ERROR),
     ],
 )
-def test_what_was_on_the_stack(stack: Stack, status: Status) -> None:
-    """An exception in the target's own code is a crash.
-
-    If the exception is in an injected line, in a probe helper that it calls, or in target code that it
-    calls, the mutant is invalid. Observing and asking the probe are not the target's code.
-    """
+def test_the_lines_on_the_stack_decide(stack: Stack, status: Status) -> None:
+    """An exception in the target's own code is a crash. If the exception is in an injected line, in a probe
+    helper that it calls, or in target code that it calls, the mutant is invalid. Observing and asking the
+    probe are not the target's code."""
     assert assign_blame(execution(stack), FILES, ())[0] is status
 
 
@@ -89,11 +87,9 @@ CHANGED = {
         ((("car/radar.py", 2, -1),), Status.CRASHED),
     ],
 )
-def test_a_changed_line_still_does_what_it_did(stack: Stack, status: Status) -> None:
-    """In a changed line, only the injected part belongs to the injection.
-
-    An exception in the rest of the line belongs to the target, and one in asking the probe to the harness.
-    """
+def test_only_the_injected_part_of_a_line_is_the_injection(stack: Stack, status: Status) -> None:
+    """An exception in the rest of the line belongs to the target, and one in asking the probe to the
+    harness."""
     assert assign_blame(execution(stack), CHANGED, ())[0] is status
 
 
@@ -114,9 +110,9 @@ TWO = b"""def say(x):
     ("data", "of_fault"),
     [(IN_A_STRING, "None.x"), (LATIN, "1 / 0"), (TWO, "no()"), (TWO, "1 / 0")],
 )
-def test_what_raised_is_found_wherever_it_stands(data: bytes, of_fault: str) -> None:
-    """In a line that begins inside a string, or has letters of another encoding, columns are those of the
-    traceback: bytes of UTF-8. Code before or after the injected part belongs to the target."""
+def test_columns_count_bytes_of_utf_8(data: bytes, of_fault: str) -> None:
+    """The line begins inside a string, or has letters of another encoding. Code before or after the injected
+    part belongs to the target."""
     encoding = "latin-1" if b"latin" in data else "utf-8"
     number = 1 + next(n for n, line in enumerate(data.splitlines()) if b"# fi:" in line)
     line = data.splitlines()[number - 1].decode(encoding)
@@ -131,8 +127,7 @@ def test_what_raised_is_found_wherever_it_stands(data: bytes, of_fault: str) -> 
     ]
 
 
-def test_each_of_two_in_a_line_answers_for_itself() -> None:
-    """An injection that raises on purpose does not excuse another injection in the same line."""
+def test_an_intended_exception_excuses_no_other_injection() -> None:
     line = TWO.splitlines()[1]
     columns = [line.index(b"no()"), line.index(b"1 / 0")]
     told = [
@@ -142,8 +137,7 @@ def test_each_of_two_in_a_line_answers_for_itself() -> None:
     assert told == [Status.CRASHED, Status.INVALID_MUTANT]
 
 
-def test_words() -> None:
-    """The message names the line or the reason."""
+def test_the_message_names_the_line_or_the_reason() -> None:
     told = [
         assign_blame(execution(stack), FILES, ()) for stack in ((TARGET,), (ELSEWHERE, INJECTED), (PROBE,))
     ]
@@ -155,9 +149,8 @@ def test_words() -> None:
     ]
 
 
-def test_a_model_may_raise() -> None:
-    """An exception from an injection that raises on purpose is a crash. It does not excuse another
-    injection."""
+def test_an_intended_exception_is_a_crash() -> None:
+    """It does not excuse another injection."""
     assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
     assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
@@ -165,32 +158,31 @@ def test_a_model_may_raise() -> None:
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
 @pytest.mark.parametrize("stacks", [(), ((TARGET,),), ((INJECTED,),)])
-def test_before_the_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
-    """A fault that was never active is not blamed for how the run ends."""
+def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tuple[Stack, ...]) -> None:
     told = assign_blame(execution(*stacks, status=status, active=False), FILES, ("0a1b2c3d",))
     assert told[0] is Status.HARNESS_ERROR
     assert told[1].endswith(", before the fault was active")
 
 
-def test_what_has_no_exception() -> None:
-    """A timeout or a silent end after the activation keeps its status. A harness error keeps its status at
-    any time."""
+def test_a_run_without_an_exception_keeps_its_status() -> None:
+    """Such a run ends with a timeout or silently after the activation, or with a harness error at any
+    time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
         assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
     told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
     assert told == (Status.HARNESS_ERROR, "why")
 
 
-def test_what_an_exception_came_of_counts() -> None:
-    """If the target catches an exception of an injected line or of the probe and raises another one, the
-    first one is blamed. The probe takes precedence."""
+def test_the_first_of_chained_exceptions_is_blamed() -> None:
+    """The target catches an exception of an injected line or of the probe and raises another one. The probe
+    takes precedence."""
     assert assign_blame(execution((TARGET,), (ELSEWHERE,)), FILES, ())[0] is Status.CRASHED
     assert assign_blame(execution((TARGET,), (INJECTED,)), FILES, ())[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((INJECTED,), (OBSERVES,)), FILES, ())[0] is Status.HARNESS_ERROR
 
 
-def test_which_call_was_one_too_many_is_chance() -> None:
-    """A target that recurses for ever is blamed, even if an injected line made the last call."""
+def test_endless_recursion_is_the_targets_fault() -> None:
+    """An injected line may have made the last call."""
     for top in ((INJECTED,), (PROBE, INJECTED), (GUARD,), (PROBE, GUARD)):
         deep = execution((*top, TARGET, ELSEWHERE), kind="RecursionError")
         assert assign_blame(deep, FILES, ())[0] is Status.CRASHED
@@ -198,12 +190,12 @@ def test_which_call_was_one_too_many_is_chance() -> None:
     assert assign_blame(inside, FILES, ())[0] is Status.INVALID_MUTANT
 
 
-def test_a_probe_that_cannot_report_failed() -> None:
+def test_a_missing_report_is_a_harness_error() -> None:
     assert assign_blame(execution((TARGET,), probe=False), FILES, ())[0] is Status.HARNESS_ERROR
 
 
-def test_records_keep_type_text_and_place() -> None:
-    """The reported position is the innermost line of the target, never of the probe."""
+def test_the_reported_position_is_the_targets_innermost_line() -> None:
+    """It is never a line of the probe."""
     error = error_of(execution((PROBE, INJECTED, ELSEWHERE)).raised)
     assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
     assert error_of(None) is None

@@ -21,13 +21,12 @@ def names(hazards: list[str], compared: list[str]) -> list[str]:
 
 
 def test_the_shipped_target_has_these_columns_in_this_order(clone: Workspace) -> None:
-    """The columns of the shipped target's results.csv stay where they are."""
     manifest = clone.manifest("openpilot")
     made = names(list(manifest.hazards), [channel.name for channel in manifest.compared])
     assert ", ".join(made) == OF_OPENPILOT
 
 
-def test_another_target_has_its_own_columns_in_the_same_places() -> None:
+def test_another_target_has_its_own_columns() -> None:
     """Hazards come before alerts, and channels after the reaction time. No column is specific to a car."""
     made = names(["CRUSHED"], ["gripper_force"])
     at = made.index("t_manifest")
@@ -37,14 +36,13 @@ def test_another_target_has_its_own_columns_in_the_same_places() -> None:
 
 
 def test_a_target_may_have_no_hazards() -> None:
-    """A target without hazards and channels has only the fixed columns, none of which is read as a hazard."""
+    """None of the fixed columns is read as a hazard."""
     made = names([], [])
     assert hazards_in(made) == ()
     assert not [name for name in made if name.startswith("max_dev_")]
 
 
-def test_hazards_are_known_by_their_columns() -> None:
-    """A table's columns name its hazards in the order of the manifest."""
+def test_hazard_columns_keep_the_order_of_the_manifest() -> None:
     assert hazards_in(names(["H3", "TOO_FAST", "H1"], ["gas"])) == ("H3", "TOO_FAST", "H1")
 
 
@@ -55,8 +53,8 @@ def test_hazards_are_known_by_their_columns() -> None:
         (["gas_left", "gas_right", "horn"], ["max_dev_gas_left", "max_dev_gas_right", "max_dev_horn"]),
     ],
 )
-def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
-    """The column of a channel is named by the first word of its name, if that is unique."""
+def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], columns: list[str]) -> None:
+    """The word must be unique."""
     assert list(deviation_columns(channels).values()) == columns
 
 
@@ -71,8 +69,8 @@ def test_deviation_columns(channels: list[str], columns: list[str]) -> None:
         ("t_crushed", False),
     ],
 )
-def test_text_is_told_from_numbers(column: str, text: bool) -> None:
-    """Names are read as text even if they look like numbers. The columns that a target adds are numbers."""
+def test_names_are_read_as_text(column: str, text: bool) -> None:
+    """They may look like numbers. The columns that a target adds are numbers."""
     assert is_text(column) is text
 
 
@@ -87,8 +85,7 @@ def test_text_is_told_from_numbers(column: str, text: bool) -> None:
         ("[H1, t_h1]", "t_h1"),
     ],
 )
-def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: str) -> None:
-    """A hazard that would have an existing column is refused at its line of the manifest."""
+def test_a_hazard_with_an_existing_column_is_refused(toy: Workspace, hazards: str, at: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: {hazards}"))
     with pytest.raises(MutatorError, match=rf"{Path(path).name}:26: '{at}'; expected a name whose columns"):
@@ -104,9 +101,8 @@ def test_a_hazard_may_not_take_another_column(toy: Workspace, hazards: str, at: 
         (["end"], "end"),  # the column t_end exists
     ],
 )
-def test_a_metric_may_not_take_another_column(toy: Workspace, metrics: list[str], at: str) -> None:
-    """A metric is refused if its column exists already, or if it would make another column look like a
-    hazard."""
+def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: list[str], at: str) -> None:
+    """It must not make another column look like a hazard, either."""
     path = toy.library / "targets" / "toy.yaml"
     lines = [f"  {name}: {{max: speed, unit: m/s, worse: higher, about: x}}" for name in metrics]
     path.write_text("\n".join([path.read_text().rstrip(), "metrics:", *lines, ""]))
@@ -115,8 +111,7 @@ def test_a_metric_may_not_take_another_column(toy: Workspace, metrics: list[str]
 
 
 @pytest.mark.parametrize("name", ["h1", "H2", "too_fast"])
-def test_no_name_is_special(toy: Workspace, name: str) -> None:
-    """All other names are valid."""
+def test_all_other_names_are_valid(toy: Workspace, name: str) -> None:
     path = toy.library / "targets" / "toy.yaml"
     path.write_text(path.read_text().replace("hazards: [H1]", f"hazards: [{name}]"))
     assert toy.manifest("toy").hazards == (name,)

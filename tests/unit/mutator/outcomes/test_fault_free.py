@@ -42,9 +42,8 @@ def folder(path: Path, runs: dict[tuple[str, str], dict]) -> RunFolder:
     return made
 
 
-def test_alerts_hazards_and_ranges(tmp_path: Path) -> None:
-    """The data have the first times of counted events and the range of a channel. Values that are not
-    recorded are left out."""
+def test_first_times_of_events_and_ranges_of_channels(tmp_path: Path) -> None:
+    """Values that are not recorded are left out."""
     raised = [{"name": "fcw", "t": 3.5}, {"name": "fcw", "t": 9.0}, {"name": "chime", "t": 1.0}]
     runs = fault_free_runs(
         folder(
@@ -71,7 +70,7 @@ def test_the_sentence_names_alerts_and_scenarios_once(tmp_path: Path) -> None:
     assert own_alerts(()) == ""
 
 
-def test_a_golden_run_that_is_gone_is_an_error(tmp_path: Path) -> None:
+def test_a_missing_golden_run_is_an_error(tmp_path: Path) -> None:
     made = folder(tmp_path, {("A", ""): {"hazards": {}}})
     (made.golden("A") / "record.json").unlink()
     with pytest.raises(MutatorError, match="golden"):

@@ -49,17 +49,15 @@ def test_equal_traces_do_not_differ() -> None:
     assert difference.max_dev == (("gas", 0.0),)
 
 
-def test_differences_up_to_the_end_of_the_drive() -> None:
-    """Steps after the drive's end count in the largest difference of the run, but not in that of the
-    drive."""
+def test_steps_after_the_end_of_the_drive_count_only_for_the_run() -> None:
     golden, faulty = trace(gas=[0, 0, 0, 0, 0]), trace(gas=[0, 2, 1, 9, 0])
     found = compare(golden, faulty, [GAS], "t", t_end=0.2)
     assert (found.max_dev, found.dev) == ((("gas", 9.0),), (("gas", 2.0),))
     assert compare(golden, faulty, [GAS], "t").dev == found.max_dev
 
 
-def test_steps_at_other_times_alone_are_no_difference() -> None:
-    """A channel with its own times is compared at these times. A run that ends earlier still differs."""
+def test_a_channel_is_compared_at_its_own_times() -> None:
+    """A run that ends earlier still differs."""
     own, times = np.array([0.0, 0.2]), T + 0.01
     golden = {"t": T, "gas": np.array([1.0, 2.0]), "gas@": own}
     faulty = {**golden, "t": times}
@@ -70,8 +68,7 @@ def test_steps_at_other_times_alone_are_no_difference() -> None:
 
 
 @pytest.mark.parametrize("times", [T, T + 0.01, T[:3]], ids=["equal", "others", "shorter"])
-def test_sharing_times_changes_no_comparison(times: np.ndarray) -> None:
-    """The result of a comparison does not depend on whether both runs share one array of times."""
+def test_shared_times_do_not_change_a_comparison(times: np.ndarray) -> None:
     golden = trace(gas=[1, 2, 3, 4, 5])
     faulty = {"t": times.copy(), "gas": np.array([1, 2, 3.5, 4, np.nan])[: len(times)]}
     shared = sharing_times(golden, faulty, "t")
@@ -88,14 +85,13 @@ def test_first_and_largest_difference() -> None:
 
 
 @pytest.mark.parametrize(("step", "first"), [(1e-12, T[3]), (0.5, T[3])])
-def test_exact_by_default(step: float, first: float) -> None:
-    """Without a tolerance, any difference counts."""
+def test_without_a_tolerance_any_difference_counts(step: float, first: float) -> None:
     difference = compare(trace(gas=[1, 1, 1, 1, 1]), trace(gas=[1, 1, 1, 1 + step, 1]), [GAS], "t")
     assert difference.t_first == first
 
 
-def test_tolerance() -> None:
-    """A difference within the channel's tolerance does not count, but its size is stored."""
+def test_a_difference_within_its_tolerance_does_not_count() -> None:
+    """Its size is stored."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -103,9 +99,8 @@ def test_tolerance() -> None:
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_no_number_against_a_number_is_infinitely_different(value: float) -> None:
-    """NaN or infinity, compared with a number in golden, is an infinite difference regardless of the
-    tolerance."""
+def test_a_non_finite_value_is_an_infinite_difference(value: float) -> None:
+    """Golden has a number. The tolerance does not matter."""
     channel = Channel(name="gas", unit="-", tolerance=100.0)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, value, 1]), [channel], "t")
     assert difference.t_first == T[1]
@@ -113,8 +108,7 @@ def test_no_number_against_a_number_is_infinitely_different(value: float) -> Non
 
 
 @pytest.mark.parametrize(("golden", "faulty"), [(3, 5), (5, 3)])
-def test_other_length_differs_where_one_ends(golden: int, faulty: int) -> None:
-    """If two runs have different lengths, they differ from the first step that only one of them has."""
+def test_runs_of_different_lengths_differ_where_one_ends(golden: int, faulty: int) -> None:
     difference = compare(trace(gas=[0] * golden), trace(gas=[0] * faulty), [GAS], "t")
     assert difference.t_first == T[3]
 
@@ -131,7 +125,6 @@ def test_key_of_a_golden_run() -> None:
 
 
 def test_trace_is_read(tmp_path: Path) -> None:
-    """The requested channels and the time are read as they were written."""
     np.savez(tmp_path / "trace.npz", t=T, gas=T * 2, other=T)
     found = load_trace(MANIFEST, tmp_path, [GAS])
     assert set(found) == {"t", "gas"}
@@ -139,8 +132,8 @@ def test_trace_is_read(tmp_path: Path) -> None:
     assert set(load_trace(MANIFEST, tmp_path)) == {"t", "gas", "other"}
 
 
-def test_bad_traces_are_told(tmp_path: Path) -> None:
-    """A trace that is missing, incomplete, without a channel, or of unequal lengths raises BadOutput."""
+def test_an_invalid_trace_is_a_bad_output(tmp_path: Path) -> None:
+    """It is missing, incomplete, without a channel, or of unequal lengths."""
     path = tmp_path / "trace.npz"
     with pytest.raises(BadOutput):
         load_trace(MANIFEST, tmp_path)
@@ -160,8 +153,8 @@ def test_bad_traces_are_told(tmp_path: Path) -> None:
             load_trace(MANIFEST, tmp_path, [GAS])
 
 
-def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
-    """A file of a single array, a member with an invalid header, and a pipe raise BadOutput."""
+def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
+    """These are a file of a single array, a member with an invalid header, and a pipe."""
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)
@@ -179,8 +172,8 @@ def test_traces_that_nobody_writes_are_told(tmp_path: Path) -> None:
             load(MANIFEST, tmp_path)
 
 
-def test_record_is_read(tmp_path: Path) -> None:
-    """A target's record is read, including each time at which a counted alert is raised."""
+def test_a_record_is_read(tmp_path: Path) -> None:
+    """Each time at which a counted alert is raised is included."""
     said = {
         "hazards": {"H1": None, "H2": 3.5},
         "alerts": [{"name": "fcw", "t": 1.0}],
@@ -203,16 +196,16 @@ def test_record_is_read(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_bad_record_is_told(tmp_path: Path, text: str) -> None:
-    """A record without the times of hazards and alerts raises BadOutput."""
+def test_an_incomplete_record_is_a_bad_output(tmp_path: Path, text: str) -> None:
+    """The times of hazards and alerts are required."""
     (tmp_path / "record.json").write_text(text)
     with pytest.raises(BadOutput):
         load_record(MANIFEST, tmp_path)
 
 
-def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If a trace cannot be opened because no file handle is free, its run is not blamed."""
-
+def test_a_lack_of_file_handles_is_not_blamed_on_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*given: Any, **more: Any) -> None:
         raise OSError(errno.EMFILE, "Too many open files")
 
@@ -221,8 +214,7 @@ def test_a_shortage_here_is_not_the_runs_doing(tmp_path: Path, monkeypatch: pyte
         load_trace(MANIFEST, tmp_path)
 
 
-def test_a_trace_that_is_a_pipe(tmp_path: Path) -> None:
-    """A pipe in place of an output counts as missing and is not waited for."""
+def test_a_pipe_counts_as_a_missing_output(tmp_path: Path) -> None:
     for name in (MANIFEST.trace_file, MANIFEST.record_file):
         os.mkfifo(tmp_path / name)
     for read in (load_trace, load_record, trace_digest):

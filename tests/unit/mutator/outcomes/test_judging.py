@@ -44,8 +44,6 @@ Write = Callable[..., TargetManifest]
 
 @pytest.fixture
 def write(tmp_path: Path) -> Write:
-    """Write a manifest that ends with these lines. `old: new` replaces earlier text."""
-
     def manifest(rest: str, **replaced: str) -> TargetManifest:
         text = HEAD
         for old, new in replaced.items():
@@ -78,8 +76,9 @@ def judged(manifest: TargetManifest, **channels: Any) -> Judged:
         ("when: min(gap, speed) < 0", 2.0),
     ],
 )
-def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> None:
-    """A hazard occurs at the first step at which its condition has held for the required time."""
+def test_a_hazard_occurs_when_its_condition_has_held_long_enough(
+    write: Write, rule: str, first: float | None
+) -> None:
     rule = rule if rule.startswith("{") else f"{{{rule.replace(': ', ': ', 1)}}}"
     key, _, value = rule.strip("{}").partition(": ")
     condition, _, more = value.partition(", for_s")
@@ -106,8 +105,8 @@ def test_when_a_hazard_comes(write: Write, rule: str, first: float | None) -> No
         ("max: gap / (speed - speed)", None),  # NaN and infinities are left out
     ],
 )
-def test_metrics_count_up_to_the_end_of_the_drive(write: Write, metric: str, value: float | None) -> None:
-    """A metric covers the steps up to and including the first terminal hazard."""
+def test_metrics_end_with_the_first_terminal_hazard(write: Write, metric: str, value: float | None) -> None:
+    """Its step is included."""
     what = metric.strip("{}")
     found = judged(
         write(
@@ -119,9 +118,8 @@ def test_metrics_count_up_to_the_end_of_the_drive(write: Write, metric: str, val
     assert dict(found.metrics).get("it") == value
 
 
-def test_a_drive_without_an_end(write: Write) -> None:
-    """Without a terminal hazard, metrics cover the whole run, and values at the end of the drive are
-    missing."""
+def test_without_a_terminal_hazard_metrics_cover_the_whole_run(write: Write) -> None:
+    """Values at the end of the drive are missing."""
     found = judged(
         write(
             "hazards: {}\nmetrics:\n"
@@ -132,8 +130,7 @@ def test_a_drive_without_an_end(write: Write) -> None:
     assert (found.t_end, dict(found.metrics)) == (None, {"least": -1.0})
 
 
-def test_a_condition_may_end_the_drive(write: Write) -> None:
-    """A hazard may occur before the end of the drive: too close at 1 s, contact at 3 s."""
+def test_a_hazard_may_occur_before_the_end_of_the_drive(write: Write) -> None:
     found = judged(write('hazards: {NEAR: {when: "gap <= 1", terminal: "gap <= 0", unit: m}}\n'))
     assert (found.hazards, found.t_end) == ((("NEAR", 1.0),), 3.0)
     assert dict(found.metrics) == {"margin_near": -1.0}  # gap - 1, at contact
@@ -155,7 +152,7 @@ CONTACT = (
     ],
 )
 def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None) -> None:
-    """Delta-v is the change of the own speed in an inelastic collision, computed from closing speed and
+    """Delta-v is the change of the car's speed in an inelastic collision, computed from closing speed and
     masses."""
     manifest = write(CONTACT.replace("OUT_ENDS", "false"))
     found = judged(manifest, speed=np.array([1.0, 2.0, -1.0, speed, 9.0, 9.0]))
@@ -163,7 +160,7 @@ def test_delta_v_of_a_contact(write: Write, speed: float, delta_v: float | None)
     assert dict(found.metrics).get("delta_v") == delta_v
 
 
-def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> None:
+def test_only_the_contact_that_ends_the_drive_has_a_delta_v(write: Write) -> None:
     found = judged(write(CONTACT.replace("OUT_ENDS", "true")))
     assert (found.t_end, found.hazards) == (2.0, (("HIT", 3.0), ("OUT", 2.0)))
     assert dict(found.metrics) == {"margin_hit": 1.0, "margin_out": -1.0, "impact": -1.0}
@@ -182,14 +179,13 @@ def test_only_the_contact_that_ended_the_drive_has_a_delta_v(write: Write) -> No
         ('{when: "gap <= 1 and speed > 0", margin: gap - 1}', -2.0),
     ],
 )
-def test_margins(write: Write, rule: str, margin: float | None) -> None:
-    """The smallest margin in a run is a metric. For a hazard with a single comparison, it needs no
-    declaration."""
+def test_the_smallest_margin_is_a_metric(write: Write, rule: str, margin: float | None) -> None:
+    """A hazard with a single comparison needs no declaration."""
     assert dict(judged(write(f"hazards: {{HIT: {rule}}}\n")).metrics).get("margin_hit") == margin
 
 
-def test_what_the_target_judges_itself(write: Write) -> None:
-    """A hazard without a condition is read from the record. The record's other hazards are ignored."""
+def test_a_hazard_without_a_condition_is_read_from_the_record(write: Write) -> None:
+    """The record's other hazards are ignored."""
     manifest = write('record: record.json\nhazards: {HIT: {terminal: true}, NEAR: {when: "gap < 0.5"}}\n')
     trace = {"time": T, "gap": GAP, "speed": SPEED}
     found = judge_run(manifest, trace, {"hazards": {"HIT": 2.5, "OTHER": 1.0}})
@@ -198,8 +194,8 @@ def test_what_the_target_judges_itself(write: Write) -> None:
     assert listed.hazards == ()
 
 
-def test_channels_with_times_of_their_own(write: Write) -> None:
-    """A slow channel keeps its newest value in the steps that follow. Before its first value it has none."""
+def test_a_slow_channel_keeps_its_newest_value(write: Write) -> None:
+    """Before its first value it has none."""
     manifest = write(
         'hazards: {SEEN: {when: "seen < 2"}}\n',
         observation="  seen: {unit: m, role: internal, time: t_seen}\nobservation:",
@@ -208,9 +204,8 @@ def test_channels_with_times_of_their_own(write: Write) -> None:
     assert judge_run(manifest, trace, {}).hazards == (("SEEN", 4.0),)
 
 
-def test_steps_of_any_length(write: Write) -> None:
-    """The trace's own times decide how long a condition has held and how much a step counts in an
-    integral."""
+def test_the_length_of_steps_matters(write: Write) -> None:
+    """The trace's times decide how long a condition has held and how much a step counts in an integral."""
     manifest = write(
         'hazards: {HIT: {when: "gap < 2", for_s: 0.5}}\n'
         "metrics: {way: {integral: speed, unit: m, worse: lower, about: x}}\n"
@@ -221,9 +216,8 @@ def test_steps_of_any_length(write: Write) -> None:
     assert dict(found.metrics)["way"] == pytest.approx(1.0)
 
 
-def test_a_formula_of_temporal_logic(write: Write) -> None:
-    """The hazard occurs after the step that violates the formula, later by the formula's horizon. The
-    margin is the robustness."""
+def test_a_temporal_formula_is_judged_after_its_horizon(write: Write) -> None:
+    """The margin is the robustness."""
     pytest.importorskip("rtamt")
     rule = "(gap < 2) implies eventually[0:2](gap > 3)"
     found = judged(write(f'hazards: {{LATE: {{stl: "{rule}", unit: m}}}}\n'))
@@ -236,7 +230,7 @@ def test_a_formula_of_temporal_logic(write: Write) -> None:
 
 
 def test_temporal_logic_needs_even_steps(write: Write) -> None:
-    """A run with uneven steps is a bad output, because such a formula cannot be evaluated."""
+    """Such a formula cannot be evaluated on uneven steps."""
     pytest.importorskip("rtamt")
     manifest = write('hazards: {LATE: {stl: "speed < 3"}}\n')
     with pytest.raises(BadOutput, match="a step of 2 s at 4 s"):
@@ -244,8 +238,8 @@ def test_temporal_logic_needs_even_steps(write: Write) -> None:
 
 
 @pytest.mark.parametrize("kind", ["npz", "csv", "parquet", "mcap"])
-def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
-    """The same run gives the same result in any format, including a channel at its own rate."""
+def test_every_trace_format_gives_the_same_result(tmp_path: Path, kind: str) -> None:
+    """One channel has its own rate."""
     import pandas as pd
 
     places = ("/cart:force", "/cart:state.gap", "/cam:d") if kind == "mcap" else ("force", "gap", "seen")
@@ -284,7 +278,7 @@ def test_every_kind_of_trace_says_the_same(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) -> None:
-    """In a table, rows at other times than a step belong to channels with their own times."""
+    """In a table, rows at times other than a step's belong to channels with their own times."""
     fast = "trace: {file: trace.csv, time: time}"
     text = (tmp_path / "cart.yaml", write("hazards: {}\n"))[0].read_text()
     text = text.replace("trace: {file: trace.npz, time: time}", fast)
@@ -299,8 +293,8 @@ def test_a_channel_may_be_faster_than_the_steps(write: Write, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("times", [[0, 2, 1], [0, 1, np.nan], [0, np.inf, np.inf]])
-def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
-    """A trace with missing or decreasing times is invalid, because hazards depend on the order."""
+def test_times_must_increase(write: Write, tmp_path: Path, times: list[float]) -> None:
+    """Hazards depend on the order."""
     np.savez(tmp_path / "trace.npz", time=times, gap=GAP[:3], speed=GAP[:3], force=GAP[:3])
     manifest = write("hazards: {}\n")
     with pytest.raises(MutatorError, match="times of time that decrease or are missing"):
@@ -315,8 +309,9 @@ def test_times_go_on(write: Write, tmp_path: Path, times: list[float]) -> None:
         ([0.0, 1.0, 2.0], None, 0.0),
     ],
 )
-def test_a_late_command_differs(later: list[float], first: float | None, largest: float) -> None:
-    """Equal values at other times are a difference from the first time that differs."""
+def test_a_value_at_another_time_is_a_difference(
+    later: list[float], first: float | None, largest: float
+) -> None:
     pedal = Channel(name="pedal", unit="-", role=Role.ACTUATOR, time="t_pedal")
     values = np.array([2.0, 9.0, 5.0])
     golden = {"t": T, "pedal": values, "pedal@": np.array([0.0, 1.0, 2.0])}

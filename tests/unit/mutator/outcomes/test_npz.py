@@ -1,4 +1,4 @@
-"""Reading arrays from stored .npz files gives the same arrays as numpy, or none."""
+"""Arrays that the fast reader gets from stored .npz files equal numpy's."""
 
 import io
 import zipfile
@@ -23,8 +23,8 @@ def written(save=np.savez, **arrays: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def test_the_arrays_are_those_that_numpy_reads() -> None:
-    """Names, order, types, shapes and values equal those that numpy reads."""
+def test_the_fast_reader_equals_numpy() -> None:
+    """Names, order, types, shapes and values are the same."""
     found = npz.members(written(**ARRAYS))
     assert found is not None
     assert list(found) == list(ARRAYS)
@@ -44,9 +44,8 @@ def test_the_arrays_are_those_that_numpy_reads() -> None:
         written(t=np.arange(3.0)) + b"more",
     ],
 )
-def test_what_is_not_as_usual_is_left_to_numpy(data: bytes) -> None:
-    """The fast reader returns nothing for compressed members, other orders and types, and other kinds of
-    files."""
+def test_unusual_files_are_left_to_numpy(data: bytes) -> None:
+    """They have compressed members, other orders or types, or are no .npz files."""
     assert npz.members(data) is None
 
 
@@ -64,9 +63,8 @@ def headed(header: bytes) -> bytes:
 @pytest.mark.parametrize(
     "shape", ["(3,)", "(-1,)", "(3, -1)", "(2,)", "(4,)", "(0,)", "(True,)", "(3,", "(%s,)" % ("9" * 30)]
 )
-def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
-    """A mutant may write a file with valid checksums. If the fast reader returns arrays, numpy reads the
-    same ones."""
+def test_any_header_is_read_as_numpy_reads_it(shape: str) -> None:
+    """A mutant may write a file with valid checksums."""
     data = headed(b"{'descr': '<f8', 'fortran_order': False, 'shape': " + shape.encode() + b"}")
     found = npz.members(data)
     if shape == "(3,)":
@@ -75,8 +73,8 @@ def test_whatever_a_header_says_numpy_agrees(shape: str) -> None:
         assert np.array_equal(found["t"], np.load(io.BytesIO(data))["t"])
 
 
-def test_a_damaged_file_has_no_arrays() -> None:
-    """After a flipped bit, the reader returns the original arrays or none."""
+def test_a_flipped_bit_never_changes_the_arrays() -> None:
+    """The reader returns the original arrays or none."""
     data = written(t=np.arange(3.0), x=np.arange(3, dtype=np.int32))
     for place in range(len(data)):
         found = npz.members(data[:place] + bytes([data[place] ^ 4]) + data[place + 1 :])

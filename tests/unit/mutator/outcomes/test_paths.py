@@ -124,9 +124,8 @@ def passages(found: Path) -> dict[str, Passage]:
     return {crossing.link: crossing.passage for crossing in found.crossings}
 
 
-def test_a_fault_that_an_estimator_held() -> None:
-    """The fault was injected in a component without recorded channels. The estimator after it did not
-    change, so it stopped the fault."""
+def test_an_estimator_that_did_not_change_stopped_the_fault() -> None:
+    """The fault was injected in a component without recorded channels."""
     found = path("eyes", outcome=Outcome.MASKED)
     assert [*states(found).items()] == [
         ("eyes", State.INJECTED),
@@ -144,7 +143,7 @@ def test_a_fault_that_an_estimator_held() -> None:
     }
 
 
-def test_a_fault_that_a_controller_held() -> None:
+def test_a_fault_that_a_controller_stopped() -> None:
     found = path("eyes", outcome=Outcome.MASKED, seen=1.2)
     assert (found.reached, found.stopped_at) == ("finder", ("speed",))
     assert passages(found)["picture"] is Passage.THROUGH
@@ -152,8 +151,7 @@ def test_a_fault_that_a_controller_held() -> None:
 
 
 def test_a_fault_that_reached_the_car() -> None:
-    """Each component has the time of its first channel to differ. The furthest component reached is the
-    controlled process."""
+    """Each component has the time of its first channel to differ."""
     found = path("eyes", seen=1.2, wanted=1.3, gas=1.3, place=1.4)
     assert [(s.component, s.t_first) for s in found.stages[1:]] == [
         ("finder", 1.2),
@@ -165,15 +163,13 @@ def test_a_fault_that_reached_the_car() -> None:
     assert (found.reached, found.stopped_at) == ("car", ())
 
 
-def test_feedback_is_no_path() -> None:
-    """A component off the path is never part of it, even if it left golden, because a car that moves
-    differently is also observed differently."""
+def test_feedback_is_not_part_of_the_path() -> None:
+    """A car that moves differently is also observed differently."""
     found = path("wheel", angle=1.0, torque=1.0, place=1.1, seen=1.2, wanted=1.3, gas=1.4)
     assert states(found) == {"wheel": State.INJECTED, "rack": State.REACHED, "car": State.REACHED}
 
 
-def test_links_that_are_not_studied_are_no_path() -> None:
-    """A fault of the speed control does not reach the wheel control through a link that the study ignores."""
+def test_links_that_the_study_ignores_are_not_part_of_the_path() -> None:
     ends = {"from": "speed", "to": "wheel", "label": ""}
     links = {name: {"from": tail, "to": tip, "label": ""} for name, (tail, tip) in LINKS.items()}
     for studied, names in ((True, {"wheel", "rack"}), (False, set())):
@@ -182,8 +178,8 @@ def test_links_that_are_not_studied_are_no_path() -> None:
         assert found.keys() - {"speed", "pedals", "car"} == names
 
 
-def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
-    """The speed control left golden after the car, and something off the path leads to it. So it and the
+def test_a_component_that_changed_after_the_car_only_received_feedback() -> None:
+    """Something off the path leads to the speed control, which left golden after the car. So it and the
     components that it alone feeds only received feedback. An earlier branch was reached."""
     found = path("finder", "wheel", angle=1.0, torque=1.0, place=1.1, wanted=1.5, gas=1.6)
     assert states(found) == {
@@ -198,18 +194,18 @@ def test_a_component_of_the_path_that_only_the_feedback_changed() -> None:
     assert passages(found)["gas"] is Passage.NONE
 
 
-def test_what_alone_feeds_a_reached_component_has_passed_the_fault_on() -> None:
-    """The rack left golden before the car, so the fault came through the wheel control. This holds even if
-    the recorded channels of the wheel control changed later or not at all."""
+def test_the_only_input_of_a_reached_component_passed_the_fault_on() -> None:
+    """The rack left golden before the car, so the fault came through the wheel control, even if its recorded
+    channels changed later or not at all."""
     found = path("gauge", torque=1.0, place=1.1)
     assert states(found)["wheel"] is State.PASSED
     assert passages(found)["angle"] is passages(found)["torque"] is Passage.THROUGH
     assert states(path("gauge", torque=1.0, place=1.1, angle=1.2))["wheel"] is State.REACHED
 
 
-def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
-    """Only the speed control feeds the pedals, so it changed no later than the pedals, whatever time its
-    channel shows. A component with other inputs proves nothing about the components that feed it."""
+def test_a_component_changed_no_later_than_what_it_alone_feeds() -> None:
+    """Only the speed control feeds the pedals. A component with other inputs proves nothing about the
+    components that feed it."""
     found = path("finder", gas=1.2, place=1.3, wanted=1.25)
     assert {s.component: s.t_by for s in found.stages if s.t_by is not None} == {"speed": 1.2}
     assert [s.t_first for s in found.stages if s.component == "speed"] == [1.25]
@@ -226,24 +222,25 @@ def test_what_it_alone_feeds_says_by_when_a_component_had_changed() -> None:
         ({"pace": 1.2, "seen": 1.4}, State.FEEDBACK),
     ],
 )
-def test_what_came_first_decides_between_fault_and_feedback(left: dict[str, float], state: State) -> None:
-    """If the car moved before the speed control left golden, the input that left golden first decides. An
-    input on the path means the fault, and one off the path means feedback."""
+def test_the_first_changed_input_decides_between_fault_and_feedback(
+    left: dict[str, float], state: State
+) -> None:
+    """The car moved before the speed control left golden. An input on the path means the fault, and one off
+    the path means feedback."""
     ways = Ways([*CHANNELS, ["pace", "m/s", "internal", "gauge", ""]], STRUCTURE)
     found = path("finder", "wheel", ways=ways, torque=1.0, place=1.1, wanted=1.5, **left)
     assert states(found)["speed"] is state
 
 
-def test_a_late_departure_that_the_path_alone_explains() -> None:
+def test_a_late_departure_with_a_single_input_is_the_fault() -> None:
     """Only the speed control leads to the pedals, so the fault reached them, although the car moved
     earlier."""
     found = path("eyes", "wheel", seen=1.0, wanted=1.0, torque=1.0, place=1.1, gas=3.0)
     assert states(found)["pedals"] is State.REACHED
 
 
-def test_what_is_not_recorded_is_passed_through() -> None:
-    """A component without channels is unobserved. It is unknown whether the fault reached it. The
-    components after it show whether the fault got further."""
+def test_components_without_channels_are_unobserved() -> None:
+    """The components after them show whether the fault got further."""
     ways = Ways([channel for channel in CHANNELS if channel[0] != "seen"], STRUCTURE)
     found = path("eyes", ways=ways, wanted=1.2, gas=1.2, place=1.3)
     assert states(found)["finder"] is State.UNSEEN
@@ -253,26 +250,25 @@ def test_what_is_not_recorded_is_passed_through() -> None:
     assert held.stopped_at == ("speed",)
 
 
-def test_a_fault_before_a_fork_may_be_held_twice() -> None:
-    """Both controllers that a sensor feeds stopped the fault."""
+def test_two_controllers_may_stop_one_fault() -> None:
+    """The sensor feeds both."""
     assert path("gauge", outcome=Outcome.MASKED).stopped_at == ("speed", "wheel")
     assert path("gauge", outcome=Outcome.MASKED, angle=2.0).stopped_at == ("rack",)
 
 
 @pytest.mark.parametrize("outcome", [Outcome.NOT_ACTIVATED, None])
-def test_no_path_without_an_active_fault_and_an_outcome(outcome: Outcome | None) -> None:
-    """A fault that was never active has no path, nor has a run that broke down."""
+def test_an_inactive_fault_or_a_broken_run_has_no_path(outcome: Outcome | None) -> None:
     assert WAYS.path(experiment("eyes"), record(outcome)) is None
 
 
-def test_no_path_from_nowhere() -> None:
-    """A fault in a file that no component names has no path, because its start is unknown."""
+def test_a_fault_outside_all_components_has_no_path() -> None:
+    """No component names its file, so the start is unknown."""
     assert WAYS.path(experiment("other"), record(Outcome.SDC, gas=1.0)) is None
 
 
-def test_a_chain_without_a_structure() -> None:
-    """Without a structure, components follow each other by role, then by order in the manifest. The first
-    one after those reached, which stayed equal, stopped the fault."""
+def test_without_a_structure_components_follow_by_role() -> None:
+    """Those with the same role keep the order of the manifest. The first one after those reached, which
+    stayed equal, stopped the fault."""
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
     assert [*states(found)] == ["wheel", "speed", "finder", "rack", "pedals", "car"]
@@ -281,7 +277,7 @@ def test_a_chain_without_a_structure() -> None:
     assert (none.reached, none.stopped_at) == ("", ("wheel",))
 
 
-def test_a_chain_knows_feedback_too() -> None:
+def test_a_chain_has_feedback_too() -> None:
     """The car interface reads values that change after the car, because the command was injected after the
     interface."""
     ways = Ways(
@@ -300,8 +296,8 @@ def test_a_chain_knows_feedback_too() -> None:
     }
 
 
-def test_components_that_lead_in_a_circle() -> None:
-    """A path through a loop has each component once and ends at the process."""
+def test_a_path_through_a_loop_has_each_component_once() -> None:
+    """It ends at the process."""
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)
@@ -314,9 +310,8 @@ def replace_links(links: dict[str, Any]) -> StructureModel:
     return StructureModel.model_validate(STRUCTURE.model_dump(mode="json", by_alias=True) | {"links": links})
 
 
-def test_ways_from_run_json() -> None:
-    """The structure is read from the head as it was written. Older runs have no components, so they have
-    no paths."""
+def test_the_structure_is_read_from_run_json() -> None:
+    """Older runs have no components, so they have no paths."""
     structure = STRUCTURE.model_dump(mode="json", by_alias=True)
     head = Head(Folder("run.json"), {"channels": CHANNELS, "structure": structure})
     found = ways_of(head)

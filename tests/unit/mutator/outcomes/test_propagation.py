@@ -24,23 +24,21 @@ def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = N
     return departures({"t": T, **golden}, {"t": T, **faulty}, channels, "t", t_end)
 
 
-def test_only_what_exceeds_its_tolerance_has_left() -> None:
-    """A channel leaves golden when it first exceeds its tolerance. Its deviation is its largest
-    difference."""
+def test_a_channel_leaves_golden_when_it_exceeds_its_tolerance() -> None:
+    """Its deviation is its largest difference."""
     faulty = {"a": stepped(2, 0.5), "b": stepped(1, 0.3) + stepped(4), "c": ZEROS}
     found = left({"a": ZEROS, "b": ZEROS, "c": ZEROS}, faulty, *(channel(n, 0.5) for n in "abc"))
     assert found == (("b", T[4], 1.3),)
 
 
-def test_what_comes_after_the_end_of_the_drive_is_left_out() -> None:
-    """A difference at the end of the drive counts. A channel that differs only later has not left golden,
-    and later values do not count as deviation."""
+def test_differences_after_the_end_of_the_drive_are_ignored() -> None:
+    """A difference at the end itself counts."""
     golden, faulty = {"a": ZEROS, "b": ZEROS}, {"a": stepped(2) + stepped(4, 9.0), "b": stepped(4)}
     assert left(golden, faulty, channel("a"), channel("b"), t_end=T[3]) == (("a", T[2], 1.0),)
     assert left(golden, faulty, channel("b"), t_end=T[4]) == (("b", T[4], 1.0),)
 
 
-def test_values_that_are_no_numbers() -> None:
+def test_non_finite_values_are_compared() -> None:
     """Equal infinities and two NaNs do not differ. A number compared with NaN is an infinite difference."""
     golden = {"a": np.array([np.nan, np.inf, 0, 0, 0, 0])}
     assert left(golden, {"a": golden["a"].copy()}, channel("a", 1.0)) == ()
@@ -48,9 +46,8 @@ def test_values_that_are_no_numbers() -> None:
     assert left(golden, faulty, channel("a", 1.0)) == (("a", T[2], np.inf),)
 
 
-def test_channels_with_times_of_their_own() -> None:
-    """Values are compared at the channel's own times. A late message leaves golden at the time when it is
-    first missing."""
+def test_channels_are_compared_at_their_own_times() -> None:
+    """A late message leaves golden at the time when it is first missing."""
     golden = {"a": np.array([1.0, 2.0]), "a@": np.array([0.0, 0.3])}
     assert left(golden, dict(golden), channel("a")) == ()
     assert left(golden, golden | {"a": np.array([1.0, 5.0])}, channel("a")) == (("a", 0.3, 3.0),)
@@ -62,8 +59,8 @@ def test_a_channel_that_was_not_recorded_is_left_out() -> None:
     assert left({"a": ZEROS}, {"b": ZEROS}, channel("a"), channel("b")) == ()
 
 
-def test_a_run_that_ends_earlier_has_left_there() -> None:
-    """All channels leave golden where the shorter run ends, unless that is after the drive."""
+def test_all_channels_leave_golden_where_the_shorter_run_ends() -> None:
+    """The end after the drive is ignored."""
     golden, faulty = {"t": T, "a": ZEROS}, {"t": T[:4], "a": ZEROS[:4]}
     assert departures(golden, faulty, [channel("a")], "t", None) == (("a", T[4], 0.0),)
     assert departures(golden, faulty, [channel("a")], "t", float(T[3])) == ()
@@ -73,8 +70,7 @@ def test_a_run_that_ends_earlier_has_left_there() -> None:
 
 @pytest.mark.parametrize("seed", range(20))
 def test_departures_agree_with_the_comparison(seed: int) -> None:
-    """For any values, the fault manifested when the first channel left golden. The deviations are those of
-    the whole run."""
+    """The first departure is the manifestation. The deviations are those of the whole run."""
     random = np.random.default_rng(seed)
     channels = [channel(name, float(random.integers(0, 3))) for name in "abc"]
     golden = {"t": T, **{name: random.integers(-2, 3, 6).astype(float) for name in "abc"}}
@@ -87,8 +83,8 @@ def test_departures_agree_with_the_comparison(seed: int) -> None:
     assert {name: largest for name, _, largest in found}.items() <= dict(compared.max_dev).items()
 
 
-def test_the_table_has_a_row_for_each_departure() -> None:
-    """Rows keep the order of the records and of the departures. Role and component are those in run.json."""
+def test_the_table_keeps_the_order_of_records_and_departures() -> None:
+    """Role and component are those in run.json."""
     record = Record(
         experiment_id="e1",
         status=Status.OK,

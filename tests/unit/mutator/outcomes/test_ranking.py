@@ -49,7 +49,7 @@ WORST_FIRST = {
 
 def test_the_worst_come_first(tmp_path: Path) -> None:
     """The order is by class, then by delta-v. Without a class, it is by ending, then by the margin of each
-    hazard. Ids decide ties, for any input order."""
+    hazard. Ids decide ties."""
     path = tmp_path / "results.csv"
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")
@@ -60,8 +60,8 @@ def test_the_worst_come_first(tmp_path: Path) -> None:
     assert [row.experiment_id for row in worst(rows)] == list(WORST_FIRST)
 
 
-def test_places_are_those_of_the_worst(tmp_path: Path) -> None:
-    """Ranking by columns gives the same order as ranking row by row, for made-up results with many ties."""
+def test_ranking_columns_equals_ranking_rows(tmp_path: Path) -> None:
+    """The results are made up and have many ties."""
     draw = random.Random(3)
     choices = list(WORST_FIRST.values())
     lines = [dict(draw.choice(choices)) for _ in range(400)]

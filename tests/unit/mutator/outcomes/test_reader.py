@@ -1,4 +1,4 @@
-"""The reader of a run's results, which is the only one."""
+"""The only reader of a run's results."""
 
 import os
 import re
@@ -35,7 +35,7 @@ OF_A_CRANE = {r"\bH1\b": "CRUSHED", r"\bH3\b": "DROPPED", r"\bgas\b": "winch", r
 
 @pytest.fixture
 def crane(toycar: Workspace) -> Workspace:
-    """The toy with other names for hazards and channels, in its library and its tree."""
+    """The toy with other names for hazards and channels."""
     for path in toycar.library.parent.rglob("*"):
         if path.suffix in (".py", ".yaml") and "templates" not in path.parts:
             text = path.read_text()
@@ -69,17 +69,17 @@ print(*(path.read_text().strip() for path in Path("/proc/self/task").glob("*/com
 """
 
 
-def test_no_thread_is_left_that_could_abort_the_end(run: Path) -> None:
-    """No reader of tables starts a thread of pyarrow, because a thread that returns bytes to Python during
-    shutdown kills the process. Threads of the allocator and of BLAS do not use Python."""
+def test_reading_tables_leaves_no_thread(run: Path) -> None:
+    """A thread of pyarrow that returns bytes to Python during shutdown kills the process. Threads of the
+    allocator and of BLAS do not use Python."""
     results.build(run)
     words, env = [sys.executable, "-c", ALONE, str(run)], os.environ | dict.fromkeys(THREADS, "1")
     ended = subprocess.run(words, capture_output=True, text=True, check=True, timeout=120, env=env)
     assert [name for name in ended.stdout.split() if name != "jemalloc_bg_thd"] == [ended.stdout.split()[0]]
 
 
-def test_a_target_without_gas_brake_and_h1_has_no_such_columns(run: Path) -> None:
-    """CSV, Parquet and frames have the target's hazards and channels where the shipped target has its own."""
+def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
+    """This holds for CSV, Parquet and frames."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")
@@ -114,8 +114,8 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
     assert units["max_dev_winch"] == units["dev_winch"] == "as its channel"
 
 
-def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
-    """Every way of reading the results gives the same hazards at the same times for each experiment."""
+def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
+    """Each has the same times for each experiment."""
     table = Results.up_to_date(run)
     rows = table.rows()
     frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
@@ -129,14 +129,13 @@ def test_rows_frames_and_comparison_sides_agree(run: Path) -> None:
         assert row.checked == (("CRUSHED", "DROPPED", "TOO_FAST") if row.status is Status.OK else ())
 
 
-def test_of_a_crash_it_is_not_known_whether_a_hazard_would_have_come(run: Path) -> None:
-    """`hazard` is unknown for exactly those runs that did not end well."""
+def test_hazard_is_unknown_for_runs_that_did_not_end_well(run: Path) -> None:
     frame = Results.up_to_date(run).frame()
     assert list(frame["hazard"].isna()) == list(frame["status"] == "crashed")
     assert frame["hazard"].isna().any()
 
 
-def test_a_target_that_checks_no_hazard(run: Path, reseal: Callable[[Path], None]) -> None:
+def test_a_target_without_hazards_has_no_hazard_in_any_row(run: Path, reseal: Callable[[Path], None]) -> None:
     head = run / "run.json"
     head.write_text(re.sub(r'"hazards":\s*\[[^]]*\]', '"hazards": []', head.read_text()))
     reseal(run)
@@ -162,10 +161,7 @@ def test_exports_and_report_follow_the_target(run: Path, crane: Workspace) -> No
     assert "H1" not in text
 
 
-def test_a_run_fills_the_columns_that_its_manifest_promises(
-    crane: Workspace, tmp_path: Path, write_run: WriteRun
-) -> None:
-    """A row of an experiment that really ran has exactly one cell for each column."""
+def test_a_real_run_fills_each_column(crane: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
     only = 'fault_type == "lane" and method == "random"'
     folder = write_run(crane, tmp_path / "one", lambda e: None, campaign="small", only=only, limit=1)
     [experiment] = plan_file.read_all(folder)
@@ -179,8 +175,7 @@ def test_a_run_fills_the_columns_that_its_manifest_promises(
     assert cells["max_dev_wheel"]
 
 
-def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
-    """For any reader, a missing table is a user's error that names the folder."""
+def test_a_missing_table_is_a_users_error(tmp_path: Path) -> None:
     table = Results.of_run(tmp_path)
     for read in (table.rows, table.texts, table.csv, table.frame):
         with pytest.raises(MutatorError, match=f"{tmp_path}: no results here"):
@@ -188,8 +183,8 @@ def test_a_folder_without_results_is_named(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
-def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
-    """A file that is not a results table is a user's error, not a KeyError or a decoding error."""
+def test_a_file_that_is_not_a_results_table_is_a_users_error(tmp_path: Path, text: str) -> None:
+    """Neither a KeyError nor a decoding error escapes."""
     table = Results.of_run(tmp_path)
     table.path.write_bytes(text.encode("latin-1"))
     for read in (table.rows, table.texts):
@@ -197,8 +192,7 @@ def test_a_table_of_another_shape_is_refused(tmp_path: Path, text: str) -> None:
             read()
 
 
-def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
-    """A table with an unknown status or an incomplete line is refused."""
+def test_an_unknown_status_or_incomplete_line_is_refused(run: Path) -> None:
     table = Results.up_to_date(run)
     whole = table.csv()
     for damaged in (whole.replace(b",crashed,", b",melted,"), whole[: whole.rindex(b",")]):
@@ -207,7 +201,7 @@ def test_a_cell_of_another_kind_is_refused(run: Path) -> None:
             table.rows()
 
 
-def test_nothing_else_opens_the_tables() -> None:
+def test_no_other_module_opens_the_tables() -> None:
     allowed = {"outcomes/reader.py", "outcomes/trace_files.py"}
     opens = re.compile(r"read_csv|read_parquet|read_table\(|ParquetFile")
     named = re.compile(r"results\.(csv|parquet)\"\)?\.(open|read_)|open\([^)]*results\.(csv|parquet)")

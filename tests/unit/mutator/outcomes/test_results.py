@@ -32,8 +32,8 @@ HAZARDS = ("H1", "H2", "H3")
 MakeRecord = Callable[..., Record]
 
 
-def test_a_hazard_row(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """The row of a run with a hazard has flags, simulation times, the alerts in order, and reaction times."""
+def test_the_row_of_a_run_with_a_hazard(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
+    """It has flags, simulation times, the alerts in order, and reaction times."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -115,9 +115,8 @@ def test_severity_and_times_to_the_hazard(
     assert result_rows.row(experiment(), kept, HAZARDS)["severity"] is None  # without a scale
 
 
-def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
-    """A run has the columns that its head requests: all of them, only the times, or, in an older run,
-    none."""
+def test_the_head_selects_the_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
+    """A run has all of them, only the times, or, in an older run, none."""
     scale = {"severity": SCALE.plain()}
     times = ["fault_tolerant_time", "manifest_to_hazard"]
     heads: list[tuple[dict[str, object], list[str]]] = [
@@ -141,14 +140,14 @@ def test_columns_of_severity(experiment: Callable[..., Experiment]) -> None:
         (Status.HARNESS_ERROR, False, None),
     ],
 )
-def test_rows_of_what_did_not_end_well(
+def test_unknown_values_of_a_failed_run_are_empty(
     experiment: Callable[..., Experiment],
     record: MakeRecord,
     status: Status,
     activation: bool,
     activated: int | None,
 ) -> None:
-    """In a run that did not end well, unknown values are empty and never 0."""
+    """They are never 0."""
     given = {} if activation else {"activation": None}
     cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS
@@ -158,8 +157,9 @@ def test_rows_of_what_did_not_end_well(
         assert cells[name] is None
 
 
-def test_never_activated_is_zero(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """A run that ended well without activation has 0 and no empty cell."""
+def test_a_run_without_activation_has_no_empty_cell(
+    experiment: Callable[..., Experiment], record: MakeRecord
+) -> None:
     cells = result_rows.row(experiment(), record(outcome=Outcome.NOT_ACTIVATED, activation=None), HAZARDS)
     assert (cells["activated"], cells["activations"], cells["manifested"], cells["h1"]) == (0, 0, 0, 0)
     assert cells["t_activation"] is None
@@ -186,8 +186,7 @@ def folder(toycar: Workspace, tmp_path: Path, record: MakeRecord) -> RunFolder:
 
 
 def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
-    """Each experiment with a record has one row, in CSV and Parquet, sorted by id. Only the hazards and
-    channels of the target appear."""
+    """Only the hazards and channels of the target appear."""
     rows = list(csv.DictReader(results.build(folder.path).open()))
     assert (len(rows), folder.planned) == (22, 24)
     ids = [row["experiment_id"] for row in rows]
@@ -212,7 +211,7 @@ def test_tables_are_sorted_and_complete(folder: RunFolder) -> None:
     assert timings.column("experiment_id").to_pylist() == ids
 
 
-def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
+def test_building_again_gives_the_same_bytes(folder: RunFolder, reseal: Callable[[Path], None]) -> None:
     tables = results.build(folder.path), folder.path / "results.parquet"
     before = [table.read_bytes() for table in tables]
     one, two = sorted((folder.path / "records").iterdir())
@@ -225,7 +224,6 @@ def test_tables_are_the_same_bytes_each_time(folder: RunFolder, reseal: Callable
 
 
 def made_at_once(folder: RunFolder) -> dict[str, bytes]:
-    """Build the tables as version 0.2 did, with all rows in memory."""
     records = folder.records()
     planned = sorted(plan_file.read_all(folder.path), key=lambda e: e.id)
     done = [(e, records[e.id]) for e in planned if e.id in records]
@@ -261,11 +259,11 @@ def parquet_at_once(rows: Sequence[Mapping[str, Any]], columns: Sequence[Column]
 
 
 @pytest.mark.parametrize(("batch", "processes"), [(1, 1), (7, 2), (5_000, 1)])
-def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
+def test_tables_built_in_batches_have_the_same_bytes(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord, batch: int, processes: int
 ) -> None:
-    """For any batch size and for one or two processes, the files equal tables that are built with all rows
-    in memory. A run without records has tables, too."""
+    """The files equal tables that are built with all rows in memory, for one or two processes. A run without
+    records has tables, too."""
     left = (("gas", 2.0000001, 0.5), ("v_ego", 2.05, 1e-7), ("strange", 2.1, 3.0))
     last = plan_file.read_all(folder.path)[22]
     lines = LineWriter(
@@ -284,9 +282,10 @@ def test_tables_made_piece_by_piece_have_the_bytes_of_those_made_at_once(
                 path.unlink()
 
 
-def test_a_long_table_has_several_row_groups(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """For any batches, all row groups of a Parquet file have the same size, except the last. No row group
-    is empty."""
+def test_row_groups_of_a_long_table_have_the_same_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The last group may be shorter, but never empty. Batches do not matter."""
     monkeypatch.setattr(table_files, "_ROWS", 4)
     columns = (Column("n", "count", "", ""),)
     for size, groups in ((0, [0]), (4, [4]), (8, [4, 4]), (11, [4, 4, 3])):
@@ -307,10 +306,10 @@ def is_rebuilt(folder: RunFolder, monkeypatch: pytest.MonkeyPatch) -> bool:
     return bool(built)
 
 
-def test_tables_stay_while_they_follow_from_what_is_there(
+def test_nothing_is_built_while_the_digests_are_the_same(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing is built while input and tables have the same digests. File times are ignored."""
+    """File times are ignored."""
     results.build(folder.path)
     os.utime(folder.path / "records" / "0001-gw0.jsonl")
     os.utime(folder.path / "results.csv", (1, 1))
@@ -322,11 +321,10 @@ def test_tables_stay_while_they_follow_from_what_is_there(
     ["more records", "fewer timings", "results.csv", "results.parquet", "timings.parquet", "results.json"],
 )
 @pytest.mark.parametrize("gone", [True, False])
-def test_tables_are_built_when_anything_of_them_changed(
+def test_tables_are_rebuilt_after_any_change(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, changed: str, gone: bool
 ) -> None:
-    """The tables are rebuilt after a change of records or timings, and after a table or a stamp is edited
-    or deleted."""
+    """Records or timings change, or a table or a stamp is edited or deleted."""
     results.build(folder.path)
     if changed == "more records":
         head = {"schema": SCHEMA, "plan": folder.head["plan"]}
@@ -342,8 +340,8 @@ def test_tables_are_built_when_anything_of_them_changed(
 
 
 @pytest.mark.parametrize("stamp", [True, False])
-def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -> None:
-    """One line reports that an edited table was replaced, even if its stamp is missing."""
+def test_replacing_an_edited_table_is_reported(folder: RunFolder, stamp: bool) -> None:
+    """The stamp may be missing."""
     table = results.build(folder.path)
     made = table.read_bytes()
     table.write_bytes(made.replace(b"masked", b"hazard", 1))
@@ -354,11 +352,10 @@ def test_an_edited_table_is_told_and_made_anew(folder: RunFolder, stamp: bool) -
     assert table.read_bytes() == made
 
 
-def test_a_table_that_a_kill_left_is_no_edited_one(
+def test_an_interrupted_build_is_not_an_edited_table(
     folder: RunFolder, monkeypatch: pytest.MonkeyPatch, record: MakeRecord
 ) -> None:
-    """If a build was killed before it wrote a table, the next build prints nothing, even if records were
-    added."""
+    """The next build prints nothing, even if records were added."""
     results.build(folder.path)
     planned = plan_file.read_all(folder.path)
     for killed_before, number in ((results.CSV, 2), (results.PARQUET, 3)):

@@ -53,8 +53,8 @@ def test_one_row_of_each_kind_is_counted_once(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("status", [Status.HARNESS_ERROR, Status.INVALID_MUTANT])
-def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Path, status: Status) -> None:
-    """A harness error or an invalid mutant counts as unusable and enters no other count."""
+def test_unusable_experiments_enter_no_other_count(tmp_path: Path, status: Status) -> None:
+    """They are harness errors and invalid mutants."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_h1": "3.0", "alerts": "fcw"}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -66,8 +66,8 @@ def test_a_run_that_says_nothing_of_its_fault_is_in_no_other_number(tmp_path: Pa
 
 
 @pytest.mark.parametrize("status", [Status.CRASHED, Status.TIMEOUT])
-def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
-    """A controller that crashes or hangs counts as injected and has a separate column."""
+def test_a_crash_counts_as_injected(tmp_path: Path, status: Status) -> None:
+    """Controllers that crash or hang have a separate column."""
     bad = SEEN | {"status": status.value, "outcome": "", "t_manifest": ""}
     rows = Results(write_table(tmp_path / "results.csv", SEEN, bad)).texts()
 
@@ -79,18 +79,18 @@ def test_a_crash_is_what_its_fault_did(tmp_path: Path, status: Status) -> None:
 
 
 def test_columns_of_failures_appear_only_when_there_are_any(tmp_path: Path) -> None:
-    """If a campaign has no crashes, timeouts or unusable runs, its table has no columns for them."""
+    """Failures are crashes, timeouts and unusable runs."""
     rows = Results(write_table(tmp_path / "results.csv", SEEN)).texts()
     heads, _ = count_table(counts_by(rows, kinds(rows)), "fault type", hazard_names(rows))
     assert heads[-1] == "hazard, no alert"
 
 
-def test_hazards_that_a_target_does_not_check_are_not_told(tmp_path: Path) -> None:
+def test_hazards_that_a_target_does_not_check_are_left_out(tmp_path: Path) -> None:
     seen = SEEN | {"h1": "", "h2": "0", "h3": ""}
     assert hazard_names(Results(write_table(tmp_path / "results.csv", seen, seen)).texts()) == ("H2",)
 
 
-def test_rows_are_typed(tmp_path: Path) -> None:
+def test_cells_have_types(tmp_path: Path) -> None:
     """Empty cells become None, times become numbers, alerts become a tuple, and hazards are sorted by
     time."""
     line = SEEN | {

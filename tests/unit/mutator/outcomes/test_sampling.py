@@ -37,7 +37,6 @@ def trace(time: np.ndarray = T, **channels: np.ndarray) -> Trace:
 
 
 def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Series]:
-    """The series of golden and of the faulty run, read back from their bytes."""
     golden = decode(sampler.encoded)
     return golden, decode(encode(sampler.series(faulty, record), sampler.golden), golden)
 
@@ -45,8 +44,7 @@ def stored(sampler: Sampler, faulty: Trace, record: Record) -> tuple[Series, Ser
 def test_a_channel_has_twenty_values_a_second_and_the_last(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Of 500 steps in 5 s, every fifth and the last are stored with their times, to six digits. The
-    manifest selects the channels."""
+    """The manifest selects the channels. Times have six digits."""
     one = Sampler(manifest, trace(speed=np.sin(T)))
     golden, faulty = stored(one, trace(speed=np.cos(T)), record())
     assert golden.t.tolist() == [*T[::5], 4.99]
@@ -56,11 +54,10 @@ def test_a_channel_has_twenty_values_a_second_and_the_last(
     assert [channel["name"] for channel in golden.about["channels"]][:2] == ["gas", "brake"]
 
 
-def test_what_the_controller_believes_has_ten_values_a_second(
+def test_beliefs_of_the_controller_have_ten_values_a_second(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Channels with the controller's beliefs have ten values a second, and the peaks in between. This
-    holds even at times when other channels have a value."""
+    """The peaks in between are stored, even at times when other channels have a value."""
     inside = [replace(c, role=Role.INTERNAL) if c.name == "speed" else c for c in manifest.channels]
     one = Sampler(replace(manifest, channels=tuple(inside)), trace(speed=np.sin(T)))
     speed = np.sin(T)
@@ -72,8 +69,8 @@ def test_what_the_controller_believes_has_ten_values_a_second(
 
 
 def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """The first step that differs, and the steps with the largest differences in the drive and in the
-    whole run, are stored as points, however short they are. Channels that do not differ have no points."""
+    """The first step that differs, and the steps with the largest differences in the drive and in the whole
+    run, are stored as points, however short they are. Channels that do not differ have no points."""
     gas = np.zeros(500)
     gas[[202, 303, 304, 404]] = 0.1, -7.0, 2.0, 9.0
     one = Sampler(manifest, trace())
@@ -84,10 +81,9 @@ def test_no_peak_between_two_samples_is_lost(manifest: TargetManifest, record: C
     assert len(stored(one, trace(), record())[1].points.t) == 0
 
 
-def test_what_is_not_a_number_stays_what_it_is(
+def test_infinite_huge_and_missing_values_survive_rounding(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """Infinite, very large and missing values stay what they are when rounded."""
     speed = np.zeros(500)
     speed[:25:5] = np.inf, -np.inf, np.nan, 3.4e38, 1e300
     faulty = stored(Sampler(manifest, trace()), trace(speed=speed), record())[1]
@@ -96,11 +92,8 @@ def test_what_is_not_a_number_stays_what_it_is(
     assert first[3] == pytest.approx(3.4e38)
 
 
-def test_the_step_of_a_hazard_is_kept_of_every_channel(
-    manifest: TargetManifest, record: Callable[..., Record]
-) -> None:
-    """At a hazard between two samples, the values of every channel are stored, even if they equal golden
-    there. A hazard after the end of either run has no such point."""
+def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: Callable[..., Record]) -> None:
+    """This holds even if they equal golden there. A hazard after the end of either run has no such point."""
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
     one = Sampler(manifest, trace(speed=T, gap=gap))
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s
@@ -112,10 +105,10 @@ def test_the_step_of_a_hazard_is_kept_of_every_channel(
     assert not np.isin(points.t, [3.0, 7.0]).any()
 
 
-def test_a_run_that_ends_early_has_no_values_afterwards_and_keeps_its_last_step(
+def test_a_run_that_ends_early_keeps_its_last_step(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The values of the last step are stored, because it may be an impact."""
+    """The last step may be an impact."""
     one = Sampler(manifest, trace(speed=T))
     faulty = stored(one, trace(T[:303], speed=T[:303] ** 2), record())[1]
     assert faulty.t[-1] == 3.0
@@ -138,17 +131,15 @@ def test_a_run_that_lasts_longer_has_more_times(
     assert faulty.rows[SPEED].tolist() == rounded(faulty.t)
 
 
-def test_steps_at_other_times_give_the_newest_values_at_those_of_golden(
-    manifest: TargetManifest, record: Callable[..., Record]
-) -> None:
-    """Both runs share one time axis, even if the target's steps depend on events."""
+def test_both_runs_share_one_time_axis(manifest: TargetManifest, record: Callable[..., Record]) -> None:
+    """The target's steps may depend on events."""
     time = np.arange(0.0, 5.0, 0.03)
     faulty = stored(Sampler(manifest, trace()), trace(time, speed=time), record())[1]
     place = np.searchsorted(time, faulty.t + 1e-9, side="right") - 1
     assert faulty.rows[SPEED].tolist() == rounded(time[place])
 
 
-def test_a_channel_with_its_own_times_has_its_newest_value(
+def test_a_channel_with_its_own_times_keeps_its_newest_value(
     manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
     own = {"gap": np.array([1.0, 2.0]), "gap@": np.array([1.0, 3.0])}
@@ -158,10 +149,10 @@ def test_a_channel_with_its_own_times_has_its_newest_value(
     assert (gap[1.0], gap[2.95], gap[3.0]) == (1.0, 1.0, 2.0)
 
 
-def test_a_series_of_its_own_file_is_read_back(
+def test_a_series_is_read_back_from_its_file(
     tmp_path: Path, manifest: TargetManifest, record: Callable[..., Record]
 ) -> None:
-    """The series has the golden run and the events. Writing it again gives the same file."""
+    """Writing it again gives the same file."""
     one = record(alerts=(("brake_hard", 2.5),))
     keep_series(tmp_path, manifest, trace(), trace(speed=T), one)
     path = SeriesFolder(tmp_path).kept(one.experiment_id)

@@ -37,18 +37,16 @@ OF_THE_GAP = ("margin_h1", "smallest_gap", "smallest_hwt", "smallest_ttc", "larg
         ([3, 1, -1], [BESIDE, 3, 9], [None] * 6),  # the car is never behind the vehicle
     ],
 )
-def test_a_gap_counts_while_the_cars_overlap(
+def test_a_vehicle_beside_the_car_is_ignored(
     manifest: TargetManifest, gaps: list[float], offsets: list[float], values: list[float | None]
 ) -> None:
-    """A vehicle that the car passes at the side is near and harmless, so it does not affect H1's margin or
-    a metric."""
+    """Such a vehicle is near and harmless, so it does not affect H1's margin or a metric."""
     found = dict(driven(manifest, gaps, offsets).metrics)
     expected = {name: value for name, value in zip(OF_THE_GAP, values, strict=True) if value is not None}
     assert {name: found[name] for name in OF_THE_GAP if name in found} == pytest.approx(expected)
 
 
-def test_the_margin_of_a_contact_is_negative_where_it_came(manifest: TargetManifest) -> None:
-    """The margin of H1 is 0 or less if the hazard occurred, and above 0 otherwise."""
+def test_the_margin_of_h1_is_positive_unless_the_hazard_occurred(manifest: TargetManifest) -> None:
     for offset in (0.0, 2.75, BESIDE, -9.0):
         judged = driven(manifest, [5, 0, -1], [offset] * 3)
         margin = dict(judged.metrics).get("margin_h1", np.inf)

@@ -1,4 +1,4 @@
-"""The verdict: its truth table, and the events that it counts."""
+"""The verdict's truth table, and the events that the verdict uses."""
 
 from itertools import product
 
@@ -24,7 +24,6 @@ TRUTH = {
 
 @pytest.mark.parametrize("case", list(product((False, True), repeat=3)), ids=str)
 def test_truth_table(case: tuple[bool, bool, bool]) -> None:
-    """Each combination of activated, manifested and hazard has the outcome that the table gives."""
     activated, manifested, hazard = case
     outcome = judge(
         activation=ACTIVE if activated else None,
@@ -41,8 +40,7 @@ def test_events_before_the_activation_do_not_count(time: float, counts: bool) ->
     assert first_events([("H1", time)], ACTIVE) == ((("H1", time),) if counts else ())
 
 
-def test_no_event_counts_without_activation() -> None:
-    """If the fault was never activated, no event is attributed to it."""
+def test_events_need_an_activated_fault() -> None:
     assert first_events([("H1", 3.0), ("fcw", 0.0)], None) == ()
 
 
@@ -66,7 +64,8 @@ HAZARDS = (("H3", 5.0), ("H1", 7.0))
     ],
     ids=["neither", "no alert", "no hazard", "alert first", "at once", "hazard first"],
 )
-def test_reaction_time(hazards: tuple, alerts: tuple, expected: float | None) -> None:
-    """The reaction time is the first hazard minus the first alert. It is empty unless the alert came
-    strictly earlier."""
+def test_the_reaction_time_is_first_hazard_minus_first_alert(
+    hazards: tuple, alerts: tuple, expected: float | None
+) -> None:
+    """It is empty unless the alert came strictly earlier."""
     assert reaction_time(hazards, alerts) == expected
