@@ -42,13 +42,11 @@ def stretch(look: Look, given: Pair) -> tuple[float, float] | None:
 def test_braking_is_too_short_when_it_lasts_half_as_long_at_most(
     end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Braking time counts from the activation on. Earlier braking is not caused by the fault."""
     given = pair({"brake": during(1, 6)}, {"brake": during(1, end)})
     assert stretch(brake_too_short, given) == shown
 
 
-def test_braking_that_nobody_needs_is_not_too_short() -> None:
-    """If the fault-free run does not brake either, no braking is too short."""
+def test_braking_is_not_too_short_if_golden_does_not_brake() -> None:
     assert brake_too_short(pair({}, {})) is None
 
 
@@ -65,7 +63,7 @@ def test_braking_that_nobody_needs_is_not_too_short() -> None:
 def test_gas_is_at_a_wrong_time_where_golden_gives_none(
     begin: float, end: float, shown: tuple[float, float] | None
 ) -> None:
-    """Wrong gas occurs between activation and hazard, and lasts at least half a second."""
+    """Wrong gas lasts at least half a second between activation and hazard."""
     given = pair({"gas": during(3, 4)}, {"gas": during(begin, end)})
     assert stretch(at_a_wrong_time("gas"), given) == shown
     assert at_a_wrong_time("brake")(given) is None
@@ -82,7 +80,7 @@ BOTH = {"gas": during(5, 7), "brake": during(1, 6)}
         ({"brake": during(1, 6)}, 4.5, None),  # golden uses no gas
     ],
 )
-def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
+def test_gas_and_brake_are_unavailable_if_they_end_soon_after_the_alert(
     golden: dict[str, np.ndarray], last: float, shown: tuple[float, float] | None
 ) -> None:
     """The actuators are unavailable from the last gas or brake to the end of the run."""
@@ -91,9 +89,8 @@ def test_both_are_unavailable_when_they_are_gone_soon_after_the_alert(
     assert both_unavailable(replace(given, alert=None)) is None
 
 
-def test_a_pair_is_cut_to_the_steps_both_runs_have(record: Callable[..., Record]) -> None:
-    """The comparison ends with the shorter run. Hazard, activation and first alert are those of the
-    record."""
+def test_runs_are_compared_up_to_the_end_of_the_shorter_one(record: Callable[..., Record]) -> None:
+    """Hazard, activation and first alert are those of the record."""
     found = record(hazards=(("H3", 4.0), ("H1", 5.0)), alerts=(("a", 3.5), ("b", 3.0)))
     long, short = {"t": T, "gas": NONE}, {"t": T[:70], "gas": NONE[:70]}
     for golden, faulty in ((long, short), (short, long)):

@@ -1,5 +1,4 @@
-"""Figures of single experiments on the toy car: a query finds them, their traces confirm them, and they
-are drawn."""
+"""Figures of single experiments on the toy car: a query finds each one, and its traces confirm it."""
 
 import shutil
 from collections.abc import Callable
@@ -46,13 +45,11 @@ def driven(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path
 
 @pytest.fixture
 def place(driven: Path, tmp_path: Path) -> Path:
-    """A copy of that folder, which a test may change."""
     shutil.copytree(driven, tmp_path / "place")
     return tmp_path / "place"
 
 
 def drawn(place: Path, wanted: Wanted) -> Drawing:
-    """The figure for the run in `place`, with the toy car of that folder."""
     toy = place / "toy"
     workspace = Workspace(library=toy / "fault_library", templates=toy / "templates")
     run = place / "run"
@@ -66,9 +63,7 @@ def edit_target(place: Path) -> None:
 
 
 def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
-    """The figure has a panel for each recorded channel, with its unit, the marks, both lines and the
-    shade. The note describes the experiment. Its code blocks have the query and the command for more
-    examples. No experiment is run."""
+    """No experiment is run."""
     drawing = drawn(driven, BRAKE)
     [name] = [name for name in RunFolder.open(driven / "run").records() if name in drawing.note]
     assert [code for _, code in drawing.codes] == [BRAKE.query, f"mutator show {name} --run DIR"]
@@ -82,9 +77,7 @@ def test_an_experiment_is_found_and_drawn(driven: Path) -> None:
     assert (len(brake.patches), len(gap.patches)) == (1, 0)
 
 
-def test_a_report_drives_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A report with its study's figures can be rewritten where no process can start."""
-
+def test_a_report_is_rewritten_without_a_process(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def start(*words: object, **keywords: object) -> None:
         raise AssertionError("a report started a process")
 
@@ -97,7 +90,7 @@ def test_a_report_drives_nothing(place: Path, monkeypatch: pytest.MonkeyPatch) -
     assert not (place / "run" / "traces").exists()
 
 
-def test_a_series_is_enough(place: Path, tmp_path: Path) -> None:
+def test_a_figure_needs_only_the_stored_series(place: Path, tmp_path: Path) -> None:
     """After an edit of the target, the figure is drawn again as the same file."""
     contents = []
     for _ in range(2):
@@ -107,8 +100,7 @@ def test_a_series_is_enough(place: Path, tmp_path: Path) -> None:
     assert contents[0] == contents[1]
 
 
-def test_what_cannot_be_drawn_is_said(place: Path, tmp_path: Path) -> None:
-    """A missing or damaged series, target or library gets one sentence. No figure is left over."""
+def test_a_missing_input_is_reported_instead_of_a_figure(place: Path, tmp_path: Path) -> None:
     for kind in ("svg", "png"):
         (tmp_path / "figures").mkdir(exist_ok=True)
         (tmp_path / "figures" / f"brake.{kind}").touch()
@@ -128,9 +120,7 @@ def test_what_cannot_be_drawn_is_said(place: Path, tmp_path: Path) -> None:
     assert "no fault library" in nowhere.note
 
 
-def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
-    """Matching experiments are tried in order. If none of them shows the action, the report gives their
-    number."""
+def test_matching_experiments_are_tried_until_one_shows_the_action(place: Path) -> None:
     looked_at: list[float] = []
 
     def second(pair: Pair) -> np.ndarray | None:
@@ -143,14 +133,13 @@ def test_candidates_are_looked_at_until_one_shows_it(place: Path) -> None:
     assert "that the query finds do not show it" in none.note
 
 
-def test_a_query_that_finds_nothing_is_said(place: Path) -> None:
-    """The report says that no experiment matched the query. This includes a target without the actuator."""
+def test_a_query_without_a_match_is_reported(place: Path) -> None:
+    """This includes a target without the actuator."""
     assert "no experiment of this run matches" in drawn(place, replace(BRAKE, query='module == "radar"')).note
     assert "records no sail" in drawn(place, replace(BRAKE, actions=("sail",))).note
 
 
 def test_candidates_come_largest_first_then_by_id() -> None:
-    """Experiments are sorted by number, not as text, and none is missing."""
     h1 = {"t_activation": 2, "t_h1": 5, "max_dev_gas": 0}
     frame: pd.DataFrame = results(
         h1 | {"max_dev_brake": 9.0},
@@ -163,8 +152,7 @@ def test_candidates_come_largest_first_then_by_id() -> None:
     assert list(candidates(frame, WANTED[0])["experiment_id"]) == ["a", "b", "0"]
 
 
-def test_every_query_can_be_asked() -> None:
-    """In results made by hand, every query finds its experiment."""
+def test_every_query_finds_its_experiment() -> None:
     had = {"t_activation": 2, "t_alert": 3, "t_h1": 5, "t_h2": 5, "max_dev_brake": 1, "max_dev_gas": 1}
     frame = results(had, had | {"fault_type": "jamming"})
     assert [list(candidates(frame, one)["experiment_id"]) for one in WANTED] == [["0"], ["0"], ["0"], ["1"]]

@@ -31,7 +31,7 @@ EVENTS = {  # what happened in a run, by the count that it enters
 
 
 def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
-    """As many runs as the counts say, each with the events that it is counted for."""
+    """As many runs as the counts say, with their events."""
     warned = tally.hazards - (tally.hazards_no_alerts or 0)
     kinds = [
         (warned, ("manifested", "alerts", "hazards")),
@@ -47,7 +47,7 @@ def runs_of(tally: Tally, **group: str) -> pd.DataFrame:
 
 
 def frame_of(parts: Iterable[pd.DataFrame]) -> pd.DataFrame:
-    """A frame of these runs. Each has an id, a partner of the other method, one of 40 faults, and an end."""
+    """A frame of these runs, each with an id, a partner of the other method, one of 40 faults, and an end."""
     frame = pd.concat(parts, ignore_index=True)
     number = frame.groupby("method").cumcount()
     ids = {"experiment_id": frame.index.astype(str), "seed": number.astype(str)}
@@ -80,7 +80,6 @@ def table_3() -> dict[str, JudgedClaim]:
 
 @pytest.mark.parametrize("number", ["1.1", "1.2", "2.4", "3.4", "4.1", "4.2", "4.3"])
 def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, JudgedClaim], number: str) -> None:
-    """On runs with the paper's counts, the query of a claim gives the paper's number and verdict."""
     one = table_2[number]
     [answer] = one.answers
     published = one.claim.published()
@@ -91,16 +90,14 @@ def test_a_query_finds_the_published_counts_of_table_2(table_2: dict[str, Judged
 
 @pytest.mark.parametrize("number", ["2.1", "2.2", "2.7", "4.1"])
 def test_a_query_finds_the_published_counts_of_table_3(table_3: dict[str, JudgedClaim], number: str) -> None:
-    """Claims about fault types also give the paper's numbers and verdicts."""
     one = table_3[number]
     published = one.claim.published()
     assert published is not None
     assert one.answers[0].found.text == published.text
 
 
-def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, JudgedClaim]) -> None:
-    """Guided faults lead per activated fault and trail per injected fault. The resampling draws faults
-    within each fault type, and each image effect is separate."""
+def test_the_papers_counts_support_it_only_per_activated_fault(table_3: dict[str, JudgedClaim]) -> None:
+    """Guided faults trail per injected fault. The resampling draws faults within each fault type."""
     assert table_3["4.4"].verdict is HOLDS
     assert table_3["4.5"].verdict is FAILS
     assert table_3["4.5"].paper is FAILS
@@ -109,8 +106,7 @@ def test_the_papers_own_counts_are_for_it_and_against_it(table_3: dict[str, Judg
     assert effects == dict.fromkeys(("rain", "snow", "occlusion", "contrast"), HOLDS)
 
 
-def test_the_cited_time_is_the_drivers() -> None:
-    """Claims about a driver's time use the reaction time that is cited next to them."""
+def test_claims_about_a_driver_use_the_cited_reaction_time() -> None:
     driver_s = load_paper(REFERENCES).driver_reaction_s
     claims = [claim for one in judge(FILE, of_rows({}), []) for claim in one.claims]
     asked = [one.claim for one in claims if one.claim.measure in ("mean_time", "median_time")]
@@ -140,23 +136,17 @@ def test_the_cited_time_is_the_drivers() -> None:
     ],
 )
 def test_each_rule_reaches_each_verdict(rule: Rule, found: Estimate, verdict: Verdict) -> None:
-    """The interval decides, or a single run if the rule needs only one. With too few data, the claim is
-    undecided."""
     assert rule.verdict(found) is verdict
 
 
-def test_an_observation_holds_if_all_it_rests_on_does() -> None:
-    """One claim that fails decides against the observation. One claim without enough data leaves it
-    undecided."""
+def test_an_observation_holds_if_all_its_claims_hold() -> None:
     assert together([HOLDS, HOLDS]) is HOLDS
     assert together([HOLDS, UNDECIDED]) is UNDECIDED
     assert together([UNDECIDED, FAILS]) is FAILS
     assert together([]) is UNDECIDED
 
 
-def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, JudgedClaim]) -> None:
-    """A run with another mixture of faults has no data for the claim, whatever its number. Other claims
-    are decided."""
+def test_a_claim_about_all_faults_needs_the_papers_mixture(table_2: dict[str, JudgedClaim]) -> None:
     frame = of_rows(*[ACTIVATED] * 200, *[ACTIVATED | {"t_h1": 9.0, "t_h3": 8.0}] * 20)
     first = judge(FILE, frame, ["a type is missing", "5 are left"])[0].claims
     assert table_2["1.1"].verdict is HOLDS
@@ -165,8 +155,7 @@ def test_a_claim_of_all_faults_needs_all_of_the_papers(table_2: dict[str, Judged
     assert first[3].verdict is HOLDS
 
 
-def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
-    """An FCW in one of three scenarios is not enough for all three."""
+def test_a_claim_is_undecided_if_a_group_is_missing() -> None:
     frame = of_rows(ACTIVATED | {"scenario": "S2", "alerts": "fcw", "t_alert": 2.0})
     fcw = judge(FILE, frame, [])[0].claims[4]
     assert [answer.verdict for answer in fcw.answers] == [HOLDS, UNDECIDED, UNDECIDED]
@@ -174,9 +163,7 @@ def test_groups_that_a_run_does_not_have_leave_the_claim_open() -> None:
 
 
 def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
-    """If most alerts precede no hazard, the censored median exceeds every run. If the curve falls past one
-    half in one step, the median is that step, unless few runs remain. Without the ends of runs there is no
-    median."""
+    """If most alerts precede no hazard, the censored median exceeds every run."""
     alerted = ACTIVATED | {"alerts": "fcw", "t_alert": 2.0}
     safe, late = of_rows(*[alerted] * 20), of_rows(*[alerted | {"t_h1": 6.0}] * 20)
     assert median_time(safe, of="").low == math.inf
@@ -187,8 +174,7 @@ def test_the_time_to_a_hazard_counts_runs_without_one() -> None:
     assert math.isnan(median_time(safe.assign(t_end=math.nan), of="").low)
 
 
-def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
-    """If the results lack a column, the file's claim is reported as an error."""
+def test_a_query_that_fails_is_reported_with_its_line(tmp_path: Path) -> None:
     file = tmp_path / "o.yaml"
     text = FILE.read_text()
     file.write_text(text.replace("part: not is_alert", "part: not is_allert", 1))
@@ -202,8 +188,7 @@ def test_a_wrong_query_is_told_with_its_line(tmp_path: Path) -> None:
     ("old", "new"),
     [("measure: share", "measure: chare"), ("holds: {above: 0.5}", "holds: {above: 0.5, below: 0.6}")],
 )
-def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str) -> None:
-    """A claim needs a known measure and exactly one rule."""
+def test_an_invalid_claim_is_reported_with_its_line(tmp_path: Path, old: str, new: str) -> None:
     file = tmp_path / "o.yaml"
     file.write_text(FILE.read_text().replace(old, new, 1))
     with pytest.raises(MutatorError) as caught:
@@ -211,8 +196,7 @@ def test_a_wrong_claim_is_told_with_its_line(tmp_path: Path, old: str, new: str)
     assert caught.value.line
 
 
-def test_what_is_shown_is_what_was_evaluated() -> None:
-    """The query lines in the report, run as Python, give the numbers next to them."""
+def test_the_query_in_the_report_gives_the_reported_numbers() -> None:
     frame = of_rows(*[ACTIVATED] * 3, ACTIVATED | {"alerts": "fcw", "t_alert": 2.0, "t_h1": 9.0})
     told: tuple[JudgedObservation, ...] = judge(FILE, frame, [])
     names: dict[str, object] = {"runs": frame}

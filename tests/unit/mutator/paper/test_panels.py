@@ -1,4 +1,4 @@
-"""The published observations in the report of a run, limited to those that its experiments can decide."""
+"""The published observations that a run's experiments can decide, in its report."""
 
 import shutil
 from pathlib import Path
@@ -22,9 +22,10 @@ REFERENCES = Path(__file__).parents[4] / "fault_library" / "references"
 
 
 @pytest.mark.parametrize("shard", [None, "1/2"])
-def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, shard: str | None) -> None:
-    """Claims about all faults are decided only after the last experiment of the whole plan. A shard is
-    only a part of the plan."""
+def test_claims_about_all_faults_need_the_whole_plan(
+    toycar: Workspace, tmp_path: Path, shard: str | None
+) -> None:
+    """A shard is only a part of the plan."""
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small", Choices(shard=shard)), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")
@@ -55,8 +56,9 @@ def test_a_part_of_a_plan_is_not_its_mixture(toycar: Workspace, tmp_path: Path, 
         assert text.count(why) == (0 if done == 12 else of_all)
 
 
-def test_results_that_decide_nothing_say_nothing_of_the_study(toycar: Workspace, tmp_path: Path) -> None:
-    """If no fault of the paper was activated, the report has no such section, and no file is written."""
+def test_a_report_without_activated_faults_of_the_paper_has_no_observations(
+    toycar: Workspace, tmp_path: Path
+) -> None:
     shutil.copytree(REFERENCES, toycar.library / "references")
     freeze(make_plan(toycar, "small"), tmp_path / "run", toycar)
     folder = RunFolder.open(tmp_path / "run")

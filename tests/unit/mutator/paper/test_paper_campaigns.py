@@ -1,4 +1,4 @@
-"""On every machine, the paper's campaigns have the counts of its table III for each kind of fault."""
+"""The paper's campaigns have the counts of its table III."""
 
 import os
 import subprocess
@@ -43,13 +43,11 @@ def library() -> Workspace:
 
 @pytest.fixture(scope="module")
 def paper(library: Workspace) -> Plan:
-    """The plan with both campaigns."""
     return make_plan(library, "paper")
 
 
 @pytest.fixture(scope="module")
 def sample(library: Workspace) -> Plan:
-    """The plan for a tenth of both campaigns."""
     return make_plan(library, "paper_sample")
 
 
@@ -67,7 +65,6 @@ def of_method(plan: Plan, method: Method, key: Callable[[Experiment], object]) -
 
 
 def test_paper_is_table_three(paper: Plan) -> None:
-    """Both campaigns have 5640 experiments each, with the paper's number for each fault type."""
     for method in Method:
         counts = kinds(paper, method)
         assert counts == INJECTED
@@ -76,8 +73,7 @@ def test_paper_is_table_three(paper: Plan) -> None:
 
 
 def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
-    """Each of the 282 values appears in five scenarios and four contexts. Each random experiment has its
-    partner."""
+    """282 values, in five scenarios and four contexts. Each random experiment has its partner."""
     guided = of_method(paper, Method.GUIDED, pair)
     assert guided == of_method(paper, Method.RANDOM, pair)
     faults = {e.fault.id for e in paper.experiments}
@@ -87,15 +83,16 @@ def test_each_value_in_each_scenario_and_context(paper: Plan) -> None:
 
 
 @pytest.mark.parametrize("method", Method)
-def test_one_method_alone_is_its_half(library: Workspace, paper: Plan, method: Method) -> None:
-    """`paper_guided` and `paper_random` have the experiments of `paper`, with camera frames."""
+def test_each_method_alone_has_its_half_of_the_experiments(
+    library: Workspace, paper: Plan, method: Method
+) -> None:
     half = make_plan(library, f"paper_{method.value}")
     assert [e.id for e in half.experiments] == [e.id for e in paper.experiments if e.method is method]
     assert {e.setting for e in half.experiments} == {("pictures", "paper_detector")}
 
 
 def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
-    """The other reading has the same numbers. Its triggers do not wait for the controller."""
+    """Its triggers do not wait for the controller."""
     coded = make_plan(library, "paper_guided", Choices(reading="as_coded"))
     assert kinds(coded, Method.GUIDED) == INJECTED
     assert {e.trigger.armed_after_s for e in coded.experiments} == {0.0}
@@ -103,7 +100,6 @@ def test_as_coded_has_the_same_make_up(library: Workspace) -> None:
 
 
 def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
-    """The tenth has complete pairs of each fault type, scenario and method, in proportion."""
     assert len(sample.experiments) == 1128
     assert {e.id for e in sample.experiments} <= {e.id for e in paper.experiments}
     assert of_method(sample, Method.GUIDED, pair) == of_method(sample, Method.RANDOM, pair)
@@ -113,8 +109,7 @@ def test_the_sample_is_a_tenth_of_everything(paper: Plan, sample: Plan) -> None:
         assert abs(number - max(INJECTED[module, kind] / 50, 1.0)) <= 1.0
 
 
-def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) -> None:
-    """The hundredth has every scenario, and each variant with both methods."""
+def test_the_smoke_campaign_has_every_scenario_and_variant(library: Workspace, paper: Plan) -> None:
     smoke = make_plan(library, "paper_smoke").experiments
     assert len(smoke) == 113
     assert {e.id for e in smoke} <= {e.id for e in paper.experiments}
@@ -123,8 +118,6 @@ def test_the_smoke_campaign_shows_everything(library: Workspace, paper: Plan) ->
 
 
 def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> None:
-    """The campaign on the reference plant, as coded, has every value of every fault type, guided and at
-    random times."""
     plan = make_plan(library, "paper_reference")
     assert kinds(plan, Method.GUIDED) == kinds(plan, Method.RANDOM) == INJECTED
     setting = ("pictures", "reference_plant", "coded_detector", "coded_translation")
@@ -133,7 +126,7 @@ def test_the_reference_campaign_is_the_paper_as_coded(library: Workspace) -> Non
 
 
 def test_the_plan_is_the_same_in_another_process(sample: Plan) -> None:
-    """An interpreter with another hash seed and locale computes the same digest of the plan."""
+    """The other process has another hash seed and locale."""
     code = (
         "from pathlib import Path; from mutator.campaigns.plans import Choices, make_plan;"
         "from mutator.workspace import Workspace;"

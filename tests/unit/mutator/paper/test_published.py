@@ -30,7 +30,6 @@ def of(counts: dict[tuple[str, str], Tally], method: str) -> Tally:
 
 
 def test_the_cited_tables_have_the_sums_that_the_paper_gives(paper: Paper) -> None:
-    """The counts by scenario and by fault type both add up to the totals in the paper's text."""
     assert of(paper.summary, "guided") == Tally(
         injected=5640,
         activated=3678,
@@ -61,8 +60,8 @@ def test_the_guided_advantage_reverses_per_injected_fault(paper: Paper) -> None:
     assert rates == [35.8, 29.0, 23.3, 29.0]
 
 
-def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
-    """Our counts are below the paper's, by scenario. Cells that the paper does not have are empty."""
+def test_our_counts_are_below_the_papers(paper: Paper) -> None:
+    """Cells that the paper does not have are empty."""
     frame = results(HIT, HIT | {"alerts": "fcw", "t_alert": 9}, {}, {"scenario": "S9", "t_activation": 2})
     lines = summary_sheet("guided", by_scenario(frame), paper.published()).table().rows
     hazards = [line[2:] for line in lines if line[:2] == ["hazards", "activated"]]
@@ -78,7 +77,7 @@ def test_both_stand_side_by_side_with_n_in_every_cell(paper: Paper) -> None:
 
 
 def test_coverage_has_both_denominators(paper: Paper) -> None:
-    """Hazards are given per activated and per injected fault. Fault types are in the paper's order."""
+    """Hazards are given per activated and per injected fault."""
     frame = results({"fault_type": "zeta"}, HIT, {}, {"fault_type": "jamming", "t_activation": 3})
     sheet = coverage_sheet("guided", by_kind(frame), paper.published())
     kinds = [line[0] for line in sheet.lines]
@@ -88,7 +87,6 @@ def test_coverage_has_both_denominators(paper: Paper) -> None:
 
 
 def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
-    """Count, total, rate and interval are numbers. An unknown cell is empty."""
     sheet = coverage_sheet("guided", by_kind(results(HIT)), paper.published())
     lines = list(csv.DictReader(io.StringIO(sheet.csv())))
     assert lines[0]["hazards/activated: count"] == "154"
@@ -97,8 +95,7 @@ def test_the_csv_has_a_column_for_each_number(paper: Paper) -> None:
     assert "| radar/chaff | paper |" in sheet.markdown()
 
 
-def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Path) -> None:
-    """More hazards than activated faults in the cited file are reported with file and line."""
+def test_contradictory_counts_are_reported_with_their_line(tmp_path: Path) -> None:
     for file in REFERENCES.glob("paper_*.yaml"):
         (tmp_path / file.name).write_text(
             file.read_text().replace("guided_hazards: 154", "guided_hazards: 433")
@@ -108,7 +105,6 @@ def test_counts_that_contradict_each_other_are_told_with_their_line(tmp_path: Pa
 
 
 def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
-    """With fault types held constant, guided faults are more hazardous only per activated fault."""
     activated, injected = (
         contrasts.mantel_haenszel(contrasts.strata(paper.coverage, whole)) for whole in contrasts.WHOLES
     )
@@ -118,8 +114,7 @@ def test_the_papers_advantage_within_fault_types(paper: Paper) -> None:
     assert activated.low > 1
 
 
-def test_the_sheets_tell_both_wholes_for_paper_and_here(paper: Paper) -> None:
-    """The paper's counts go through the same tests as ours, per activated and per injected fault."""
+def test_the_papers_counts_go_through_the_same_tests_as_ours(paper: Paper) -> None:
     frame = results(HIT, HIT | {"method": "random", "trigger": "random/C2"})
     overall, kinds = overall_sheet(frame, paper.published()), kinds_sheet(frame, paper.published())
     assert [line[:2] for line in overall.lines] == [

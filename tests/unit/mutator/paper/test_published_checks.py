@@ -1,5 +1,4 @@
-"""Published numbers that are impossible, or that do not match the library, are reported with file and
-line."""
+"""Checks of the published numbers in a library."""
 
 import re
 import shutil
@@ -17,7 +16,6 @@ CLONE = Path(__file__).parents[4]
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Workspace:
-    """The shipped library with a copy of its references, which a test may break."""
     library = tmp_path / "fault_library"
     library.mkdir()
     for folder in (CLONE / "fault_library").iterdir():
@@ -32,8 +30,7 @@ def test_the_cited_numbers_that_ship_are_well(workspace: Workspace) -> None:
     assert list(check_paper(workspace)) == []
 
 
-def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None:
-    """If a campaign needs numbers that are missing, the error names the folder, the files and a remedy."""
+def test_missing_numbers_are_reported_with_a_remedy(workspace: Workspace) -> None:
     references = workspace.library / "references"
     shutil.rmtree(references)
     [problem] = check_paper(workspace)
@@ -73,11 +70,9 @@ def test_a_library_without_them_is_told_what_to_do(workspace: Workspace) -> None
         ("times", "driver_reaction_s: 1.8", "driver_reaction_s: -1", r"times\.yaml:4: "),
     ],
 )
-def test_what_is_wrong_is_told_where_it_stands(
+def test_a_wrong_number_is_reported_with_its_line(
     workspace: Workspace, file: str, old: str, new: str, told: str
 ) -> None:
-    """An unknown key, name or method, a duplicate row, and parts that do not match their sum are reported
-    with their line."""
     path = workspace.library / "references" / f"paper_{file}.yaml"
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new))
@@ -85,9 +80,7 @@ def test_what_is_wrong_is_told_where_it_stands(
     assert re.search(told, problems), problems
 
 
-def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar: Workspace) -> None:
-    """If a campaign requests the study and the library has only some of the published numbers, the missing
-    file is reported."""
+def test_a_missing_file_is_reported_if_a_campaign_requests_the_study(toycar: Workspace) -> None:
     references = toycar.library / "references"
     references.mkdir()
     shutil.copy(CLONE / "fault_library" / "references" / "paper_coverage.yaml", references)
@@ -101,8 +94,7 @@ def test_a_library_is_checked_for_the_studies_that_its_campaigns_ask_for(toycar:
     assert "no paper_summary.yaml, paper_times.yaml" in new
 
 
-def test_a_library_without_any_is_told_only_if_a_campaign_asks(toycar: Workspace) -> None:
-    """Without a campaign that requests the study, no published number is needed."""
+def test_a_library_needs_no_numbers_if_no_campaign_requests_the_study(toycar: Workspace) -> None:
     told = [str(problem) for problem in check_library(toycar, "toycar")]
     assert not any("references" in problem for problem in told)
     campaign = toycar.library / "campaigns" / "small.yaml"

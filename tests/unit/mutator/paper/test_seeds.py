@@ -1,4 +1,4 @@
-"""The observations by seed: for results made by hand, the number of seeds that show each observation."""
+"""The number of seeds that show each observation, for results made by hand."""
 
 from pathlib import Path
 from typing import Any
@@ -45,8 +45,7 @@ def frame() -> pd.DataFrame:
 
 
 def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
-    """Each observation has its verdict over all seeds, and the numbers of seeds that show it, contradict
-    it or are undecided. Seeds are sorted as numbers. Claims that support nothing are skipped."""
+    """Seeds are sorted as numbers."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: [])
@@ -60,9 +59,8 @@ def test_how_many_seeds_show_each_observation(tmp_path: Path) -> None:
     assert len(lines) == 8 and lines[2][:4] == (3, 1, "holds", "1.1")
 
 
-def test_seeds_that_lack_fault_types_cannot_tell_of_all(tmp_path: Path) -> None:
-    """A seed that lacks some fault types is judged by its own runs. With a single seed, there is no
-    comparison."""
+def test_a_seed_without_some_fault_types_is_judged_by_its_own_runs(tmp_path: Path) -> None:
+    """With a single seed, there is no comparison."""
     file = tmp_path / "observations.yaml"
     file.write_text(OBSERVATIONS)
     found = judge_by_seed(file, frame(), lambda runs: ["a type"] if set(runs["seed"]) == {"3"} else [])

@@ -30,9 +30,7 @@ def study_forms(run: Path) -> tuple[str, str]:
     return (report / "STUDY.md").read_text(), " ".join(Page((report / "study.html").read_text()).texts)
 
 
-def test_the_tables_of_a_published_fault_type_stand_beside_the_papers(run: Path) -> None:
-    """The observations are in the study's Markdown and page, which are separate files, and not in the
-    report's."""
+def test_the_observations_are_in_files_of_their_own(run: Path) -> None:
     forms = study_forms(run)
     cell = "35.6 % (154/432; 31.3 to 40.3)"
     files = [run / "report" / "tables" / f"coverage_guided.{kind}" for kind in ("md", "csv")]
@@ -59,8 +57,7 @@ def test_without_a_library_there_are_no_observations(run: Path) -> None:
 
 
 def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
-    """Both forms of the report link to the page while it exists. It is deleted when the results no longer
-    concern the study."""
+    """The page is deleted when the results no longer concern the study."""
     written = building.write(run, HERE)
     assert "[STUDY.md](STUDY.md)" in written.markdown.read_text()
     assert "study.html" in Page(written.page.read_text()).links
@@ -73,9 +70,8 @@ def test_the_report_links_to_the_page_of_the_study(run: Path) -> None:
     assert "these results are not enough for it" in written.markdown.read_text()
 
 
-def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
-    """If a hazard's experiment is outside the plan, it has no trace. Both forms say so, and neither has a
-    figure."""
+def test_an_experiment_outside_the_plan_has_no_figure(run: Path) -> None:
+    """Both forms name the query instead."""
     forms = study_forms(run)
     for text in forms:
         assert "No figure: its traces are not available" in text
@@ -84,8 +80,7 @@ def test_a_figure_that_cannot_be_is_told_with_its_query(run: Path) -> None:
     assert "<figure" not in (run / "report" / "study.html").read_text()
 
 
-def test_a_library_without_the_papers_numbers_is_said_in_the_origin(run: Path, toycar: Workspace) -> None:
-    """Both forms name the study and say that its data are missing. The shipped library has the data."""
+def test_the_origin_says_which_data_of_the_paper_are_missing(run: Path, toycar: Workspace) -> None:
     said = "the published numbers are not in this library"
     for workspace, expected in ((toycar, True), (HERE, False)):
         written = building.write(run, workspace)

@@ -17,24 +17,20 @@ def rows(heading: str) -> list[list[str]]:
 
 
 def test_each_model_has_its_row(clone: Workspace) -> None:
-    """Every template is in one row, with a link to its section. Every row names existing templates and
-    states their failure mode."""
     found = [name for first, *_ in rows("The models") for name in _MODEL.findall(first)]
     assert all(name == section for name, section in found)
     assert sorted(name for name, _ in found) == sorted(clone.fault_models().models)
     assert all(len(row) == 3 and all(row) for row in rows("The models"))
 
 
-def test_what_cannot_be_expressed_has_its_reason(clone: Workspace) -> None:
-    """Each unreachable failure mode has a reason. The models that the reason names exist."""
+def test_each_unreachable_failure_mode_has_a_reason(clone: Workspace) -> None:
     missing = rows("What cannot be expressed, and why")
     assert len(missing) > 5 and all(len(row) == 2 and all(row) for row in missing)
     named = {name for row in missing for cell in row for name in re.findall(r"`([a-z_]+)`", cell)}
     assert named - {"value"} <= set(clone.fault_models().models)
 
 
-def test_sources_are_named_in_the_text() -> None:
-    """Each listed source is cited by its first author or its number, and each cited source is listed."""
+def test_sources_are_listed_and_cited() -> None:
     text, _, sources = PAGE.read_text().partition("\n## Sources\n")
     listed = [line[2:].partition(",")[0] for line in sources.splitlines() if line.startswith("* ")]
     assert listed == sorted(listed) and len(listed) > 10

@@ -20,8 +20,7 @@ def in_code() -> set[str]:
     return {name for file in files for name in IN_CODE.findall(file.read_text(encoding="utf-8"))}
 
 
-def test_every_schema_of_the_code_is_in_the_page() -> None:
-    """Every stored or transmitted format has a line that names its writers and readers."""
+def test_the_page_lists_every_schema_of_the_code() -> None:
     assert {"run/1", "sim-record/1", "film-events/1"} <= in_code() <= set(IN_PAGE.findall(PAGE))
 
 
@@ -36,7 +35,6 @@ def test_every_module_in_the_page_exists() -> None:
 
 
 def test_every_cache_has_a_line() -> None:
-    """The table lists exactly the folders of `mutator cache`."""
     table = PAGE.split("\n## Caches\n")[1].split("\n## ")[0]
     folders = set(re.findall(r"^\| `([^/`]+)/", table, re.MULTILINE))
     kept = {caches.CHECKS, caches.GOLDENS, caches.LINES, caches.PICTURES, caches.RUNS, caches.TARGETS}
@@ -44,7 +42,6 @@ def test_every_cache_has_a_line() -> None:
 
 
 def test_every_file_of_a_library_has_a_line() -> None:
-    """Each shipped YAML file has a schema that the page lists."""
     files = [*(CLONE / "fault_library").rglob("*.yaml"), *(CLONE / "templates").glob("*.yaml")]
     heads = {re.search(rf"^schema: {SCHEMA.pattern}$", file.read_text(), re.MULTILINE) for file in files}
     assert {found and found[1] for found in heads} <= set(IN_PAGE.findall(PAGE))

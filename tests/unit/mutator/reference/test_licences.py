@@ -14,22 +14,20 @@ TABLE = table_of((CLONE / PAGE).read_text(encoding="utf-8"))
 
 
 def test_every_constrained_package_has_a_licence() -> None:
-    """The table and constraints.txt name the same packages in the same order."""
     assert tuple(TABLE) == constrained(CLONE)
     assert all(licence.strip() for licence in TABLE.values())
 
 
 @pytest.mark.skipif(sys.version_info[:2] != (3, 11), reason="the page has the versions for Python 3.11")
 def test_the_licences_are_those_that_the_packages_state() -> None:
-    """Every licence on the page equals the licence of the installed package."""
     stated = {name: stated_licence(name) for name in TABLE}
     installed = {name: licence for name, licence in stated.items() if licence is not None}
     assert "numpy" in installed
     assert {name: TABLE[name] for name in installed} == installed
 
 
-def test_a_licence_given_whole_is_told_by_its_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package that puts the whole text of its licence into the name field is listed with its first line."""
+def test_a_licence_text_is_listed_by_its_first_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Some packages put the whole text of their licence into the name field."""
     stated = Message()
     stated["License"] = "BSD 3-Clause License\n \n Redistribution and use ..."
     monkeypatch.setattr("mutator.reference.licences.metadata.metadata", lambda name: stated)
@@ -46,8 +44,7 @@ def clone(folder: Path, *packages: str) -> Path:
 
 
 def test_a_package_that_is_not_installed_keeps_its_licence(tmp_path: Path) -> None:
-    """If a package is not installed, its line is kept. A removed package loses its line. A new package
-    that is not installed is an error."""
+    """A new package that is not installed is an error."""
     page = clone(tmp_path, "pytest", "no_such") / PAGE
     page.write_text("| gone | others | MIT |\n| no_such | others | BSD |\n")
     write_licences(tmp_path)

@@ -35,8 +35,7 @@ def described(kind: Format) -> dict[str, dict[str, Any]]:
 @pytest.mark.parametrize(
     "path", [*(FOLDER / page for page in PAGES), *(SCHEMAS / f"{f.name}.json" for f in FORMATS)]
 )
-def test_what_is_generated_is_up_to_date(path: Path) -> None:
-    """Every committed page and schema equals what its source generates."""
+def test_generated_files_are_up_to_date(path: Path) -> None:
     generated = _generated()[path]
     assert (CLONE / path).read_text(encoding="utf-8") == generated, "run: python -m mutator.reference"
 
@@ -50,8 +49,8 @@ def _generated() -> dict[Path, str]:
     return _FILES
 
 
-def test_nothing_else_says_that_it_is_generated() -> None:
-    """A page or schema without a source must not exist. The target generates its scenarios page."""
+def test_no_generated_file_lacks_a_source() -> None:
+    """The target generates its scenarios page."""
     pages = [
         path
         for path in (CLONE / "docs").rglob("*.md")
@@ -71,9 +70,9 @@ def test_every_model_and_key_is_described(kind: Format) -> None:
             assert value["description"].endswith("."), f"{name}.{key}: a sentence"
 
 
-def test_models_come_in_the_order_in_which_a_reader_meets_them() -> None:
-    """The model of the file comes first. The models of its keys follow in the order in which they are
-    first needed."""
+def test_models_are_in_reading_order() -> None:
+    """The file's model comes first, and then those of its keys, in the order in which they are first
+    needed."""
     names = reading_order(definitions(spec_model(Workspace.find(CLONE).readings())))
     assert names == ["Spec", "Variant", "Draw", "Sweep", "Reading", "Injection", "At"]
 
@@ -107,8 +106,7 @@ def test_library_files_follow_their_schema(kind: Format) -> None:
         (("variants", "distance", "as_described", "injections", 0, "params"), {"by": 1, "by_m": [1]}),
     ],
 )
-def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...], value: Any) -> None:
-    """The editor marks a misspelt key or parameter, an invalid word, and a number out of range."""
+def test_a_schema_rejects_invalid_keys_and_values(keys: tuple[str | int, ...], value: Any) -> None:
     data = yaml_files.load(CHAFF).data
     check = validator("fault_spec")
     assert check.is_valid(data)
@@ -119,8 +117,7 @@ def test_a_schema_sees_what_the_program_would_refuse(keys: tuple[str | int, ...]
     assert not check.is_valid(data)
 
 
-def test_a_schema_takes_a_model_of_ones_own() -> None:
-    """A schema accepts an unknown fault model, because users can add models."""
+def test_a_schema_accepts_a_users_fault_model() -> None:
     data = yaml_files.load(CHAFF).data
     injection = data["variants"]["distance"]["as_described"]["injections"][0]
     injection |= {"model": "mine", "params": {"whatever_m": math.inf}}
@@ -128,8 +125,7 @@ def test_a_schema_takes_a_model_of_ones_own() -> None:
 
 
 def test_pages_are_written_in_a_clone_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With a library from a wheel, the reference is not generated, because there is no clone to write it
-    into."""
+    """A wheel has no clone to write them into."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     library = tmp_path / "mutator" / "shipped" / "0" / "fault_library"

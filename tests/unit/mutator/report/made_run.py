@@ -68,11 +68,8 @@ CRASHED = OK | NONE | {"status": "crashed", "detail": "IndexError"}
 
 
 def make_run(folder: Path, **head: object) -> Path:
-    """A run folder without digests, as older versions wrote it, with a hazard, a crash and a harness
-    error.
-
-    The hazard has a patch and a still. `head` is added to run.json.
-    """
+    """A run folder without digests, as older versions wrote it, with a hazard, a crash and a harness error.
+    `head` is added to run.json."""
     (folder / "run.json").write_text(json.dumps(HEAD | head))
     with (folder / "results.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, COLUMNS, restval="")

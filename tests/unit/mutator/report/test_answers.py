@@ -44,8 +44,8 @@ RUNS = [
 
 @pytest.fixture
 def run(tmp_path: Path) -> ReportedRun:
-    """A made-up run with the rows of `RUNS`. The experiments cost 1, 2, 4, ... s of CPU time, except the
-    last one, which has none."""
+    """The rows of `RUNS`. The experiments cost 1, 2, 4, ... s of CPU time, except the last one, which has
+    none."""
     make_run(tmp_path, metrics=METRICS)
     columns = [c.name for c in result_columns(("H1",), ("gas",), METRICS)]
     with (tmp_path / "results.csv").open("w", newline="") as file:
@@ -73,12 +73,11 @@ def run(tmp_path: Path) -> ReportedRun:
 
 @pytest.fixture
 def said(run: ReportedRun) -> dict[str, Answer]:
-    """The answers by name."""
     return {answer.name: answer for answer in answers_of(run)}
 
 
 def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
-    """Harder contacts come first, then smaller margins. A row opens its experiment in the list of hazards."""
+    """Harder contacts come first, then smaller margins."""
     answer = said["dangerous"]
     assert (
         answer.says
@@ -103,7 +102,6 @@ def test_the_worst_experiment_is_first(said: dict[str, Answer]) -> None:
 
 
 def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> None:
-    """Three of four hazards had no alert before them: two had no alert, and one had an alert too late."""
     answer = said["unwarned"]
     assert answer.says == (
         "3 of 4 hazards (75 %) were silent (no alert before the hazard): 2 with no alert at all, 1 with an "
@@ -118,9 +116,8 @@ def test_an_alert_after_the_hazard_is_no_warning(said: dict[str, Answer]) -> Non
     ]
 
 
-def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str, Answer]) -> None:
-    """The type with the most silent hazards comes first; the shortest time to one decides ties. A link
-    opens the fastest silent hazard."""
+def test_without_severity_fix_first_the_type_with_most_silent_hazards(said: dict[str, Answer]) -> None:
+    """The shortest time to a hazard decides ties."""
     answer = said["first"]
     assert answer.says.startswith("Start with car/speed: 2 of 3 silent hazards (67 %). The rule: ")
     silent = "warning=no%20alert%20at%20all,alert%20only%20after%20the%20hazard"
@@ -139,8 +136,7 @@ def test_without_severity_the_most_silent_hazards_are_fixed_first(said: dict[str
 
 
 def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
-    """A frame of silent hazards, each given by fault type, severity class and time after the activation,
-    worst first."""
+    """A frame of silent hazards, worst first: fault type, severity class and time after the activation."""
     names = ["kind", "severity", "after"]
     frame = pd.DataFrame(rows, columns=names)
     frame["t_hazard"] = 2 + frame["after"]
@@ -150,9 +146,8 @@ def hazards(*rows: tuple[str, str, float]) -> pd.DataFrame:
     return frame.assign(fault=frame["kind"], place=frame.index, **same, **told)
 
 
-def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() -> None:
-    """One hazard of class S3 ranks before many of S1. With equal numbers in each class, the faster one
-    ranks first."""
+def test_severity_decides_what_to_fix_first_and_then_time() -> None:
+    """One hazard of class S3 ranks before many of S1."""
     many = [("a/many", "S1", 1.0)] * 5
     some = [("b/slow", "S3", 9.0), ("c/fast", "S3", 8.0), ("d/both", "S3", 9.5), ("d/both", "", 9.0)]
     answer = first_to_fix(hazards(*some, *many), None, has_alerts=True)
@@ -167,15 +162,14 @@ def test_the_highest_severity_decides_what_to_fix_then_the_next_then_the_time() 
 
 
 def course(by: str = "", stopped_at: tuple[str, ...] = ()) -> Course:
-    """The course of a fault that reached its first actuator through the link `by`, or was stopped at
+    """The path of a fault that reached its first actuator through the link `by`, or was stopped at
     components."""
     entered = Crossing(link=by, tail=by, tip="pedals", passage=Passage.THROUGH) if by else None
     return Course(states={}, late={}, crossings=(), reached="", stopped_at=stopped_at, entered=entered)
 
 
 def test_the_component_that_let_most_faults_through_is_named() -> None:
-    """The answer names the link through which most of a type's faults reached the first actuator, and
-    counts the faults that were stopped. Faults without a path are in neither number."""
+    """Faults without a path are in neither number."""
     courses = (course("feet"), course("hands"), course(stopped_at=("eyes",)))
     structure = {"label": {"feet": "Feet", "eyes": "Eyes"}.__getitem__, "courses": courses}
     frame = hazards(*[("a/b", "S1", 1.0)] * 4).assign(course=[0, 0, 1, -1])
@@ -191,9 +185,8 @@ def test_the_component_that_let_most_faults_through_is_named() -> None:
     )
 
 
-def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
-    """With many contacts and many other hazards, six contacts and four others are listed. Each list opens
-    hazards of its own kind."""
+def test_contacts_and_other_hazards_are_listed_separately() -> None:
+    """Of many, six contacts and four other hazards are listed."""
     frame = hazards(*[("a/hit", "S1", 1.0)] * 12, *[("b/miss", "", 1.0)] * 12)
     hit, missed, _ = dangerous(frame, [["margin_h1", "m", "", "lower"]], has_alerts=True).listings
     assert (len(hit.lines), len(missed.lines)) == (6, 4)
@@ -203,9 +196,8 @@ def test_the_worst_without_contact_stand_beside_the_worst_contacts() -> None:
     assert len(dangerous(frame[:12], [], has_alerts=True).listings[0].lines) == 10
 
 
-def test_what_was_tolerated_is_counted_of_what_was_activated(said: dict[str, Answer]) -> None:
-    """A fault that never became active does not count as tolerated. The weakest fault type comes first, and
-    types without a hazard are named."""
+def test_tolerated_faults_are_counted_among_activated_ones(said: dict[str, Answer]) -> None:
+    """The weakest fault type comes first."""
     answer = said["survived"]
     assert answer.says == (
         "3 of 7 activated faults (43 %) led to no hazard: 2 changed no actuator (masked), 1 did (sdc). "
@@ -216,8 +208,7 @@ def test_what_was_tolerated_is_counted_of_what_was_activated(said: dict[str, Ans
     assert never.lines == [(Link("car/steer", "kind=car%2Fsteer&outcome=masked,sdc"), "1")]
 
 
-def test_time_is_that_of_the_experiments_by_fault_type(said: dict[str, Answer]) -> None:
-    """The fault type with the most CPU time comes first. An experiment that did not run costs no time."""
+def test_cpu_time_is_added_up_by_fault_type(said: dict[str, Answer]) -> None:
     answer = said["time"]
     assert answer.says == (
         "The experiments took 2 min 07 s of CPU time, by 2 workers: 7 of 8 experiments (88 %) were "
@@ -240,8 +231,7 @@ def names_of(run: ReportedRun, empty: str) -> set[str]:
     return {row["experiment_id"] for row in lines_of(run.texts) if not row[empty]}
 
 
-def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
-    """The report of a run without hazards has no empty table and no share of zero."""
+def test_a_report_without_hazards_has_no_empty_table(run: ReportedRun) -> None:
     panel = answers_panel(part_of(run, names_of(run, "t_h1")))
     assert "0 of 3 activated faults (0 %) led to a hazard." in panel.markdown
     assert "## Which hazards were silent\n\nNo hazard came." in panel.markdown
@@ -249,9 +239,8 @@ def test_a_run_without_hazards_says_so(run: ReportedRun) -> None:
     assert "What to fix first" not in panel.markdown
 
 
-def test_a_run_in_which_no_fault_was_activated_says_so(run: ReportedRun) -> None:
-    """If no fault was activated, nothing is reported as dangerous or as tolerated, and no link leads to an
-    empty list."""
+def test_a_report_without_activated_faults_calls_none_tolerated(run: ReportedRun) -> None:
+    """It has no link to an empty list either."""
     idle = part_of(run, names_of(run, "t_activation"))
     found = {answer.name: answer for answer in answers_of(idle)}
     assert found["dangerous"].says == found["survived"].says == "No fault was activated."
@@ -271,15 +260,13 @@ def test_a_crash_is_not_tolerated(run: ReportedRun) -> None:
 
 
 def test_one_is_singular(run: ReportedRun) -> None:
-    """A single hazard or experiment is reported in the singular."""
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16, "1" * 16}))}
     assert found["unwarned"].says.startswith("1 of 2 hazards (50 %) was silent")
     found = {answer.name: answer for answer in answers_of(part_of(run, {"0" * 16}))}
     assert "1 of 1 experiment (100 %) was simulated" in found["time"].says
 
 
-def test_a_link_names_facets_as_the_page_reads_them() -> None:
-    """The values in a link are escaped, and its sort order comes last."""
+def test_link_values_are_escaped_and_the_order_comes_last() -> None:
     assert (
         to_list({"kind": ["a/b,c"], "outcome": ["sdc"]}, "-t_end") == "kind=a%2Fb%2Cc&outcome=sdc&sort=-t_end"
     )

@@ -61,9 +61,9 @@ def row(name: str) -> Row:
         ("variant", ["nan"], {"words": ["nan"], "codes": [0]}),
     ],
 )
-def test_a_column_is_numbers_a_dictionary_or_texts(name: str, values: list[str], made: object) -> None:
-    """Ids stay text, empty cells stay empty, and non-finite numbers are written by name. Columns of names
-    have a dictionary for the filters, even if no names are equal, and are not read as numbers."""
+def test_columns_are_numbers_dictionaries_or_texts(name: str, values: list[str], made: object) -> None:
+    """Columns of names have a dictionary for the filters, even if no names are equal, and are not read as
+    numbers."""
     assert column(name, values) == made
 
 
@@ -77,7 +77,7 @@ def test_alerts_are_columns_only_of_a_target_that_has_some() -> None:
 
 
 def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., Experiment]) -> None:
-    """The members of a shape are in the order of rows. A row without a patch or a plan has no shape."""
+    """A row without a patch or a plan has no shape."""
     one, two = experiment(3.0), experiment(4.0)
     rows = [row(two.id), row("none"), row(one.id)]
     patches = [(two.id, "", PATCH.format(4)), (one.id, "", PATCH.format(3))]
@@ -95,7 +95,7 @@ def test_diffs_are_put_together_from_shape_and_values(experiment: Callable[..., 
 
 
 def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
-    """The first images by time are embedded in the page. Films and plots of exact traces are always links."""
+    """Films and plots of exact traces are always links."""
     write_json(tmp_path / "run.json", {"schema": "run/1"})
     plots = tmp_path / "plots"
     plots.mkdir()
@@ -111,8 +111,6 @@ def test_pictures_beyond_the_budget_are_links(tmp_path: Path) -> None:
     }
 
 
-def test_rows_are_read_in_one_order() -> None:
-    """Rows are sorted by fault, scenario, method, trigger and id, so the page is independent of the order
-    of results."""
+def test_rows_do_not_depend_on_the_order_of_results() -> None:
     rows = [row("b"), row("a")]
     assert sorted(rows, key=browse.reading_order) == [rows[1], rows[0]]

@@ -31,7 +31,6 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
-    """A harness error is listed first among the runs that ended badly, and does not count as a fault."""
     text = building.write(run, None).markdown.read_text()
     assert "3 experiments: 1 hazard, 1 crashed, 1 harness_error." in text
     failed = text.split("## Runs that did not finish normally")[1]
@@ -43,7 +42,6 @@ def test_a_harness_error_is_a_class_of_its_own(run: Path) -> None:
 
 
 def test_the_page_is_well_formed_and_escapes_what_it_shows(run: Path) -> None:
-    """Every tag is closed. Text from specs and runs cannot become markup."""
     page = Page(building.write(run, None).page.read_text())
     assert page.open == []
     assert "night_<b>drive</b>" in page.texts
@@ -56,7 +54,6 @@ def carried(page: Path, name: str) -> Any:
 
 
 def test_the_page_needs_no_other_file(run: Path) -> None:
-    """The links of the page lead to parts of the page, and the page loads nothing from elsewhere."""
     written = building.write(run, None)
     page = Page(written.page.read_text())
     assert page.links
@@ -82,15 +79,15 @@ def test_the_page_carries_results_diff_and_still_of_an_experiment(run: Path) -> 
 
 
 def test_many_failed_runs_are_a_link_to_all(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A page of 100,000 crashes lists a few of them, and a filter shows the rest."""
+    """The page has 100,000 crashes."""
     monkeypatch.setattr(failed, "PAGE_LISTED", 1)
     text = building.write(run, None).page.read_text()
     assert "1 more: " in text
     assert "#status=crashed,timeout,invalid_mutant,harness_error" in text
 
 
-def test_the_report_says_what_it_comes_from(run: Path) -> None:
-    """Both forms have the plan, the seed, the reading, the choices, the sources and the versions."""
+def test_the_report_states_its_origin(run: Path) -> None:
+    """This is plan, seed, reading, choices, sources and versions."""
     written = building.write(run, None)
     for text in (written.markdown.read_text(), written.page.read_text()):
         for fact in ("ab" * 32, "cd" * 32, "as_described", "chosen: limit", "3 of 3 planned", "2.4.6"):
@@ -98,7 +95,6 @@ def test_the_report_says_what_it_comes_from(run: Path) -> None:
 
 
 def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
-    """Both forms show the approvals that a run stored. Without approvals, they do not mention them."""
     assert "reviewed" not in building.write(run, None).markdown.read_text()
     approvals = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"by": "Jane"}, {"by": "Joe"}]}
     write_json(run / gate.FILE, approvals)
@@ -107,8 +103,7 @@ def test_the_report_says_who_reviewed_what_ran(run: Path) -> None:
         assert "all of 2 groups approved, by Jane (1), Joe (1)" in text
 
 
-def test_the_report_is_the_same_each_time(run: Path) -> None:
-    """The report has the same bytes when it is written again from the same results."""
+def test_the_report_is_written_byte_for_byte_again(run: Path) -> None:
     written = building.write(run, None)
     before = written.page.read_bytes(), written.markdown.read_bytes()
     again = building.write(run, None)
@@ -120,9 +115,7 @@ def test_no_report_without_a_run(tmp_path: Path) -> None:
         building.write(tmp_path, None)
 
 
-def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> None:
-    """With two fault types and two scenarios, there are three figures, shown in the Markdown and in the
-    page."""
+def test_figures_are_in_the_markdown_and_in_the_page(run: Path) -> None:
     with (run / "results.csv").open("a", newline="") as file:
         other = OK | {"experiment_id": "3" * 16, "fault_id": "f3", "fault_type": "jamming", "scenario": "S2"}
         csv.DictWriter(file, COLUMNS, restval="").writerow(other)
@@ -136,16 +129,14 @@ def test_figures_are_shown_where_there_is_something_to_compare(run: Path) -> Non
 
 
 def test_experiments_and_runs_are_told_apart(run: Path) -> None:
-    """Both numbers are shown with the reason why they differ. For a plan from before shared runs, the
-    number of runs is missing."""
+    """For a plan from before shared runs, the number of runs is missing."""
     assert "3 experiments are planned, as 2 runs" in building.write(run, None).markdown.read_text()
     (run / "run.json").write_text(json.dumps({name: x for name, x in HEAD.items() if name != "runs"}))
     assert "3 experiments are planned.\n" in building.write(run, None).markdown.read_text()
 
 
-def test_what_runs_that_stop_have_not_seen_is_told(run: Path) -> None:
-    """If runs stop, the alert for a hazard may be missing because it came after the end. The summary, the
-    answer on warnings and the table heads say so, for such runs only."""
+def test_the_report_says_what_runs_that_stop_may_have_missed(run: Path) -> None:
+    """If a run stops at a hazard, its alert may be missing because it came after the end."""
     assert STOP_NOTE not in building.write(run, None).markdown.read_text()
     stops = {"canary": {"after_hazard": "stop"}, "alerts": ["fcw"]}
     (run / "run.json").write_text(json.dumps(HEAD | stops))
@@ -163,8 +154,7 @@ def drawn_again(run: Path, workspace: Workspace | None) -> bool:
     return page.stat().st_mtime_ns != before
 
 
-def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
-    """The report is written once, and again after results, a plot, a series, or the library have changed."""
+def test_an_up_to_date_report_is_not_written_again(run: Path) -> None:
     assert drawn_again(run, None)
     assert not drawn_again(run, None)
     (run / "plots" / ("2" * 16 + ".svg")).touch()
@@ -180,8 +170,7 @@ def test_a_report_is_left_alone_while_it_is_up_to_date(run: Path) -> None:
 
 @pytest.mark.parametrize("name", ["REPORT.md", "index.html", "figures/a.svg", "tables/a.csv"])
 def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None:
-    """Each file of the report is compared with what was written. A comparison in the same folder is not a
-    file of the report."""
+    """A comparison in the same folder is not a file of the report."""
     out = run / "report"
     for folder in ("figures", "tables", "compare-other"):
         (out / folder).mkdir(parents=True)
@@ -195,26 +184,21 @@ def test_a_report_that_was_edited_is_written_again(run: Path, name: str) -> None
 
 
 @pytest.mark.parametrize("text", ["{", "[1]", '{"schema": "report/1"}', '{"schema": "report/1", "files": 1}'])
-def test_a_damaged_note_of_what_a_report_was_made_from_is_none(run: Path, text: str) -> None:
-    """Any damage to the note of inputs causes the report to be written again."""
+def test_a_damaged_note_of_inputs_causes_a_new_report(run: Path, text: str) -> None:
     building.write(run, None)
     (run / "report" / "made_from.json").write_text(text)
     assert drawn_again(run, None)
 
 
 @pytest.mark.parametrize("damage", ["REPORT.md", "made_from.json"])
-def test_a_report_that_lacks_something_is_written_again(run: Path, damage: str) -> None:
-    """A missing page or a missing note of inputs causes the report to be written again."""
+def test_an_incomplete_report_is_written_again(run: Path, damage: str) -> None:
     building.write(run, None)
     (run / "report" / damage).unlink()
     assert drawn_again(run, None)
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])
-def test_a_campaign_without_a_study_is_reported_without_its_words(
-    run: Path, workspace: Workspace | None
-) -> None:
-    """Published fault types do not add published numbers to a report, even if the library cites some."""
+def test_published_fault_types_alone_add_no_published_numbers(run: Path, workspace: Workspace | None) -> None:
     written = building.write(run, workspace)
     page = re.sub(r"(?s)<(style|script).*?</\1>", "", written.page.read_text())
     shown = written.markdown.read_text() + page
@@ -225,19 +209,15 @@ def test_a_campaign_without_a_study_is_reported_without_its_words(
 
 
 @pytest.mark.parametrize("workspace", [HERE, None], ids=["library", "no library"])
-def test_a_study_that_cannot_be_asked_is_said_and_left_out(
+def test_a_study_that_cannot_be_evaluated_is_left_out_with_the_reason(
     tmp_path: Path, workspace: Workspace | None
 ) -> None:
-    """If the package or the library is missing, the report is written, and its section on origin gives the
-    reason."""
     text = building.write(make_run(tmp_path, study="moon_landing"), workspace).markdown.read_text()
     assert ("moon_landing, which cannot be loaded here" in text) == (workspace is not None)
     assert ("moon_landing, which needs a fault library" in text) == (workspace is None)
 
 
-def test_several_seeds_have_a_part_of_the_report(run: Path) -> None:
-    """Both forms, the files, and a table on the command line show the spread of several seeds. A single
-    seed has no spread."""
+def test_the_report_shows_the_spread_of_several_seeds(run: Path) -> None:
     assert building.write(run, None).summaries == ()
     path = run / "results.csv"
     lines = list(csv.DictReader(path.read_text().splitlines()))

@@ -105,8 +105,7 @@ def test_reasons_beyond_the_most_frequent_are_one_line(finish: Finish) -> None:
     assert sum(int(count) for _, count in told.table.rows) == 34
 
 
-def test_an_experiment_run_again_counts_once(finish: Finish) -> None:
-    """If an experiment has several timings, the report uses the newest one."""
+def test_the_newest_timing_of_an_experiment_is_used(finish: Finish) -> None:
     run = finish(4)
     again = timing(record_ids(run)[0]) | {"engine": "reference", "why": "it leaves threads behind"}
     write(run / "timings/0002-main.jsonl", TIMINGS_SCHEMA, [again])
@@ -132,8 +131,9 @@ def record_ids(run: Path) -> list[str]:
         (None, "no equivalence check is needed. Forking pays off from 40 experiments.", "none needed"),
     ],
 )
-def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: str, state: str) -> None:
-    """The report distinguishes a complete proof, a partial proof, and no proof."""
+def test_complete_partial_and_missing_proofs_are_distinguished(
+    finish: Finish, proven: int | None, said: str, state: str
+) -> None:
     told = summary(finish(proven))
     assert told is not None
     assert said in told.proof
@@ -142,20 +142,17 @@ def test_how_far_the_proof_is_is_told(finish: Finish, proven: int | None, said: 
     assert not told.failed
 
 
-def test_of_many_experiments_forking_is_not_said_to_be_in_vain(
+def test_forking_is_not_called_useless_for_many_experiments(
     finish: Finish, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the harness chose the reference engine for many experiments, the report does not say that forking
-    is useless."""
+    """The harness chose the reference engine for them."""
     monkeypatch.setattr(engines, "WORTH_IT", 4)
     told = summary(finish(None))
     assert told is not None
     assert told.proof.endswith("so no equivalence check is needed.")
 
 
-def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
-    """Both forms report a wrong record first, and again in the facts. How experiments ran comes later, and
-    its text is escaped."""
+def test_a_failed_proof_is_reported_first(finish: Finish) -> None:
     run = finish(4, change=lambda r: replace(r, trace_digest="0" * 64))
     build(run)
     written = building.write(run, None)
@@ -166,9 +163,7 @@ def test_a_failed_proof_is_told_before_any_table(finish: Finish) -> None:
     assert "its golden run has &lt;two&gt; threads" in written.page.read_text()
 
 
-def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
-    """Additional results of the proof make the report out of date, even if the run's results are
-    unchanged."""
+def test_new_results_of_the_proof_make_a_report_out_of_date(finish: Finish) -> None:
     run = finish(3)
     build(run)
     before = stamp.made_from(RunFolder.open(run), None)
@@ -177,9 +172,10 @@ def test_a_report_is_made_from_its_proof(finish: Finish) -> None:
     assert before != stamp.made_from(RunFolder.open(run), None)
 
 
-def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Path], None]) -> None:
-    """The proof compares the digests of traces, which are not part of the results. A changed digest makes
-    the report out of date."""
+def test_a_changed_trace_digest_makes_a_report_out_of_date(
+    finish: Finish, reseal: Callable[[Path], None]
+) -> None:
+    """The results do not contain these digests."""
     run = finish(4)
     build(run)
     results, before = (run / "results.csv").read_bytes(), stamp.made_from(RunFolder.open(run), None)
@@ -191,13 +187,12 @@ def test_a_report_is_made_from_its_records(finish: Finish, reseal: Callable[[Pat
     assert before != stamp.made_from(RunFolder.open(run), None)
 
 
-def test_a_proof_is_told_where_timings_are_not(finish: Finish) -> None:
-    """A failed proof is reported even if the run's timings do not name an engine."""
+def test_a_failed_proof_is_reported_without_timings(finish: Finish) -> None:
     told = summary(finish(4, lambda r: replace(r, tree="x"), ways=()))
     assert told is not None
     assert told.failed
 
 
-def test_runs_of_before_there_were_engines_say_nothing_of_them(finish: Finish) -> None:
-    """If the timings do not name an engine, the report does not name one."""
+def test_without_an_engine_in_the_timings_the_report_names_none(finish: Finish) -> None:
+    """Older versions did not record it."""
     assert summary(finish(None, ways=())) is None

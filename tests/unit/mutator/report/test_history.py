@@ -31,9 +31,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_what_changed_from_run_to_run_is_counted(folder: Path) -> None:
-    """A new hazard and one that disappeared count as two changes. The command that compares the two runs
-    is shown."""
+def test_changes_between_runs_are_counted(folder: Path) -> None:
+    """A new hazard and one that disappeared count as two changes."""
     written = write_history(folder)
     text = written.markdown.read_text()
     assert written.runs == 2

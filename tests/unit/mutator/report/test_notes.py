@@ -3,8 +3,7 @@
 from mutator.report.panel import marked
 
 
-def test_a_note_is_escaped_and_its_marks_are_elements() -> None:
-    """Code and emphasis become elements. A single asterisk and all other text stay text."""
+def test_code_and_emphasis_become_elements_and_the_rest_is_escaped() -> None:
     assert marked("*above x* and `any`, marked with *.") == (
         "<em>above x</em> and <code>any</code>, marked with *."
     )

@@ -1,4 +1,4 @@
-"""A report's data on paths of faults: shapes and columns for the page, and counts by fault type."""
+"""A report's data on fault paths."""
 
 from collections.abc import Callable
 from math import inf
@@ -27,8 +27,8 @@ def path(*states: State, stopped_at: tuple[str, ...] = ()) -> Path:
 
 
 def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
-    """Equal paths share a shape, and an experiment without a path has none. Deviations have three digits
-    or are a name. If nothing left golden, the columns of channels are empty."""
+    """Equal paths share a shape. Deviations have three digits or are a name. If nothing left golden, the
+    columns of channels are empty."""
     far, held = path(*[State.REACHED] * 3), path(State.REACHED, State.HELD, State.HELD)
     records = {
         "a": record("a", left=(("seen", 1.23456, 0.123456), ("gap", 2.0, inf))),
@@ -47,11 +47,8 @@ def test_shapes_and_columns_for_the_page(record: Callable[..., Record]) -> None:
 
 
 def test_counts_of_links_and_components() -> None:
-    """A link counts the faults that reached its start, unless the component after it is not recorded.
-
-    A component counts the faults that it stopped, and how many of these were masked. If several components
-    stopped a masked fault, it counts once.
-    """
+    """A link counts the faults that reached its start, unless the component after it is not recorded. A
+    masked fault that several components stopped counts once."""
     counts = PathCounts()
     counts.add(path(State.INJECTED, State.REACHED, State.REACHED))
     counts.add(path(State.INJECTED, State.HELD, State.HELD, stopped_at=("pedals",)))

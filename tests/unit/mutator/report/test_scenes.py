@@ -15,9 +15,8 @@ def names(tree: Tree) -> Iterator[str]:
             yield from names(part)
 
 
-def test_the_shipped_scene_is_of_channels() -> None:
-    """Every formula of the scene uses channels of the target. The scene follows an actor that is always
-    visible."""
+def test_the_shipped_scene_uses_channels_of_the_target() -> None:
+    """It follows an actor that is always visible."""
     manifest = Workspace.find().manifest("openpilot")
     scene = scene_facts(manifest)
     assert scene is not None

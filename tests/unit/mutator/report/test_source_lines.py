@@ -1,5 +1,4 @@
-"""The source of a run with operators' mutants: the marks of lines, and the parts of the page that use
-them."""
+"""The source view of a run with mutation operators, and the panels that use it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,8 +32,8 @@ def at(text: str) -> int:
 
 
 def became(experiment: Experiment) -> dict[str, Any]:
-    """The result of a mutant: on the line of `wanted`, permanent ones do harm, except one that was not
-    active, and transient ones are masked. Results for the pedals are unknown."""
+    """The result of a mutant. Permanent ones on the line of `wanted` do harm, except an inactive one, and
+    transient ones are masked. Results for the pedals are unknown."""
     place = str(experiment.fault.value)
     if "3.0" in place or "6.0" in place:
         return FAILED
@@ -55,8 +54,7 @@ def run(
 
 
 def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: Path) -> None:
-    """Each line has the outcomes of its permanent and its transient mutants, each mutant once. A harness
-    error is not an outcome."""
+    """A harness error is not an outcome."""
     source = ReportedRun.open(RunFolder.open(run), toycar).source
     assert source is not None
     (file,) = source.files
@@ -69,7 +67,6 @@ def test_lines_have_the_worst_outcome_of_their_mutants(toycar: Workspace, run: P
 
 
 def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
-    """The links of the panel search columns of the page's table for values that at least one row has."""
     reported = ReportedRun.open(RunFolder.open(run), toycar)
     panel = source_panel(reported)
     assert panel is not None
@@ -88,8 +85,8 @@ def test_a_line_leads_to_its_experiments(toycar: Workspace, run: Path) -> None:
     assert columns["variant"]["words"] == ["toycar/driver.py::Driver.drive"]
 
 
-def test_the_score_is_printed_and_in_python(toycar: Workspace, run: Path) -> None:
-    """The totals equal those of the command line. Without golden runs, alerts are not compared."""
+def test_the_score_equals_that_of_the_api(toycar: Workspace, run: Path) -> None:
+    """Without golden runs, alerts are not compared."""
     loaded = load_run(run, workspace=toycar)
     totals = loaded.mutation_totals()
     assert totals.heads[:3] == ("mutation score", "number", "not activated")
@@ -120,7 +117,6 @@ def test_a_target_that_has_changed_is_not_shown(toycar: Workspace, run: Path) ->
 def test_a_run_without_operators_has_neither_panel(
     toycar: Workspace, tmp_path: Path, write_run: Callable[..., Path]
 ) -> None:
-    """The report of a run without operators' mutants has neither the panel nor the column of lines."""
     out = write_run(toycar, tmp_path / "run")
     results.build(out)
     reported = ReportedRun.open(RunFolder.open(out), toycar)

@@ -1,4 +1,4 @@
-"""The code that injected lines call is found by following names from these lines only."""
+"""The code that injected lines call is found by following names."""
 
 from pathlib import Path
 
@@ -122,36 +122,31 @@ def called(line: str, tag: str = TAG, **changed: str) -> dict[str, str]:
     ],
 )
 def test_names_lead_to_what_is_called(line: str, found: set[str]) -> None:
-    """Names are followed through imports, modules, bases and `self`, and from there on. Variables and
-    annotations are not followed."""
+    """Imports, modules, bases and `self` are followed, and variables and annotations are not."""
     assert set(called(line)) == found
 
 
 def test_only_injected_lines_call() -> None:
-    """Calls in the target's own lines next to injected ones are ignored, and so are calls in the probe's
-    lines."""
     assert called("picture = weather.Rain(3)", tag="") == {}
     assert called("picture = weather.Rain(3)", tag="  # fi:observe") == {}
 
 
-def test_of_a_changed_line_only_the_new_value_calls() -> None:
-    """In a changed line, only the new value counts, because the rest is the target's."""
+def test_only_the_new_value_of_a_changed_line_calls() -> None:
+    """The rest is the target's."""
     line = 'picture = cut(picture) + (helper() if _fi.active("01234567") else Mist())'
     was = f"{TAG} was:        picture = cut(picture) + Mist()"
     assert set(called(line, was)) == {"car/eye.py helper", "car/eye.py LEVEL"}
 
 
-def test_the_source_is_that_of_the_definition() -> None:
-    """All statements that set a name are included, with their decorators. A file that is not Python is
-    included as a whole."""
+def test_the_source_has_all_statements_that_set_a_name() -> None:
+    """A file that is not Python is included as a whole."""
     assert called("kit.never()")["car/tools.py never"] == "@cached\ndef never():\n    return clip\n"
     assert called("numbers.one()")["car/numbers.py one"] == TREE["car/numbers.py"]
     assert called("Mist()")["car/drops.npz"] == "\0"
 
 
-def test_what_is_broken_calls_nothing() -> None:
-    """A module that cannot be parsed has no names. A module that imports itself does not make the search
-    endless."""
+def test_a_module_that_cannot_be_parsed_calls_nothing() -> None:
+    """A module that imports itself does not make the search endless."""
     assert called("picture = weather.Rain(3)", **{"car/weather.py": "class Rain(:\n"}) == {}
     assert called("picture = four()") == {}
 
@@ -217,10 +212,8 @@ class Eye(Effect[int]):
         ("picture = part(picture)", {"car/eye.py part"}),
     ],
 )
-def test_names_of_packages_and_bases_lead_on(line: str, found: set[str]) -> None:
-    """The search follows star imports, re-exported modules, whole modules, `super()`, bases with type
-    arguments, and calls from a base's method back to the class. A variable of a comprehension does not
-    hide an outer name."""
+def test_names_are_followed_through_packages_and_bases(line: str, found: set[str]) -> None:
+    """A variable of a comprehension does not hide an outer name."""
     pristine = PACKAGE["car/eye.py"].format(line="pass")
     files = {**TREE, **PACKAGE, "car/eye.py": pristine}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
@@ -237,8 +230,8 @@ def test_names_of_packages_and_bases_lead_on(line: str, found: set[str]) -> None
         (["left out"], set()),
     ],
 )
-def test_expressions_are_looked_at_where_they_are_to_stand(texts: list[str], found: set[str]) -> None:
-    """Names have the meaning that they have in the function. Text that is not an expression calls nothing."""
+def test_names_in_expressions_have_their_meaning_in_the_function(texts: list[str], found: set[str]) -> None:
+    """Text that is not an expression calls nothing."""
     files = {**TREE, "car/eye.py": EYE.format(line="pass")}
     tree = SourceTree(Path(), {path: text.encode() for path, text in files.items()}, "", {})
     assert set(CalledCode(tree).of_expressions("car/eye.py", "Eye.look", texts)) == found

@@ -23,12 +23,11 @@ def of_toy(toy: Workspace, *specs: str) -> Groups:
 
 @pytest.fixture(scope="module")
 def groups(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Groups:
-    """The groups of the unchanged toy, which tests must not modify."""
     return of_toy(copy_toycar(tmp_path_factory.mktemp("groups")))
 
 
-def test_a_library_is_few_groups(groups: Groups) -> None:
-    """Variants are grouped by place, model and arguments; the trigger does not matter."""
+def test_variants_are_grouped_by_place_model_and_arguments(groups: Groups) -> None:
+    """The trigger does not matter."""
     sense = "toycar/sensing.py Sensor.sense"
     assert {group.what: (group.trigger, group.hold) for group in groups.values()} == {
         f"{sense} after_assign gap: offset(by, low, target=gap)": ("state or time", "to_end or while"),
@@ -40,8 +39,6 @@ def test_a_library_is_few_groups(groups: Groups) -> None:
 
 
 def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) -> None:
-    """An approval for the library applies to every campaign of the library, regardless of what the
-    campaign selects."""
     picked = of_plan(toycar, make_plan(toycar, "small", Choices(limit=3)))
     assert 1 < len(picked) <= 5
     for group in picked:
@@ -52,15 +49,14 @@ def test_a_group_is_the_same_in_a_campaign(toycar: Workspace, groups: Groups) ->
 
 
 def test_the_canary_is_reviewed_too(toycar: Workspace) -> None:
-    """The canary's group is listed even if no experiment belongs to it, because the canary runs before all
-    others."""
+    """The canary runs before all experiments."""
     plan = make_plan(toycar, "small", Choices(only='fault_type == "silence" and method == "guided"'))
     canary = next(g for g in of_plan(toycar, plan) if "after_assign offset" in g.what)
     assert canary.runs == 0
 
 
-def test_what_a_reader_sees_is_the_fault(groups: Groups) -> None:
-    """The diff has only the injected lines of the fault. The probe and the import form a separate group."""
+def test_the_diff_has_only_the_lines_of_the_fault(groups: Groups) -> None:
+    """The probe and the import form a separate group."""
     for group in groups.values():
         is_probe = group.what.startswith("the probe")
         assert ("_fi.observe" in group.diff) is ("+from toycar import _fi" in group.diff) is is_probe
@@ -78,11 +74,10 @@ def test_what_a_reader_sees_is_the_fault(groups: Groups) -> None:
         ("templates/_fi.py.j2", "_TINY = 1e-9", "_TINY = 1e-8", [], "offset"),
     ],
 )
-def test_what_a_decision_is_bound_to(
+def test_a_decision_depends_on_template_function_and_diff(
     toycar: Workspace, groups: Groups, file: str, old: str, new: str, changed: list[str], untouched: str
 ) -> None:
-    """A decision depends only on template, target function and diff. Other changes, even in the same file,
-    do not affect it."""
+    """Other changes, even in the same file, do not affect it."""
     before = groups
     path = toycar.library.parent / file
     assert old in path.read_text()
@@ -108,8 +103,8 @@ def test_drawn_values_are_not_bound(toycar: Workspace, groups: Groups) -> None:
     assert [group.faults for group in other] != [group.faults for group in groups.values()]
 
 
-def test_a_template_that_chooses_lines_by_numbers(toycar: Workspace) -> None:
-    """The group of a drawn choice has a diff for each choice. A decision covers all of them."""
+def test_a_drawn_choice_has_a_diff_for_each_choice(toycar: Workspace) -> None:
+    """A decision covers all of them."""
     template = toycar.templates / "offset.py.j2"
     text = template.read_text()
     template.write_text(text + "{% if by > 30 %}\n    {{ target }} = {{ target }}\n{% endif %}\n")
@@ -119,8 +114,7 @@ def test_a_template_that_chooses_lines_by_numbers(toycar: Workspace) -> None:
     assert sorted(m for shape in both.shapes for m in shape.members) == sorted(f.id for f in both.faults)
 
 
-def test_specs_are_chosen(toycar: Workspace, tmp_path: Path) -> None:
-    """Specs can be selected by globs and by files. Anything else is reported."""
+def test_specs_are_selected_by_globs_and_files(toycar: Workspace, tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text((toycar.library / "faults/sensor/lane.yaml").read_text())
     by_file, by_name = of_toy(toycar, str(path)), of_toy(toycar, "sensor/l*")
@@ -129,8 +123,7 @@ def test_specs_are_chosen(toycar: Workspace, tmp_path: Path) -> None:
         of_toy(toycar, "sensor/none")
 
 
-def test_another_target_has_other_groups(toycar: Workspace, groups: Groups) -> None:
-    """An id includes the target, so that a decision about one target does not apply to another target."""
+def test_an_id_includes_the_target(toycar: Workspace, groups: Groups) -> None:
     other = of_library(toycar, replace(toycar.manifest("toycar"), name="other"), specs=SENSOR)
     assert {group.what for group in other} == {group.what for group in groups.values()}
     assert not {group.id for group in other} & groups.keys()
@@ -138,7 +131,6 @@ def test_another_target_has_other_groups(toycar: Workspace, groups: Groups) -> N
 
 @pytest.mark.slow
 def test_the_whole_library_is_at_most_80_groups(clone: Workspace) -> None:
-    """The library has at most 80 groups. Each fault, in either reading, is in exactly one of them."""
     groups = of_library(clone, clone.manifest("openpilot"))
     assert 50 < len(groups) <= 80
     assert len({group.id for group in groups}) == len(groups)

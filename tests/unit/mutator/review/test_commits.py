@@ -34,7 +34,7 @@ def commit(root: Path, path: str, author: str) -> str:
 
 @pytest.fixture
 def root(toycar: Workspace) -> Path:
-    """The toy in a clone with `four_eyes`, written by Git Smith alone."""
+    """The toy in a clone with `four_eyes`, written by one author."""
     root = toycar.library.parent
     (root / "fault_library/reviews").mkdir()
     (root / "fault_library/reviews/toycar.yaml").write_text(HEAD)
@@ -57,9 +57,8 @@ def say(toy: Workspace, by: str, kind: Kind = Kind.APPROVE) -> Review:
     )
 
 
-def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root: Path) -> None:
-    """An author of any part of a group (spec, template, or its YAML) is refused under any signature.
-    Others may approve."""
+def test_the_last_author_cannot_approve(toycar: Workspace, root: Path) -> None:
+    """The author may have changed the spec, the template, or its YAML, and is refused under any signature."""
     for author in ("Git Smith", "smith@example.org", "git smith <other@example.org>"):
         with pytest.raises(MutatorError, match=r"changed group \w{12} last \(commit .*Git Smith") as caught:
             say(toycar, author)
@@ -72,9 +71,8 @@ def test_the_author_of_the_last_change_does_not_approve(toycar: Workspace, root:
 
 
 @pytest.mark.parametrize("path", [LANE, OFFSET, "templates/offset.yaml"])
-def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path, path: str) -> None:
-    """Only the last author of the spec or the template is refused, not earlier authors. Other files are
-    ignored."""
+def test_earlier_authors_may_approve(toycar: Workspace, root: Path, path: str) -> None:
+    """Other files are ignored."""
     sha = commit(root, path, "Jane Doe <jane@example.org>")
     commit(root, "fault_library/faults/sensor/distance.yaml", "Joe <joe@example.org>")
     with pytest.raises(MutatorError, match=sha[:12]):
@@ -83,8 +81,7 @@ def test_only_the_last_change_of_the_group_counts(toycar: Workspace, root: Path,
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> None:
-    """A co-author named in the commit's message is refused like the author."""
+def test_a_co_author_cannot_approve(toycar: Workspace, root: Path) -> None:
     commit(root, LANE, "Joe <joe@example.org>")
     words = "more\n\nCo-authored-by: Jane  Doe <jane@example.org>\nCo-Authored-By: Jim <jim@example.org>"
     git(root, "commit", "-q", "--amend", "-m", words)
@@ -94,9 +91,8 @@ def test_a_co_author_does_not_approve_either(toycar: Workspace, root: Path) -> N
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
-    """After a merge, the later of two authors still cannot approve their own change. The person who merges
-    is not an author."""
+def test_who_merges_is_not_an_author(toycar: Workspace, root: Path) -> None:
+    """The later of two authors still cannot approve their own change."""
     git(root, "checkout", "-qb", "side")
     commit(root, "templates/offset.yaml", "Joe <joe@example.org>")
     git(root, "checkout", "-q", "-")
@@ -107,8 +103,8 @@ def test_who_merges_has_changed_nothing(toycar: Workspace, root: Path) -> None:
     assert say(toycar, "Git Smith").decision(lane(toycar).id)
 
 
-def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> None:
-    """An uncommitted change, an untracked file, and a library without git are refused with a remedy."""
+def test_uncommitted_and_untracked_changes_are_refused(toycar: Workspace, root: Path) -> None:
+    """So is a library without git."""
     with (root / LANE).open("a") as file:
         file.write("# more\n")
     with pytest.raises(MutatorError, match=r"lane\.yaml: cannot determine .* not committed.*commit first"):
@@ -124,7 +120,7 @@ def test_what_git_does_not_know_is_refused(toycar: Workspace, root: Path) -> Non
 
 
 def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> None:
-    """The commit ends in `-dirty` if anything is uncommitted, except reviews."""
+    """The commit ends in `-dirty` if anything except reviews is uncommitted."""
     sha = git(root, "rev-parse", "HEAD")
     for _ in range(2):  # the second time the first decision is uncommitted
         decision = say(toycar, "Jane Doe").decision(lane(toycar).id)
@@ -133,8 +129,9 @@ def test_a_decision_keeps_the_librarys_commit(toycar: Workspace, root: Path) -> 
     assert library_commit(toycar) == f"{sha}-dirty"
 
 
-def test_who_is_at_work(toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The reviewer's name is the clone's own `user.name`, or empty."""
+def test_the_reviewer_is_gits_user_name(
+    toycar: Workspace, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("HOME", str(root))
     monkeypatch.delenv("XDG_CONFIG_HOME", raising=False)
     assert user_name(toycar) is None

@@ -49,8 +49,7 @@ def say(toy: Workspace, kind: Kind, *names: str, by: str = "Jane Doe", text: str
     return record(toy, "toycar", changes, {one.group.id: review.revision(one.group.id) for one in changes})
 
 
-def test_what_is_said_is_kept(toycar: Workspace) -> None:
-    """Decisions, remarks and flags in any alphabet are read as written, and so are their revisions."""
+def test_what_is_written_is_read(toycar: Workspace) -> None:
     say(toycar, Kind.APPROVE, "b", "0", text="fine")
     say(toycar, Kind.REJECT, "1", by="Ünï 'x' # \"y\"", text="a: b\\n")
     say(toycar, Kind.REMARK, "a", text="- [not yaml]")
@@ -68,9 +67,7 @@ def test_what_is_said_is_kept(toycar: Workspace) -> None:
     assert flag is not None and flag.by == "Joe" and flag.at == decision.at[:11] + flag.at[11:]  # type: ignore[index]
 
 
-def test_states(toycar: Workspace) -> None:
-    """A group is new until it is decided. Then it has its decision until something that the decision
-    depends on changes."""
+def test_a_group_is_new_decided_or_changed(toycar: Workspace) -> None:
     say(toycar, Kind.APPROVE, "a")
     found = say(toycar, Kind.REJECT, "b")
     other = replace(BOUND, function="e" * 16, template="1" * 16, calls="2" * 16)
@@ -101,13 +98,12 @@ def test_states(toycar: Workspace) -> None:
 def test_values_must_lie_within_the_approved_ones(
     toycar: Workspace, values: dict[str, tuple[float | str, ...]], changed: list[str]
 ) -> None:
-    """A subset of the approved values is approved. A value outside them is reported with both ranges."""
     found = say(toycar, Kind.APPROVE, "a")
     assert found.changed(replace(group("a"), values=values)) == changed
 
 
-def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
-    """A group has one block with one decision, and keeps its earlier remarks."""
+def test_a_new_decision_replaces_the_old_one(toycar: Workspace) -> None:
+    """The group keeps its earlier remarks."""
     say(toycar, Kind.APPROVE, "a", text="fine")
     found = say(toycar, Kind.REJECT, "a", by="Joe", text="no")
     assert found.describe(group("a")).startswith("rejected by Joe")
@@ -115,8 +111,8 @@ def test_a_new_decision_takes_the_old_ones_place(toycar: Workspace) -> None:
     assert len(found.entries) == 1
 
 
-def test_what_is_taken_back_is_gone(toycar: Workspace) -> None:
-    """If a decision is cleared, the remarks stay. An empty block is deleted."""
+def test_a_cleared_decision_is_deleted(toycar: Workspace) -> None:
+    """Remarks stay. An empty block is deleted."""
     say(toycar, Kind.APPROVE, "a", "b", text="fine")
     say(toycar, Kind.FLAG, "c")
     found = say(toycar, Kind.CLEAR, "a")
@@ -125,9 +121,7 @@ def test_what_is_taken_back_is_gone(toycar: Workspace) -> None:
     assert found.revision("c" * 12) and load_review(toycar, "toycar").revision("c" * 12) == ""
 
 
-def test_who_has_not_seen_the_latest_writes_nothing(toycar: Workspace) -> None:
-    """The error for a conflict names the groups and the other reviewer's decision. None of the changes is
-    written."""
+def test_a_decision_from_an_old_view_writes_nothing(toycar: Workspace) -> None:
     before = load_review(toycar, "toycar")
     say(toycar, Kind.REJECT, "a", by="Joe", text="too much")
     changes = [Change(group=group(name), kind=Kind.APPROVE, by="Jane") for name in ("a", "b")]
@@ -139,8 +133,6 @@ def test_who_has_not_seen_the_latest_writes_nothing(toycar: Workspace) -> None:
 
 
 def test_different_groups_never_conflict(toycar: Workspace) -> None:
-    """A decision about a group is accepted even if the reviewer has not seen the latest decisions about
-    other groups."""
     say(toycar, Kind.REJECT, "a", by="Joe")
     found = record(toycar, "toycar", [Change(group=group("b"), kind=Kind.APPROVE, by="Jane")], {})
     assert [found.state(group(name)) for name in "ab"] == [State.REJECTED, State.APPROVED]
@@ -161,7 +153,6 @@ for name in sys.argv[4]:
 
 
 def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
-    """Two processes that decide about different groups at the same time lose no decision."""
     words = [sys.executable, "-c", _WRITER, str(Path(__file__).parent), str(toycar.library)]
     shares = {"Jane": "02468ace", "Joe": "13579bdf"}
     with_pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "env": dict(os.environ)}
@@ -184,8 +175,7 @@ def test_two_writers_at_once_lose_nothing(toycar: Workspace) -> None:
     }
 
 
-def test_a_change_tells_what_it_is_part_of(tmp_path: Path) -> None:
-    """Each hunk names its section and function."""
+def test_each_hunk_names_its_section_and_function(tmp_path: Path) -> None:
     path, body = tmp_path / "seen.txt", "".join(f"{i}\n" for i in range(9))
 
     def text(value: int) -> str:
@@ -197,9 +187,8 @@ def test_a_change_tells_what_it_is_part_of(tmp_path: Path) -> None:
     assert [line.rpartition("@@ ")[2] for line in hunks] == ["diff", "calls: car/b.py B"]
 
 
-def test_what_was_seen_explains_a_change(toycar: Workspace) -> None:
-    """A changed group shows the diff between the approved and the current text, or no diff if the approved
-    text is not stored."""
+def test_a_changed_group_shows_the_diff_since_its_approval(toycar: Workspace) -> None:
+    """There is none if the approved text is not stored."""
     found = say(toycar, Kind.APPROVE, "a")
     now = group("a", replace(BOUND, diff="e" * 16), "+x = 2\n")
     assert found.changes(group("a")) == ""
@@ -234,8 +223,7 @@ def test_a_remark_is_one_line(toycar: Workspace) -> None:
     assert found.remarks("a" * 12)[0].text == "one two tabs"
 
 
-def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a failed write, the old file is there and no temporary file."""
+def test_a_failed_write_leaves_the_old_file(toycar: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
     path = say(toycar, Kind.APPROVE, "a").path
     before = path.read_bytes()
 
@@ -249,10 +237,9 @@ def test_it_is_written_whole_or_not_at_all(toycar: Workspace, monkeypatch: pytes
     assert sorted(one.name for one in path.parent.iterdir()) == ["seen", "toycar.yaml"]
 
 
-def test_the_shipped_library_takes_no_decisions(
+def test_a_library_from_a_wheel_takes_no_decisions(
     toycar: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A decision about a library from a wheel is refused, and nothing is written."""
     monkeypatch.setattr(shipped, "ARCHIVE", tmp_path)
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "cache"))
     library = tmp_path / "cache" / "mutator" / "shipped" / "0"

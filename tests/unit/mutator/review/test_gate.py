@@ -1,4 +1,4 @@
-"""With `--require-reviewed`, a plan with unapproved groups does not start."""
+"""With `--require-reviewed`, all groups of a plan must be approved."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ def decide(toy: Workspace, plan: Plan, kind: Kind = Kind.APPROVE, count: int | N
     record(toy, "toycar", changes, {change.group.id: review.revision(change.group.id) for change in changes})
 
 
-def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
+def test_an_approved_plan_runs(toycar: Workspace, plan: Plan, tmp_path: Path) -> None:
     """The run folder stores for the report who approved which group."""
     run = freeze(plan, tmp_path / "run", toycar).path
     assert gate.approval_summary(run) == ""
@@ -43,9 +43,7 @@ def test_what_is_approved_may_run(toycar: Workspace, plan: Plan, tmp_path: Path)
     )
 
 
-def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
-    """The error lists missing, changed and rejected groups, in this order, with reasons, experiments and a
-    remedy."""
+def test_groups_without_approval_are_named(toycar: Workspace, plan: Plan) -> None:
     groups = of_plan(toycar, plan)
     missing, changed, rejected = groups[0], groups[1], groups[-1]
     decide(toycar, plan)
@@ -67,8 +65,7 @@ def test_what_is_not_is_named(toycar: Workspace, plan: Plan) -> None:
     assert caught.value.exit_code == 1
 
 
-def test_what_the_canary_alone_needs_is_told_as_such(toycar: Workspace, plan: Plan) -> None:
-    """A group that no experiment uses is listed without a count of experiments."""
+def test_a_group_of_the_canary_alone_has_no_count(toycar: Workspace, plan: Plan) -> None:
     alone = [group for group in of_plan(toycar, plan) if not group.runs]
     with pytest.raises(CheckFailed) as caught:
         gate.approvals(toycar, plan)
@@ -84,16 +81,14 @@ def test_a_file_of_the_users_is_named_by_its_path(toycar: Workspace, tmp_path: P
     assert f"--campaign '{mine}'" in str(caught.value.remedy)
 
 
-def test_nothing_is_planned_without_approval(toycar: Workspace, tmp_path: Path) -> None:
-    """A refused run leaves no plan, so that it can be started again with other options."""
+def test_a_refused_run_leaves_no_plan(toycar: Workspace, tmp_path: Path) -> None:
     with pytest.raises(CheckFailed):
         run_campaign(toycar, "small", tmp_path / "run", reviewed=True)
     assert not (tmp_path / "run" / "run.json").exists()
 
 
-def test_a_run_goes_on_without_the_spec_file_of_its_campaign(toycar: Workspace, tmp_path: Path) -> None:
-    """A run's copy of a campaign cannot find a file that was next to the original. Its drawn faults are
-    still approved."""
+def test_a_resumed_run_does_not_need_the_campaigns_spec_file(toycar: Workspace, tmp_path: Path) -> None:
+    """Its drawn faults are still approved."""
     mine = tmp_path / "mine"
     mine.mkdir()
     spec = (toycar.library / "faults/sensor/lane.yaml").read_text()

@@ -1,4 +1,4 @@
-"""Shapes of patches: the parts that vary become holes, and the rest is text."""
+"""Shapes of patches: text with holes for the parts that vary."""
 
 from dataclasses import replace
 
@@ -29,9 +29,7 @@ def grouped(toy: Workspace, pairs: list[tuple[Fault, Trigger]]) -> list[Shape]:
     )
 
 
-def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
-    """The faults of a variant share a diff with holes. Filled with the values of one fault, it is the
-    patch of that fault."""
+def test_a_shape_with_a_faults_values_is_its_patch(toycar: Workspace) -> None:
     pairs = [(fault, trigger) for fault in faults(toycar, "longer") for trigger in (NEAR, FAR)]
     (shape,) = grouped(toycar, pairs)
     assert shape.members == tuple(str(i) for i in range(8))
@@ -40,9 +38,8 @@ def test_a_shape_is_its_members_patches(toycar: Workspace) -> None:
         assert shape.patch(i) == build(manifest, models, *pair).patch
 
 
-def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
-    """The table has the ids, the trigger's condition and the fault's parameter. Parts that all share stay
-    text."""
+def test_holes_have_names(toycar: Workspace) -> None:
+    """Parts that all share stay text."""
     pairs = [(fault, NEAR) for fault in faults(toycar, "nearer")]
     (shape,) = grouped(toycar, pairs)
     named = shape.with_named_holes(parameter_values(fault) for fault, _ in pairs)
@@ -53,7 +50,6 @@ def test_holes_are_what_varies_by_its_name(toycar: Workspace) -> None:
 
 
 def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
-    """`+ 3` and `- 3` fill the same hole of the same diff."""
     first, second, *_ = faults(toycar, "longer")
     (injection,) = second.injections
     less = replace(second, injections=(replace(injection, params=(("by", -3.0), ("target", "gap"))),))
@@ -61,8 +57,7 @@ def test_a_sign_is_part_of_the_value(toycar: Workspace) -> None:
     assert shape.values[1][shape.holes.index("1")] == "- 3"
 
 
-def test_not_a_number_is_a_value(toycar: Workspace) -> None:
-    """NaN fills a hole like any number."""
+def test_nan_fills_a_hole(toycar: Workspace) -> None:
     first, second, *_ = faults(toycar, "longer")
     (injection,) = second.injections
     params = (("by", float("nan")), ("target", "gap"))
@@ -72,8 +67,7 @@ def test_not_a_number_is_a_value(toycar: Workspace) -> None:
     assert named.values[1][named.holes.index("by")] == "+ float('nan')"
 
 
-def test_what_must_be_in_common(toycar: Workspace) -> None:
-    """Another place or another model gives another shape, and so does a bound that is set or not set."""
+def test_place_model_and_bound_are_part_of_the_shape(toycar: Workspace) -> None:
     longer, nearer = faults(toycar, "longer")[0], faults(toycar, "nearer")[0]
     shifted = faults(toycar, "shifted", "sensor/lane")[0]
     silent = faults(toycar, "no_data", "sensor/silence")[0]
@@ -81,16 +75,13 @@ def test_what_must_be_in_common(toycar: Workspace) -> None:
     assert len(grouped(toycar, pairs)) == len(pairs)
 
 
-def test_what_triggers_a_change_makes_no_other_shape(toycar: Workspace) -> None:
-    """Faults share a diff whether they have a context, a time or neither, and whether they hold for a time
-    or to the end."""
+def test_triggers_are_not_part_of_the_shape(toycar: Workspace) -> None:
     longer = faults(toycar, "longer")[0]
     triggers = (NEAR, replace(NEAR, hold=Hold.TO_END), at_time(3.0), always())
     assert len(grouped(toycar, [(longer, trigger) for trigger in triggers])) == 1
 
 
-def test_the_id_is_that_of_any_members(toycar: Workspace) -> None:
-    """The id of a shape does not depend on the faults from which it was built."""
+def test_the_id_of_a_shape_does_not_depend_on_its_members(toycar: Workspace) -> None:
     one, other, *_ = faults(toycar, "longer")
     (first,), (second,) = grouped(toycar, [(one, NEAR)]), grouped(toycar, [(other, FAR)])
     assert first.id == second.id
@@ -111,9 +102,7 @@ def test_any_text_is_given_back(patch: str) -> None:
     assert shape.patch(1) == patch
 
 
-def test_pristine_lines_are_never_cut() -> None:
-    """Numbers outside injected lines belong to the target, so patches that differ in them have different
-    shapes."""
+def test_numbers_outside_injected_lines_are_part_of_the_shape() -> None:
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,2 @@\n x = 3\n+y = 4  # fi:01234567\n"
     )
@@ -123,8 +112,7 @@ def test_pristine_lines_are_never_cut() -> None:
 
 
 def test_a_tag_of_several_injections_has_no_numbers() -> None:
-    """Mutants that change the same two values in a line have the same shape, regardless of the ids in its
-    tag."""
+    """Mutants that change the same two values have the same shape."""
     patch = (
         "diff --git a/a.py b/a.py\n--- a/a.py\n+++ b/a.py\n@@ -1,1 +1,1 @@\n-x = y, z\n"
         '+x = (0 if _fi.active("0123456a") else y), (0 if _fi.active("0123456b") else z)'

@@ -1,4 +1,4 @@
-"""Images before and after image effects, for any target. The injected lines are run to draw them."""
+"""Images before and after image effects."""
 
 import io
 from collections.abc import Callable
@@ -58,7 +58,7 @@ def grey(jpeg: bytes) -> float:
 
 
 def test_three_levels_of_an_effect(lit: Lit) -> None:
-    """The images are the target's own one, and those for the least, a middle and the largest value."""
+    """These are the least, a middle and the largest value."""
     workspace, group = lit()
     found = drawn(workspace, group)
     assert grey(found.before) == pytest.approx(90, abs=1)
@@ -70,9 +70,8 @@ def test_three_levels_of_an_effect(lit: Lit) -> None:
     assert [grey(one.after) for one in found.levels] == pytest.approx([100, 130, 250], abs=1)
 
 
-def test_one_level_is_asked_for(lit: Lit) -> None:
-    """The images of a level are a pair of files. The result is None for a level that a group with few
-    values lacks, and for a group without images."""
+def test_images_of_one_level_are_a_pair(lit: Lit) -> None:
+    """The result is None for a level that a group with few values lacks, and for a group without images."""
     workspace, group = lit(values="[10, 50]")
     manifest = workspace.manifest("toycar")
     pairs = [pictures.of_group(workspace, manifest, group, level) for level in (*LEVELS, "utmost")]
@@ -82,9 +81,8 @@ def test_one_level_is_asked_for(lit: Lit) -> None:
     assert pictures.of_group(workspace, manifest, probe, "most") is None
 
 
-def test_they_are_cached_by_what_they_show(lit: Lit, runs: list[str]) -> None:
-    """An image is not drawn twice. It is drawn again after a line of the effect changed or its entry was
-    damaged."""
+def test_images_are_cached_until_an_effect_changes(lit: Lit, runs: list[str]) -> None:
+    """A damaged entry is drawn again."""
     workspace, group = lit()
     first = drawn(workspace, group)
     runs.clear()
@@ -114,22 +112,19 @@ def test_groups_of_a_place_are_drawn_in_one_process(lit: Lit, runs: list[str]) -
     assert len(runs) == 1
 
 
-def test_a_picture_in_an_attribute(lit: Lit) -> None:
-    """Each value is applied to the target's original image, not to the result for another value."""
+def test_each_value_is_applied_to_the_original_image(lit: Lit) -> None:
     workspace, group = lit(values="[10, 20, 30]", target="self.picture", place="self.picture")
     assert [round(grey(one.after)) for one in drawn(workspace, group).levels] == [100, 110, 120]
 
 
-def test_what_is_more_severe() -> None:
-    """The more severe of two amounts changes the image more, whether it is larger or smaller. This holds
-    for amounts on both sides of zero."""
+def test_the_more_severe_amount_changes_the_image_more() -> None:
     assert pictures._by_severity([1.0, 2.0, 4.0]) == [0, 1, 2]
     assert pictures._by_severity([90.0, 40.0, 20.0]) == [2, 1, 0]
     assert pictures._by_severity([90.0, 40.0, 1.0, 30.0, 80.0]) == [2, 3, 1, 4, 0]
     assert pictures._by_severity([7.0]) == [0]
 
 
-def test_chance_does_not_turn_neighbours_round() -> None:
+def test_more_blobs_are_more_severe() -> None:
     """Nine blobs are less severe than ten, even if they cover a larger area."""
     assert pictures._by_severity([1.0, 3.0, 2.0, 5.0, 4.0]) == [0, 1, 2, 3, 4]
     assert pictures._by_severity([5.0, 3.0, 4.0, 1.0]) == [3, 2, 1, 0]
@@ -143,8 +138,8 @@ def test_chance_does_not_turn_neighbours_round() -> None:
         ("1 / 0", "no image of toycar/sensing.py Sensor.sense: ZeroDivisionError"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(lit: Lit, picture: str, said: str) -> None:
-    """An array of bytes is an image. An error of the target is reported with the target's own text."""
+def test_an_image_that_cannot_be_drawn_is_reported(lit: Lit, picture: str, said: str) -> None:
+    """An array of bytes is an image. An error of the target keeps its text."""
     with pytest.raises(MutatorError, match=said):
         drawn(*lit(picture=picture))
 

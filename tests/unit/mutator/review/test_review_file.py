@@ -1,5 +1,4 @@
-"""The review file can be merged under version control, reports mistakes with their line, and can be read
-in old versions."""
+"""The review file, in its current and its old format."""
 
 import shutil
 import subprocess
@@ -41,7 +40,6 @@ def written(path: Path, *names: str) -> Path:
 
 
 def test_what_is_written_is_read(tmp_path: Path) -> None:
-    """All content of the blocks and the head is read back. Written again, it gives the same text."""
     path = written(tmp_path / "toycar.yaml", "b", "a")
     found = review_file.load(path, "toycar")
     assert found == Content(entries={name * 12: entry(name) for name in "ab"}, four_eyes=True)
@@ -50,8 +48,7 @@ def test_what_is_written_is_read(tmp_path: Path) -> None:
     assert path.read_text() == text
 
 
-def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
-    """Decisions by two people about different groups merge under version control."""
+def test_decisions_about_different_groups_merge(tmp_path: Path) -> None:
     files = [written(tmp_path / f"{i}", *names) for i, names in enumerate(("018f", "08f", "08ef"))]
     merged = subprocess.run(["git", "merge-file", "-p", *files], capture_output=True, check=True).stdout
     (path := tmp_path / "toycar.yaml").write_bytes(merged)
@@ -80,8 +77,9 @@ def test_blocks_are_sorted_one_fact_a_line(tmp_path: Path) -> None:
         ('    by: "Jane Doe"\n', "", 7, "a decision without `by`"),
     ],
 )
-def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, words: str) -> None:
-    """A mistake is reported with the file, its line, and the invalid value."""
+def test_mistakes_are_reported_with_their_line(
+    tmp_path: Path, old: str, new: str, line: int, words: str
+) -> None:
     path = written(tmp_path / "toycar.yaml", "a", "b")
     assert old in path.read_text()
     path.write_text(path.read_text().replace(old, new, 1))
@@ -93,8 +91,8 @@ def test_hand_edits_are_checked(tmp_path: Path, old: str, new: str, line: int, w
 
 @pytest.fixture
 def old(tmp_path: Path) -> Path:
-    """A file with schema `review/1`: three changes, each under two kinds of triggers, and the probe. All
-    are approved."""
+    """A file with schema `review/1`: three changes, each under two kinds of triggers, and the probe, all
+    approved."""
     return shutil.copy(OLD, tmp_path / "toycar.yaml")
 
 
@@ -113,8 +111,7 @@ PROBE = "the probe, observing at toycar/go.py Drive.step after_assign now"
 
 
 def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
-    """A change is approved if it was approved under each kind of trigger. It does not depend on data that
-    was not stored."""
+    """A change is approved if it was approved under each kind of trigger."""
     found = {one.what: one for one in review_file.load(old, "toycar").entries.values()}
     assert set(found) == {GAP, OFFSET, SILENCE, PROBE}
     decision = found[OFFSET].decision
@@ -127,24 +124,20 @@ def test_an_old_file_has_a_decision_for_each_change(old: Path) -> None:
     assert found[PROBE].decision is not None and found[PROBE].decision.by == "reader"
 
 
-def test_an_old_rejection_counts(old: Path) -> None:
-    """If a change was rejected under one kind of trigger, it is rejected, by the same reviewer."""
+def test_an_old_rejection_applies_under_any_trigger(old: Path) -> None:
     edited(old, "d32713d465f1", "approved", "rejected")
     found = edited(old, "d32713d465f1", "Jane Doe", "Joe")[OFFSET].decision
     assert found is not None and (found.verdict, found.by) == (Verdict.REJECTED, "Joe")
 
 
-def test_old_decisions_about_different_things_do_not_hold(old: Path) -> None:
-    """If a change was approved with different diffs under two kinds of triggers, the approval is no longer
-    valid."""
+def test_old_approvals_of_different_diffs_are_invalid(old: Path) -> None:
     found = edited(old, "50d62901775b", "119123172159a027", "9" * 16)[OFFSET].decision
     assert found is not None
     assert found.bound == Bound(diff="0" * 16, function="3eff22e1db4eaddf", template="3307b2f6026230e8")
 
 
 def test_old_remarks_are_kept(old: Path) -> None:
-    """The remark of a decision becomes a remark for all kinds of triggers. A reviewer under one kind
-    counts as a reviewer."""
+    """A reviewer under one kind of trigger counts as a reviewer."""
     edited(old, "4f924f1dc5e6", 'remark: ""', 'remark: "once"')
     edited(old, "6ee7b871b4c7", 'remark: ""', 'remark: "twice"')
     entry = edited(old, "6ee7b871b4c7", "Jane Doe", "Joe")[SILENCE]

@@ -123,7 +123,6 @@ def original(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Pa
 
 @pytest.fixture
 def approved(original: Path, tmp_path: Path) -> Workspace:
-    """A copy of that toy, which a test may change."""
     root = shutil.copytree(original, tmp_path / "toy")
     return Workspace(library=root / "fault_library", templates=root / "templates")
 
@@ -152,11 +151,10 @@ def groups(toy: Workspace) -> tuple[Group, ...]:
         ("fault_library/faults/sensor/lane.yaml", "[2.4, 2.5]", "[1.6, 1.7]", set(), ""),
     ],
 )  # fmt: skip
-def test_exactly_what_is_affected_is_stale(
+def test_a_change_makes_exactly_its_groups_stale(
     approved: Workspace, file: str, old: str, new: str, stale: set[str], why: str
 ) -> None:
-    """A change in an effect, its base, a called helper or constant, a template, a function or a range
-    makes exactly the related approvals stale. The reason is given."""
+    """The reason is given."""
     path = approved.library.parent / file
     text = path.read_text()
     assert old in text
@@ -169,8 +167,9 @@ def test_exactly_what_is_affected_is_stale(
 
 
 @pytest.mark.slow
-def test_a_line_of_an_effect_of_openpilots(clone: Workspace, tmp_path: Path) -> None:
-    """Exactly those groups of the shipped library are stale whose effect, base or helper changed."""
+def test_a_change_in_a_shipped_effect_makes_exactly_its_groups_stale(
+    clone: Workspace, tmp_path: Path
+) -> None:
     target = tmp_path / "target"
     shutil.copytree(clone.library.parent / "target", target, ignore=shutil.ignore_patterns("__pycache__"))
     library = tmp_path / "fault_library"

@@ -27,8 +27,7 @@ HAZARD = {"outcome": Outcome.HAZARD, "t_manifest": 2.5}
 def test_counts_a_typical_and_the_worst_experiment(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun
 ) -> None:
-    """Only the group's experiments are counted. The examples are the median of the most frequent ending
-    and the worst of all."""
+    """They are the median of the most frequent ending and the worst of all."""
     plan = make_plan(toycar, "toy", Choices())
     lane = [e.id for e in plan.experiments if e.fault.fault_type == "lane"]
     bad = {name: {"hazards": (("H3", 3.0 + i),), **HAZARD} for i, name in enumerate(lane[:2])}
@@ -46,8 +45,10 @@ def test_counts_a_typical_and_the_worst_experiment(
     assert found.worst.verdict.endswith("after activation; no alert")
 
 
-def test_a_run_without_the_group(toycar: Workspace, tmp_path: Path, write_run: WriteRun) -> None:
-    """A group that the campaign left out has no verdict. The probe has none, because all mutants share it."""
+def test_a_group_without_experiments_has_no_verdict(
+    toycar: Workspace, tmp_path: Path, write_run: WriteRun
+) -> None:
+    """The probe has none, because all mutants share it."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run", only='fault_type == "silence"'))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -67,11 +68,10 @@ def test_results_that_came_later_count(toycar: Workspace, tmp_path: Path, write_
     assert of_group(RunFolder.open(tmp_path / "run"), group)
 
 
-def test_many_who_ask_at_once_read_the_table_once(
+def test_the_results_are_read_once_for_many_groups(
     toycar: Workspace, tmp_path: Path, write_run: WriteRun, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The results are not read for each group of a page, because reading a large table takes seconds and
-    much memory."""
+    """Reading a large table takes seconds and much memory."""
     run = RunFolder.open(write_run(toycar, tmp_path / "run"))
     results.ensure(run.path)
     groups = of_plan(toycar, make_plan(toycar, "toy", Choices()))
@@ -119,5 +119,4 @@ def row(**given: Any) -> Row:
     ],
 )
 def test_a_verdict_in_words(given: dict[str, Any], words: str) -> None:
-    """The verdict says what happened, when, and whether an alert came first."""
     assert verdict_of(row(**given), {"H1": "a crash"}) == words

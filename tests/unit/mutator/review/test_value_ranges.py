@@ -1,4 +1,4 @@
-"""The possible values of a group follow from its specs and not from the values that a seed draws."""
+"""The possible values of a group, which do not depend on the seed."""
 
 from dataclasses import replace
 
@@ -14,9 +14,7 @@ def faults(toy: Workspace, spec: str, seed: int = 0) -> list[Fault]:
     return list(expand(toy.spec(spec), seed, models=toy.fault_models(), manifest=toy.manifest("toycar")))
 
 
-def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
-    """For any seed, the range goes from the smallest to the largest end of all ranges, in the variable's
-    unit."""
+def test_a_range_covers_all_ranges_of_the_specs(toycar: Workspace) -> None:
     specs, models = {spec.name: spec for spec in toycar.specs()}, toycar.fault_models()
     for seed in (0, 1):
         longer, nearer = (
@@ -28,8 +26,7 @@ def test_a_range_is_what_may_be_drawn(toycar: Workspace) -> None:
         assert ranges_of(faults(toycar, "sensor/lane", seed)[:1], specs, models) == {"by": (0.0, 2.5)}
 
 
-def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
-    """If its spec is missing, a fault has only its own values."""
+def test_without_its_spec_a_fault_has_only_its_own_values(toycar: Workspace) -> None:
     fault = faults(toycar, "sensor/distance")[0]
     assert ranges_of([fault], {}, toycar.fault_models()) == {"by": (fault.value, fault.value)}
 
@@ -43,18 +40,17 @@ def test_without_the_spec_only_what_is_there_counts(toycar: Workspace) -> None:
         ([True, "word", None], None),  # the group's name has these
     ],
 )
-def test_what_is_no_number_is_a_word(
+def test_values_without_an_order_are_listed_next_to_the_range(
     toycar: Workspace, values: list[Value], found: tuple[object, ...] | None
 ) -> None:
-    """Values that cannot be ordered are listed next to the range."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = [replace(fault, injections=(replace(injection, params=(("by", one),)),)) for one in values]
     assert ranges_of(made, {}, toycar.fault_models()).get("by") == found
 
 
-def test_several_injections_are_numbered_and_limits_are_values(toycar: Workspace) -> None:
-    """The selected execution and instance count as values. A seed is drawn and does not."""
+def test_the_selected_execution_and_instance_are_values(toycar: Workspace) -> None:
+    """A seed is drawn and is no value."""
     fault = faults(toycar, "sensor/distance")[0]
     (injection,) = fault.injections
     made = replace(fault, injections=(injection, replace(injection, call=3, where="index == 2")))

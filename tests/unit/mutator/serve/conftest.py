@@ -1,5 +1,4 @@
-"""A server in this process, with a toy library and a made-up run folder, and a client that can send any
-request."""
+"""A server in this process with a toy library and a made-up run folder, and a client for any request."""
 
 import http.client
 import json
@@ -46,8 +45,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Client:
-    """A client of the server. It checks that no response contains the token, the secret, or a path on the
-    disk."""
+    """A client that checks that no response contains the token, the secret, or a path on the disk."""
 
     port: int
     place: Path
@@ -66,8 +64,7 @@ class Client:
         *,
         chunked: bool = False,
     ) -> Answer:
-        """Send a request as the server's page does, except for `headers`, in which None leaves a header
-        out."""
+        """Send a request as the server's page does. None in `headers` leaves a header out."""
         own: dict[str, str | None] = {"Host": f"{HOST}:{self.port}", "Cookie": f"mutator-{self.port}={TOKEN}"}
         if method == "POST":
             own |= {"Origin": self.origin, "Content-Type": "application/json"}

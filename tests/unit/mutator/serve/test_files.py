@@ -1,4 +1,4 @@
-"""From a run folder and the disk, only files of reports are served, whatever the request."""
+"""The server serves only the files of reports."""
 
 import json
 import shutil
@@ -43,8 +43,7 @@ SECRETS = ("secret.csv", "runs/night/run.json")
         "/api/jobs/{}/log",
     ],
 )
-def test_no_address_leads_out(client: Client, address: str) -> None:
-    """A name in an address is either the name of something that is served, or it is not found."""
+def test_an_address_outside_the_reports_is_not_found(client: Client, address: str) -> None:
     ways = [f"{step}/" * 2 + secret for step in STEPS for secret in SECRETS]
     for way in (*ways, *map(str, (client.place / secret for secret in SECRETS)), "/etc/passwd"):
         for path in (address.format(way), address.format(quote(way, safe=""))):
@@ -56,8 +55,8 @@ def test_no_address_leads_out(client: Client, address: str) -> None:
 
 
 @pytest.mark.parametrize("spec", ["../../secret.csv", "toy/fault_library/targets/toycar.yaml", "/etc/passwd"])
-def test_a_spec_is_no_path(client: Client, spec: str) -> None:
-    """A spec in an address is the name of one in the library. A file, as on the command line, is refused."""
+def test_a_spec_is_not_named_by_its_path(client: Client, spec: str) -> None:
+    """Only the command line accepts a file."""
     for given in (spec, quote(spec, safe="")):
         answer = client.get(f"/api/review/toycar?spec={given}")
         assert answer.status in (400, 404)
@@ -79,8 +78,7 @@ def test_only_what_a_report_shows_is_served(client: Client, name: str) -> None:
 
 
 def test_files_of_a_report_are_served(client: Client) -> None:
-    """Images and tables are served with their types. A part of a film is served if the request asks for a
-    range."""
+    """A part of a film is served if the request asks for a range."""
     assert client.get("/runs/night/results.csv").headers["content-type"].startswith("text/csv")
     picture = client.get(f"/runs/night/plots/{'0' * 16}-14.50s.jpg")
     assert (picture.headers["content-type"], picture.data) == ("image/jpeg", b"picture")
@@ -93,7 +91,6 @@ def test_files_of_a_report_are_served(client: Client) -> None:
 
 @pytest.fixture
 def linked(client: Client) -> Iterator[Path]:
-    """A separate run folder, in which a test may put links."""
     folder = client.place / "runs" / "linked"
     folder.mkdir()
     yield make_run(folder)
@@ -113,9 +110,8 @@ def test_a_link_to_a_file_is_not_followed(client: Client, linked: Path, name: st
 
 
 @pytest.mark.parametrize("name", ["plots", "report", "series"])
-def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: str) -> None:
-    """A linked folder in the path is not followed. No report is built and no job is started that would
-    write there."""
+def test_linked_folders_are_not_followed(client: Client, linked: Path, name: str) -> None:
+    """No report is built and no job is started that would write there."""
     outside = client.place / "outside"
     outside.mkdir(exist_ok=True)
     for kind in ("a.svg", "a.html", "index.js"):
@@ -134,7 +130,7 @@ def test_a_link_to_a_folder_is_not_followed(client: Client, linked: Path, name: 
 
 @pytest.mark.parametrize("name", ["report/figures/a.svg", "records/a.jsonl", "series/kept/.a.js.1"])
 def test_no_command_is_started_on_a_run_folder_with_a_link(client: Client, linked: Path, name: str) -> None:
-    """A link at any depth prevents a command, because its output would follow the link."""
+    """The command's output would follow the link."""
     end = client.place / "secret.csv"
     (linked / name).parent.mkdir(parents=True, exist_ok=True)
     (linked / name).symlink_to(end)
@@ -170,8 +166,7 @@ def test_a_run_folder_that_is_a_link_is_not_served(client: Client) -> None:
 )
 @pytest.mark.parametrize("name", ["series/index.js", "series/kept/0123456789abcdef.js"])
 def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: str) -> None:
-    """A series is a script of this server's origin, so it is served only if it is one call with one plain
-    string."""
+    """A series has the server's origin, so it is served only if it is one call with one plain string."""
     path = client.place / "runs/night" / name
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text.replace("NAME", path.stem))
@@ -180,8 +175,7 @@ def test_a_hostile_series_script_is_not_served(client: Client, name: str, text: 
 
 
 def test_series_are_served_as_they_are(client: Client) -> None:
-    """A series is served byte by byte and without an encoding, because the page relies on lengths in
-    bytes."""
+    """The page relies on lengths in bytes, so there is no encoding."""
     path = client.place / "runs/night/series/kept/0123456789abcdef.js"
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(script_of(path.stem, bytes(range(256)) + b'");alert(1);("'))
@@ -191,9 +185,8 @@ def test_series_are_served_as_they_are(client: Client) -> None:
     path.unlink()
 
 
-def test_a_hostile_report_runs_no_script(client: Client, linked: Path) -> None:
-    """A page that claims to be the newest report, including the stamp, gets a policy that allows none of
-    its scripts."""
+def test_a_report_with_a_forged_stamp_gets_a_strict_policy(client: Client, linked: Path) -> None:
+    """The policy allows none of its scripts."""
     assert client.get("/runs/linked/report/index.html").status == 200
     page = linked / "report" / "index.html"
     page.write_text(
@@ -215,8 +208,7 @@ def test_a_hostile_report_runs_no_script(client: Client, linked: Path) -> None:
 HOSTILE = "<img src=x onerror=alert(1)>"
 
 
-def test_names_and_words_of_runs_are_text(client: Client) -> None:
-    """The names of run folders and campaigns, and the errors of runs, are escaped everywhere."""
+def test_text_of_runs_is_escaped(client: Client) -> None:
     folder = client.place / "runs" / HOSTILE
     folder.mkdir()
     make_run(folder, campaign=HOSTILE)
@@ -248,6 +240,6 @@ def test_names_and_words_of_runs_are_text(client: Client) -> None:
         ("1.5 m/s and/or 3", "1.5 m/s and/or 3"),
     ],
 )
-def test_places_are_left_out(text: str, told: str) -> None:
-    """Of an absolute path, only the last part is shown. Other slashes stay as they are."""
+def test_only_the_last_part_of_a_path_is_shown(text: str, told: str) -> None:
+    """Slashes that belong to no absolute path stay."""
     assert without_places(text) == told

@@ -1,4 +1,4 @@
-"""Jobs, from the request to the files in the run folder. All tests share one small campaign of the toy."""
+"""Jobs, from the request to their files. All tests share one small campaign of the toy."""
 
 import shutil
 from collections.abc import Callable, Iterator
@@ -48,8 +48,8 @@ def experiment(client: Client) -> str:
     return next(plan_file.ids(client.place / "runs/first"))
 
 
-def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
-    """The run folder of a job is complete, is served, and can be compared with itself."""
+def test_the_run_of_a_job_is_complete(busy: Client) -> None:
+    """It can be compared with itself."""
     assert RunFolder.open(busy.place / "runs/first").finished
     [run] = busy.get("/api/runs").json["runs"]
     assert (run["key"], run["state"], run["done"]) == ("first", "finished", 2)
@@ -65,8 +65,7 @@ def test_a_campaign_is_one_of_the_command_line(busy: Client) -> None:
 
 
 @pytest.mark.slow
-def test_an_exact_plot_is_kept_in_the_run(busy: Client) -> None:
-    """Trace, plot and series are stored where `rerun --trace` stores them, and they are served."""
+def test_an_exact_plot_is_stored_where_rerun_stores_it(busy: Client) -> None:
     about = {"run": "first", "experiment": experiment(busy)}
     answer = busy.post("/api/jobs", {"kind": "plot", **about})
     job = busy.ended(answer.json["id"])
@@ -77,8 +76,8 @@ def test_an_exact_plot_is_kept_in_the_run(busy: Client) -> None:
 
 
 @pytest.mark.slow
-def test_a_try_has_its_plot(busy: Client) -> None:
-    """A try is stored in try/, next to the runs, and is not a run. The job links to its plot."""
+def test_a_try_is_stored_next_to_the_runs(busy: Client) -> None:
+    """The job links to its plot."""
     order = {"kind": "try", "spec": "sensor/lane", "scenario": "A", "trigger": "2", "value": 2.4}
     job = busy.ended(busy.post("/api/jobs", order).json["id"])
     assert job["state"] == "done", busy.get(f"/api/jobs/{job['id']}/log").json
@@ -88,7 +87,7 @@ def test_a_try_has_its_plot(busy: Client) -> None:
 
 
 def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
-    """Jobs run one at a time, so the second job waits. Both can be cancelled, and no process is left."""
+    """No process is left."""
     order = {"kind": "campaign", "campaign": "toy", "name": "second", "limit": 20, "workers": 2}
     first, second = (busy.post("/api/jobs", order).json["id"] for _ in range(2))
     states = {job["id"]: job["state"] for job in busy.get("/api/jobs").json["jobs"]}
@@ -105,7 +104,6 @@ def test_jobs_wait_and_are_cancelled(busy: Client) -> None:
 
 @pytest.mark.slow
 def test_a_job_that_fails_says_why(busy: Client) -> None:
-    """A job fails with the error line of the command line, without paths on the disk."""
     target = busy.place / "toy/tree/toycar/sensing.py"
     whole = target.read_text()
     target.write_text(whole + "# changed\n")
@@ -121,9 +119,8 @@ def job(**given: Any) -> Job:
     return Job(id="1", work=Work(order=order, title="again", words=()), **given)
 
 
-def test_what_a_job_prints_is_text() -> None:
-    """Control characters and paths are removed from a message, and markup stays text. If the output is too
-    long, its beginning is cut."""
+def test_the_output_of_a_job_is_plain_text() -> None:
+    """If it is too long, its beginning is cut."""
     made = job()
     made.hear(f"\x1b[31m/srv/data/{HOSTILE}\x07\u202e\n".encode())
     made.hear(b"\xff\xfe\n")
@@ -142,8 +139,8 @@ def test_progress_is_that_of_the_stage() -> None:
     assert made.progress is None
 
 
-def test_only_so_many_jobs_wait() -> None:
-    """The number of waiting jobs is limited, so that a page cannot fill the memory."""
+def test_the_number_of_waiting_jobs_is_limited() -> None:
+    """Otherwise a page could fill the memory."""
     jobs = Jobs(0, lambda work: None)
     for _ in range(50):
         assert jobs.submit(job().work).state is State.QUEUED

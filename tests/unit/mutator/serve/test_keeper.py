@@ -1,5 +1,4 @@
-"""The keeper of a job ends a command's processes when the server ends. The server holds the other end of
-its pipe."""
+"""The keeper of a job ends the job's processes when the server ends."""
 
 import os
 import signal
@@ -42,7 +41,7 @@ def eventually(holds: Callable[[], bool]) -> bool:
 
 
 def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subprocess.Popen[bytes], int]:
-    """Start the keeper of a script; return it and the server's end of the pipe."""
+    """Start the keeper of a script. Return it and the server's end of the pipe."""
     watched, hold = os.pipe()
     words = [sys.executable, "-c", KEEPER, str(watched), script, str(patience_s)]
     keeper = subprocess.Popen(words, cwd=folder, pass_fds=[watched], start_new_session=True)
@@ -51,7 +50,6 @@ def kept(folder: Path, script: str, patience_s: float = 10.0) -> tuple[subproces
 
 
 def is_gone(pid: int) -> bool:
-    """Whether a process has ended."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].startswith("Z")
     except OSError:
@@ -59,13 +57,12 @@ def is_gone(pid: int) -> bool:
 
 
 def child_of(folder: Path) -> int:
-    """The process id of the process that the command started."""
     assert eventually((folder / "started").exists)
     return int((folder / "started").read_text())
 
 
 def test_a_command_ends_in_order_with_its_server(tmp_path: Path) -> None:
-    """When the pipe is closed, the command is asked to end, and its children end as well."""
+    """When the pipe is closed, the command is asked to end, and so are its children."""
     keeper, hold = kept(tmp_path, COMMAND.format(IN_ORDER))
     child = child_of(tmp_path)
     os.close(hold)
@@ -95,7 +92,6 @@ def test_a_command_dies_with_its_keeper(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("code", [0, 1, 3])
 def test_the_exit_code_is_the_commands(tmp_path: Path, code: int) -> None:
-    """The keeper's exit code is that of the command, so that the server recognizes failed jobs."""
     keeper, hold = kept(tmp_path, f"raise SystemExit({code})")
     assert keeper.wait(20) == code
     os.close(hold)

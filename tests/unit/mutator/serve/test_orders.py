@@ -1,4 +1,4 @@
-"""Requests for jobs. Their names, ids and numbers are all checked before anything starts."""
+"""Requests for jobs are checked before anything starts."""
 
 import math
 from pathlib import Path
@@ -84,8 +84,7 @@ ABSENT = "0" * 16
         b"\xff\xfe",
     ],
 )
-def test_a_hostile_order_starts_nothing(client: Client, order: Any) -> None:
-    """A hostile request is refused as invalid input and creates no job."""
+def test_a_hostile_request_starts_no_job(client: Client, order: Any) -> None:
     answer = client.ask("POST", "/api/jobs", body=order)
     assert answer.status in (400, 404), answer.text
     assert answer.json["error"]["got"]
@@ -95,8 +94,8 @@ def test_a_hostile_order_starts_nothing(client: Client, order: Any) -> None:
 @pytest.mark.parametrize(
     "kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", ""]
 )
-def test_an_order_is_json(client: Client, kind: str) -> None:
-    """Data that a form on another site could send are not accepted as JSON."""
+def test_a_job_request_must_be_json(client: Client, kind: str) -> None:
+    """A form on another site cannot send JSON."""
     assert client.ask("POST", "/api/jobs", {"Content-Type": kind}, TRY).status == 415
     assert client.get("/api/jobs").json == {"jobs": []}
 
@@ -114,9 +113,7 @@ def work(desk: Desk, **order: Any) -> Work:
     return desk.work(json.dumps(order).encode())
 
 
-def test_orders_are_command_lines(desk: Desk) -> None:
-    """Each request becomes a verb of the command line, for this library, with each value as a separate
-    argument."""
+def test_requests_become_command_lines(desk: Desk) -> None:
     run = desk.runs.folder("first")
     experiment = next(plan_file.ids(run))
     place = (f"--library={desk.workspace.library}", f"--templates={desk.workspace.templates}")
@@ -146,7 +143,6 @@ def test_orders_are_command_lines(desk: Desk) -> None:
 
 @pytest.mark.parametrize("trigger", ["always", "10", "1.5", "near", "near_far/near", "t >= 2 and v_ego > 3"])
 def test_triggers_are_those_of_try(desk: Desk, trigger: str) -> None:
-    """A trigger is a context with or without its table, a time, `always`, or a condition."""
     assert f"--trigger={trigger}" in work(desk, **TRY, trigger=trigger).words
 
 
@@ -160,6 +156,5 @@ def test_a_new_run_is_no_link(desk: Desk, tmp_path: Path) -> None:
 
 
 def test_numbers_are_finite(desk: Desk) -> None:
-    """A fault's value in JSON cannot be infinite."""
     with pytest.raises(ValueError):
         work(desk, **TRY, value=math.inf)

@@ -1,5 +1,4 @@
-"""The requests of the review page's script. When the response arrives, the decision is in the library's
-file."""
+"""The requests of the review page's script."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -40,8 +39,9 @@ def decided(client: Client, *changes: tuple[str, str], by: str = "Jane", **more:
     return client.post(f"{API}?spec=sensor/*", body | {k: v for k, v in more.items() if k != "text"})
 
 
-def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """An approval, a remark and a flag are in the file, and a reloaded page has them."""
+def test_a_decision_is_in_the_file_and_on_the_reloaded_page(
+    reviewed: tuple[Client, list[str]], toycar: Workspace
+) -> None:
     client, (first, second, *_) = reviewed
     answer = decided(client, (first, "approve"), (second, "flag"))
     assert answer.status == 200
@@ -56,9 +56,9 @@ def test_what_is_decided_is_kept(reviewed: tuple[Client, list[str]], toycar: Wor
     assert client.get("/review/toycar?spec=sensor/*").status == 200
 
 
-def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: Workspace) -> None:
-    """If somebody else has decided since, this is reported and nothing is written. A reviewer who has seen
-    the other decision may decide."""
+def test_another_reviewers_decision_is_not_overwritten_unseen(
+    reviewed: tuple[Client, list[str]], toycar: Workspace
+) -> None:
     client, (first, second, *_) = reviewed
     group = next(
         one for one in of_library(toycar, toycar.manifest("toycar"), specs=("sensor/*",)) if one.id == first
@@ -73,10 +73,10 @@ def test_nobody_overwrites_another(reviewed: tuple[Client, list[str]], toycar: W
     assert decided(client, (first, "approve")).status == 200
 
 
-def test_another_diff_than_the_page_shows_is_not_approved(
+def test_a_diff_that_the_page_did_not_show_is_not_approved(
     reviewed: tuple[Client, list[str]], toycar: Workspace
 ) -> None:
-    """A page loaded before the target changed cannot be used to decide about lines that it does not show."""
+    """The target changed after the page was loaded."""
     client, [*names] = reviewed
     before = client.get(f"{API}?spec=sensor/*").json["groups"]
     sensing = toycar.library.parent / "tree/toycar/sensing.py"
@@ -120,7 +120,7 @@ def test_what_is_no_decision_is_refused(reviewed: tuple[Client, list[str]], toyc
 
 
 def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
-    """Scripts in a name, a remark or an address do not become markup. The data of the page are packed."""
+    """The data of the page are packed."""
     client, (first, *_) = reviewed
     assert decided(client, (first, "approve"), by=HOSTILE, text=f"</script>{HOSTILE}").status == 200
     answer = client.get(f"{API}?spec=sensor/*")
@@ -132,8 +132,7 @@ def test_remarks_are_text(reviewed: tuple[Client, list[str]]) -> None:
     assert HOSTILE not in client.get(f"/review/toycar?{HOSTILE.replace(' ', '%20')}=1").text
 
 
-def test_pictures_and_verdicts_are_asked_by_name(reviewed: tuple[Client, list[str]]) -> None:
-    """A group without images, an unknown level and an unknown run are "not found"."""
+def test_unknown_images_and_runs_are_not_found(reviewed: tuple[Client, list[str]]) -> None:
     client, (first, *_) = reviewed
     assert client.get(f"/review/toycar/{first}/picture/most-after.jpg?spec=sensor/*").status == 404
     assert client.get(f"{API}/{first}/typical?spec=sensor/*&run=none").status == 404

@@ -1,4 +1,4 @@
-"""Requests from elsewhere are refused, whatever they request."""
+"""The server refuses requests from elsewhere."""
 
 import base64
 import hashlib
@@ -19,30 +19,28 @@ ASKED = ("/", "/api/jobs", "/runs/night/report/index.html", "/assets/base.css", 
 )
 @pytest.mark.parametrize("path", ASKED)
 def test_another_host_is_refused(client: Client, path: str, host: str | None) -> None:
-    """A page under another name that resolves to this machine can read nothing, although the browser sends
-    its requests to this server."""
+    """Another name may resolve to this machine, so that the browser sends requests to this server."""
     answer = client.get(path, Host=host and host.format(port=client.port))
     assert answer.status in (400, 403)
     assert "<" not in answer.text
 
 
-def test_both_names_of_this_machine_will_do(client: Client) -> None:
-    """The address may have localhost as its host."""
+def test_the_host_may_be_localhost(client: Client) -> None:
     assert client.get("/", Host=f"localhost:{client.port}").status == 200
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1", "https://{own}", ""])
 @pytest.mark.parametrize("method", ["GET", "POST"])
 def test_another_origin_is_refused(client: Client, method: str, origin: str) -> None:
-    """A page of another origin can read and do nothing, whatever headers its browser sends."""
+    """No header makes a difference."""
     own = origin.format(own=f"127.0.0.1:{client.port}")
     answer = client.ask(method, "/api/jobs", {"Origin": own}, b"{}" if method == "POST" else None)
     assert answer.status == 403
     assert not [name for name in answer.headers if name.startswith("access-control")]
 
 
-def test_what_changes_anything_says_where_it_comes_from(client: Client) -> None:
-    """A POST is refused if it has no origin, or if the browser marks it as cross-site."""
+def test_a_post_needs_an_origin(client: Client) -> None:
+    """It is also refused if the browser marks it as cross-site."""
     assert client.ask("POST", "/api/jobs", {"Origin": None}, b"{}").status == 403
     for site in ("cross-site", "same-site", "anything"):
         assert client.get("/api/jobs", Sec_Fetch_Site=site).status == 403
@@ -53,17 +51,15 @@ def test_what_changes_anything_says_where_it_comes_from(client: Client) -> None:
     "cookie", [None, "", "mutator-{port}=", "mutator-{port}=wrong", "mutator-1=" + TOKEN, TOKEN]
 )
 @pytest.mark.parametrize("path", ASKED)
-def test_without_the_token_nothing_is_answered(client: Client, path: str, cookie: str | None) -> None:
-    """Without the right cookie, no page, file or error is sent. The cookie of another server is not
-    accepted."""
+def test_a_request_without_the_token_is_refused(client: Client, path: str, cookie: str | None) -> None:
+    """The cookie of another server is not accepted."""
     answer = client.get(path, Cookie=cookie and cookie.format(port=client.port))
     assert answer.status == 403
     assert "the server printed" in answer.text
 
 
 def test_the_token_becomes_a_cookie(client: Client) -> None:
-    """The first address sets a cookie that scripts cannot read and that other sites do not send. It
-    redirects to an address without the token."""
+    """Scripts cannot read the cookie, and other sites do not send it. The next address has no token."""
     answer = client.get(f"/?token={TOKEN}", Cookie=None)
     assert (answer.status, answer.headers["location"]) == (303, "/")
     cookie = answer.headers["set-cookie"].lower()
@@ -74,8 +70,7 @@ def test_the_token_becomes_a_cookie(client: Client) -> None:
 @pytest.mark.parametrize(
     "query", ["token=wrong", "token=", f"token={TOKEN}&token=wrong", f"token={TOKEN[:-1]}", "token=%ff"]
 )
-def test_a_wrong_token_is_refused(client: Client, query: str) -> None:
-    """A wrong token gives no access, even with a valid cookie."""
+def test_a_wrong_token_is_refused_despite_a_valid_cookie(client: Client, query: str) -> None:
     answer = client.get(f"/?{query}")
     assert answer.status == 403
     assert "set-cookie" not in answer.headers
@@ -83,7 +78,7 @@ def test_a_wrong_token_is_refused(client: Client, query: str) -> None:
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "PROPFIND"])
 def test_other_methods_are_refused(client: Client, method: str) -> None:
-    """Only GET and POST are accepted. A preflight from another origin gets no permission."""
+    """A preflight from another origin gets no permission."""
     answer = client.ask(method, "/api/jobs")
     assert answer.status == 405
     assert not [name for name in answer.headers if name.startswith("access-control")]
@@ -91,14 +86,14 @@ def test_other_methods_are_refused(client: Client, method: str) -> None:
 
 @pytest.mark.parametrize("chunked", [False, True])
 def test_a_long_body_is_refused(client: Client, chunked: bool) -> None:
-    """A body above the limit is refused, whether or not its length is stated."""
+    """The length may be stated or not."""
     body = b'{"kind": "' + b"x" * (MOST_BYTES + 10) + b'"}'
     assert client.ask("POST", "/api/jobs", body=body, chunked=chunked).status == 413
 
 
 @pytest.mark.parametrize("length", ["99999999999999999999999", "1000001"])
-def test_a_length_that_is_told_is_believed(client: Client, length: str) -> None:
-    """If the stated length is above the limit, the request is refused before the body arrives."""
+def test_a_request_with_a_long_stated_length_is_refused_at_once(client: Client, length: str) -> None:
+    """The body has not arrived."""
     answer = client.ask("POST", "/api/jobs", {"Content-Length": length}, b"{}")
     assert answer.status in (400, 413)
 
@@ -110,9 +105,8 @@ def test_a_body_within_the_limit_is_read(client: Client) -> None:
 
 
 @pytest.mark.parametrize("path", [*ASKED, "/runs/night/results.csv", "/?token=wrong"])
-def test_every_answer_has_the_policy(client: Client, path: str) -> None:
-    """The policy is part of every response: pages, files, refusals and errors. It allows only our scripts,
-    no framing, and no guessing of types."""
+def test_every_response_has_the_policy(client: Client, path: str) -> None:
+    """The policy allows only our scripts, no framing, and no guessing of types."""
     headers = client.get(path).headers
     policy = headers["content-security-policy"]
     assert policy.startswith("default-src 'none'; script-src 'self' 'sha256-")
@@ -127,7 +121,7 @@ def test_every_answer_has_the_policy(client: Client, path: str) -> None:
 
 
 def blocks(page: str, tag: str) -> list[str]:
-    """The content of the page's elements of this kind, as far as a browser would run or apply it."""
+    """The content of the page's elements of this kind that a browser would run or apply."""
     found = re.findall(rf"<{tag}( type=[^>]*)?>(.*?)</{tag}>", page, re.DOTALL)
     return [text for kind, text in found if not kind]
 
@@ -143,8 +137,7 @@ def check_policy(answer: Answer) -> None:
 
 
 @pytest.mark.parametrize("path", ["/runs/night/report/index.html", "/review/toycar"])
-def test_pages_run_by_the_policy(client: Client, path: str) -> None:
-    """The policy allows every script and style sheet of our pages."""
+def test_the_policy_allows_our_scripts_and_style_sheets(client: Client, path: str) -> None:
     answer = client.get(path)
     assert answer.status == 200, answer.text
     check_policy(answer)

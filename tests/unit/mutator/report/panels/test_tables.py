@@ -37,8 +37,7 @@ def names(run: RunFolder, suffix: str) -> set[str]:
     return {file.stem for file in (run.path / "report" / "tables").glob(f"*.{suffix}")}
 
 
-def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
-    """Each table is written in CSV and in Markdown, with the title that it has in the report."""
+def test_every_table_is_written_in_csv_and_markdown(run: RunFolder) -> None:
     markdown = tables_panel(ReportedRun.open(run, HERE)).markdown
     assert "alert_to_hazard" in names(run, "md") == names(run, "csv")
     for file in (run.path / "report" / "tables").glob("*.md"):
@@ -46,14 +45,13 @@ def test_every_table_is_a_file_of_its_own_twice(run: RunFolder) -> None:
 
 
 def test_without_a_library_no_time_is_censored(run: RunFolder) -> None:
-    """Without the target's manifest, the ends of runs are unknown, so there is no table of censored times."""
+    """Without the target's manifest, the ends of runs are unknown."""
     tables_panel(ReportedRun.open(run, None))
     assert "propagation" in names(run, "csv")
     assert "alert_to_hazard" not in names(run, "csv")
 
 
-def test_files_are_the_same_each_time(run: RunFolder) -> None:
-    """Each table has the same bytes when it is written again, in CSV and in Markdown."""
+def test_tables_are_written_byte_for_byte_again(run: RunFolder) -> None:
     contents = []
     for _ in range(2):
         tables_panel(ReportedRun.open(run, HERE))
