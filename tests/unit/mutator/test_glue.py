@@ -61,7 +61,7 @@ def test_a_run_writes_a_row_for_each_step(arguments: list[str]) -> None:
 
 
 def test_the_step_that_calls_end_is_the_last(arguments: list[str]) -> None:
-    """That step is recorded."""
+    """The last step is recorded."""
     trace, _ = driven([*arguments, "--caught"])
     assert trace["height"][-1] == 0.0
 
@@ -159,7 +159,7 @@ def test_only_numbers_can_be_recorded(value: object) -> None:
 
 @pytest.mark.parametrize("value", [True, 3, np.float32(2.5), np.array(4), float("inf")])
 def test_any_single_number_is_recorded(value: float, tmp_path: Path) -> None:
-    """These are numbers of Python and numpy, booleans, infinity and arrays without dimensions."""
+    """Numbers of Python and numpy, booleans, infinity and arrays without dimensions are single numbers."""
     run = Run(step_s=0.5, duration_s=1.0)
     run.record(a=value)
     run.write(tmp_path)

@@ -97,7 +97,7 @@ def test_a_name_cannot_lead_out_of_the_library(toy: Workspace) -> None:
 
 
 def test_spec_file_names_consist_of_module_and_fault_type(toy: Workspace) -> None:
-    """This makes names unique."""
+    """Such names are unique."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     path.write_text(path.read_text().replace("fault_type: distance", "fault_type: speed"))
     with pytest.raises(MutatorError, match=r"distance.yaml:2: .*faults/sensor/speed.yaml"):

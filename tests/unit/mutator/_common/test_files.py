@@ -77,7 +77,7 @@ def test_any_folder_can_be_removed(tmp_path: Path) -> None:
 
 
 def test_a_scratch_folder_is_deleted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It goes at the end of its `with` block, or together with its object."""
+    """The folder goes at the end of its `with` block, or together with its object."""
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     with ScratchFolder("x-") as folder:
         (folder / "y").mkdir()

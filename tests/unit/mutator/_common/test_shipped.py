@@ -125,7 +125,8 @@ def test_the_unpacked_library_is_not_written_to(archive: Path, tmp_path: Path) -
 def test_a_new_library_is_a_copy_that_finds_the_controller(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It differs from the shipped one only in the manifest's `root`, and its folder can be moved."""
+    """The copy differs from the shipped library only in the manifest's `root`, and its folder can be
+    moved."""
     write_library(tmp_path / "new")
     (tmp_path / "deep").mkdir()
     moved = (tmp_path / "new").rename(tmp_path / "deep" / "moved")

@@ -22,7 +22,7 @@ from mutator.errors import EXIT_HARNESS_ERRORS
     ],
 )
 def test_each_shortage_has_a_remedy(error: Exception, said: str) -> None:
-    """This holds even if it is the cause of another error."""
+    """The shortage may be the cause of another error."""
     found = shortage(error)
     assert found is not None
     assert said in str(found)

@@ -97,7 +97,7 @@ def test_the_frame_has_hazards(run: Run) -> None:
 
 
 def test_a_run_prints_as_one_line(run: Run) -> None:
-    """It gives access to its faults and provenance."""
+    """The run gives access to its faults and provenance."""
     assert repr(run) == "<Run first: 24 of 24 experiments of toy, as_described>"
     assert run.provenance["campaign"] == "toy"
     assert {"sources", "seed", "stretches", "choices"} <= set(run.provenance)
@@ -181,7 +181,8 @@ def test_an_experiment_has_a_diff_a_record_and_a_plot(driven: Run) -> None:
 
 
 def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
-    """It leaves no files unless the caller requests them. The series of a rerun that differs is not kept."""
+    """A rerun leaves no files unless the caller requests them. The series of a rerun that differs is not
+    kept."""
     experiment = driven.experiment(driven.results.index[0])
     trial = experiment.rerun()
     assert trial.same_as_record is True
@@ -199,7 +200,7 @@ def test_a_rerun_is_compared_with_the_campaigns_record(driven: Run) -> None:
 
 
 def test_two_processes_may_request_the_same_series(driven: Run) -> None:
-    """Each gets the complete series."""
+    """Each process gets the complete series."""
     [name] = driven.results.index
     library = driven.workspace.library
     look = (

@@ -18,7 +18,7 @@ def git(folder: Path, *words: str) -> None:
 
 
 def test_required_packages_include_indirect_ones() -> None:
-    """They have canonical names. mutator and its extras are left out."""
+    """Names are canonical. mutator and its extras are left out."""
     found = machine.required()
     assert {"numpy", "jinja2", "markupsafe", "pydantic-core", "execnet", "pytest-xdist"} <= found
     assert not {"hypothesis", "mypy", "tox", "import-linter", "mutator"} & found

@@ -38,8 +38,8 @@ def use(monkeypatch: pytest.MonkeyPatch, **other: str | None) -> None:
 
 
 def test_a_session_records_everything_that_affects_results(folder: RunFolder, toycar: Workspace) -> None:
-    """These are Python, platform, processor, BLAS, threads, and the packages of the harness and of golden
-    runs."""
+    """Python, platform, processor, BLAS, threads, and the packages of the harness and of golden runs are
+    recorded."""
     begin_stretch(folder, toycar, records="0001-*", accept=False)
     (stretch,) = RunFolder.open(folder.path).stretches
     assert stretch == folder.stretches[0]

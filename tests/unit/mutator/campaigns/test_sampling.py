@@ -46,7 +46,7 @@ def test_other_variants_fill_the_share_of_an_exhausted_one(many: list[Experiment
 
 
 def test_a_seed_always_picks_the_same_experiments(many: list[Experiment]) -> None:
-    """They keep their order. Another seed picks others."""
+    """Experiments keep their order. Another seed picks others."""
     picked = pick(many, 10, seed=1)
     assert [many.index(e) for e in picked] == sorted(many.index(e) for e in picked)
     assert pick(list(reversed(many)), 10, seed=1) == tuple(reversed(picked))

@@ -28,8 +28,8 @@ def mine(toycar: Workspace, tmp_path: Path) -> Path:
 def test_a_spec_file_is_found_relative_to_the_campaign(
     toycar: Workspace, mine: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Its faults are added to the library's, from any current folder. The canary may come from a spec file,
-    too. Random times need a latest time; guided triggers do not."""
+    """The spec file's faults are added to the library's, from any current folder. The canary may come from a
+    spec file, too. Random times need a latest time; guided triggers do not."""
     (tmp_path / "elsewhere").mkdir()
     monkeypatch.chdir(tmp_path / "elsewhere")
     plan = make_plan(toycar, mine)

@@ -40,7 +40,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 
 
 def test_the_shipped_study_is_installed() -> None:
-    """This fails if the installation is outdated."""
+    """The test fails if the installation is outdated."""
     assert "driving_agent_resilience" in study_names(), "install again: pip install -e . --no-deps"
     assert list(find_study("driving_agent_resilience").check(Workspace.find(root=CLONE))) == []
 

@@ -218,7 +218,7 @@ def test_comparing_again_gives_the_same_bytes(
 def test_a_long_page_shows_the_first_changes_without_scripts(
     found: Comparison, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It contains all rows."""
+    """The page contains all rows."""
     monkeypatch.setattr(pages, "SHOWN", 3)
     text = pages.write(found, tmp_path / "out").page.read_text()
     rows = [line for line in text.splitlines() if '<span class="change' in line]

@@ -74,7 +74,7 @@ def test_first_active_step(probe, trigger: Trigger, step: int | None) -> None:
 def test_the_activation_step_agrees_with_observe(
     probe, condition: str, armed_after_s: float, hold: Hold
 ) -> None:
-    """This holds for any observations, including standstill and NaN."""
+    """Observations may include standstill and NaN."""
     draw = random.Random(condition)
     code = probe(Trigger(name="x", condition=condition, armed_after_s=armed_after_s, hold=hold))
     for _ in range(10):

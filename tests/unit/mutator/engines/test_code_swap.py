@@ -58,7 +58,7 @@ GUARDED = 'if _fi.active("abc"):\n    y = y + 1.0'
 
 
 def test_changed_functions_are_found(changes: Changes) -> None:
-    """Each is listed by module and path, with its old and new code."""
+    """Each function is listed by module and path, with its old and new code."""
     found = changes(
         ("return [value", GUARDED), ("self.speed = speed", 'if not _fi.active("abc"):\n    speed = 0.0')
     )

@@ -66,7 +66,7 @@ def test_the_stored_reason_is_printable(fork: Fork, edit: Edit) -> None:
 
 @pytest.mark.slow
 def test_a_target_that_behaves_differently_step_by_step_is_not_forked(fork: Fork, edit: Edit) -> None:
-    """Its stepwise golden run differs from the command's golden run."""
+    """The stepwise golden run differs from the command's golden run."""
     edit(
         "tree/toycar/go.py",
         "    drive = begin(arguments)\n",

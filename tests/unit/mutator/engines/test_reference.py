@@ -69,7 +69,7 @@ def test_a_mutant_of_what_runs_read_shares_nothing(
 
 
 def test_a_good_run_leaves_its_trace_and_record(run: Run) -> None:
-    """Its CPU time is recorded."""
+    """The CPU time is recorded."""
     execution = run()
     assert (execution.status, execution.detail) == (Status.OK, "")
     assert {path.name for path in execution.out.iterdir()} == {"log.npz", "said.json"}
@@ -372,7 +372,7 @@ def test_jobs_run_in_order_and_clean_up(toycar: Workspace, manifest: TargetManif
 def test_two_threads_may_use_one_engine(
     run: Run, toycar: Workspace, manifest: TargetManifest, tmp_path: Path
 ) -> None:
-    """Each works in a separate folder."""
+    """Each thread works in a separate folder."""
     work = tmp_path / "side"
     work.mkdir()
     engine = ReferenceEngine(manifest, prepare_base(manifest, tmp_path / "base"), work, LIMITS)
@@ -391,13 +391,13 @@ def test_two_threads_may_use_one_engine(
 
 
 def test_the_report_lists_imported_packages(run: Run) -> None:
-    """It excludes the target's own, the standard library, and those that Python loaded before."""
+    """The target's own packages, the standard library, and modules that Python loaded before are excluded."""
     assert run().modules == ("numpy",)
     assert run(entry("import json, iniconfig.exceptions, toycar.world")).modules == ("iniconfig",)
 
 
 def test_the_report_lists_packages_of_shared_libraries(run: Run) -> None:
-    """Their versions affect results, even without an import."""
+    """The versions of shared libraries affect results, even without an import."""
     code = (
         "import ctypes; from importlib.util import find_spec; from pathlib import Path\n"
         "ctypes.CDLL(str(Path(find_spec('casadi').origin).with_name('libdaqp.so')))"

@@ -154,7 +154,7 @@ def test_a_hazard_over_several_steps_cannot_stop_a_run(
 
 
 def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edit) -> None:
-    """Its runs would never stop."""
+    """Runs of such a target would never stop."""
     edit(MANIFEST, ", terminal: true", "")
     edit(MANIFEST, ", terminal: speed > 90", "")
     with pytest.raises(MutatorError, match="no terminal hazard"):
@@ -172,14 +172,14 @@ def test_a_target_without_a_terminal_hazard_is_refused(stopping: Fork, edit: Edi
     ],
 )
 def test_any_terminal_condition_ends_a_drive(stopping: Fork, gap: float, speed: float, over: bool) -> None:
-    """It may use the trace's channels and values derived from them."""
+    """The condition may use the trace's channels and values derived from them."""
     source = stop_source(stopping.toy.manifest("toycar"))
     assert compiled(source)({"time": 1.0, "gap": gap, "speed": speed}) is over
 
 
 @pytest.mark.parametrize("terminal", ["max(d_rel, speed) <= 90", "min(speed, d_rel, t) > 40"])
 def test_stopping_agrees_with_the_verdict_on_the_trace(stopping: Fork, edit: Edit, terminal: str) -> None:
-    """This holds even if a value is NaN."""
+    """A value may be NaN."""
     edit(MANIFEST, "terminal: speed > 90", f"terminal: '{terminal}'")
     manifest = stopping.toy.manifest("toycar")
     over = compiled(stop_source(manifest))

@@ -1,5 +1,5 @@
-"""What watching a run records about its tree. It runs in a separate process, because the watcher replaces
-the functions that it watches."""
+"""What watching a run records about its tree. The watcher replaces the functions that it watches, so it runs
+in a separate process."""
 
 import json
 import subprocess

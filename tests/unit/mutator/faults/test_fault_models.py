@@ -74,7 +74,8 @@ def test_the_examples_of_the_models_hold(clone: Workspace, name: str) -> None:
 
 
 def test_the_digest_covers_which_models_raise_on_purpose(folder: Path, clone: Workspace) -> None:
-    """Verdicts depend on it. These models do not run the target's own code as it is written."""
+    """Verdicts depend on these models. Models that raise on purpose do not run the target's own code as it is
+    written."""
     known = clone.fault_models()
     assert [model.name for model in known if model.raises] == sorted(RAISING)
     path = folder / "scale.yaml"

@@ -113,7 +113,7 @@ def test_the_cap_limits_the_number_of_values() -> None:
 def test_a_variable_may_be_stuck_at_a_value_without_a_unit(
     toy: Workspace, unit: str, written: str, value: object
 ) -> None:
-    """Such a value is a truth value, None or a text."""
+    """The value may be a truth value, None or a text."""
     path = toy.library / "faults" / "sensor" / "distance.yaml"
     old = "model: offset\n          unit: m\n          params: {by_m: error}"
     assert old in path.read_text()

@@ -70,7 +70,7 @@ def test_times_need_a_run_with_both_events(frame: pd.DataFrame) -> None:
 
 
 def test_a_figure_drawn_again_has_the_same_bytes(frame: pd.DataFrame, tmp_path: Path) -> None:
-    """This holds for SVG and PNG. The SVG has names as text."""
+    """The format is SVG or PNG. An SVG has names as text."""
     contents = []
     for _ in range(2):
         write_drawings(drawings(frame)[:1], tmp_path)

@@ -105,7 +105,7 @@ def test_patch_tree_and_digest_agree(toy: Workspace, tmp_path: Path) -> None:
 
 
 def test_ids_depend_on_everything_that_makes_a_mutant(toy: Workspace) -> None:
-    """These are the fault, the trigger, the target and the templates. Equal ids mean equal bytes."""
+    """The fault, the trigger, the target and the templates determine the id. Equal ids mean equal bytes."""
     faults = toy_faults(toy)
     first = build(toy, faults["longer"])
     assert first == build(toy, faults["longer"])

@@ -188,7 +188,7 @@ def test_a_huge_number_has_no_anchor() -> None:
 
 
 def test_two_injections_into_one_expression_are_refused() -> None:
-    """Their effects could not be separated."""
+    """The effects of the injections could not be separated."""
     with pytest.raises(MutatorError, match="two injections into one expression"):
         changed(SOURCE, (location("value", "gap - LIMIT"), "0"), (location("value", "LIMIT"), "0"))
 

@@ -136,7 +136,8 @@ def load(clone: Workspace) -> Iterator[Callable[..., tuple[Any, Any]]]:
 def test_a_fixed_value_changes_while_the_fault_is_active(
     load: Callable[..., tuple[Any, Any]], place: str
 ) -> None:
-    """It is restored at the next inactive step and when a run starts again. Each active step counts once."""
+    """The value is restored at the next inactive step and when a run starts again. Each active step counts
+    once."""
     location, value = PLACES[place]
     module, fi = load(location)
     original, seen = value(module), []
@@ -197,7 +198,7 @@ def test_a_model_that_changes_no_value_is_refused(clone: Workspace) -> None:
 
 
 def test_modules_that_import_a_constant_are_found(tmp_path: Path) -> None:
-    """They may import it through other modules. Imports inside functions are ignored."""
+    """Modules may import a constant through other modules. Imports inside functions are ignored."""
     files = {
         "pkg/__init__.py": "from .limits import LIMIT\n",
         "pkg/limits.py": "LIMIT = 5\n",

@@ -8,7 +8,7 @@ from mutator.workspace import Workspace
 
 
 def test_injected_lines_are_recognized(clone: Workspace) -> None:
-    """They are the import, the observation and the guards, with their ids."""
+    """The import, the observation, the guards and their ids are recognized."""
     lines = {
         injected_lines.import_statement("car"): ("probe", 0, False),
         injected_lines.tagged(injected_lines.observe_call([("t", "now.time")]), injected_lines.OBSERVE_TAG): (

@@ -143,7 +143,7 @@ def test_the_tag_of_a_selecting_line_asks_the_probe(clone: Workspace) -> None:
     ],
 )
 def test_a_condition_with_side_effects_is_refused(text: str) -> None:
-    """It calls, calculates or sets something, or uses the probe."""
+    """A condition must not call, calculate or set anything, or use the probe."""
     with pytest.raises(ValueError, match=r".*"):
         instance_condition(text)
 
@@ -182,6 +182,6 @@ def test_a_condition_is_stored_in_canonical_form() -> None:
     ],
 )
 def test_invalid_selections_in_yaml_are_refused(given: dict[str, Any], words: str) -> None:
-    """These are invalid conditions, contradictions, and settings that select all instances."""
+    """Invalid conditions, contradictions, and settings that select all instances are refused."""
     with pytest.raises(MutatorError, match=words):
         read(**given)

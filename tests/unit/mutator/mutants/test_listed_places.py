@@ -66,7 +66,6 @@ def shipped() -> Workspace:
 
 
 def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> None:
-    """Each place has its line."""
     found = [(one.line, {k: v for k, v in one.at.items() if k not in ("file", "function")}) for one in listed]
     assert found[:3] == [
         (1, {"constant": "LIMIT"}),
@@ -92,7 +91,7 @@ def test_an_ambiguous_place_is_listed_with_nth(listed: list[ListedPlace]) -> Non
 
 
 def test_each_listed_anchor_finds_its_own_line(listed: list[ListedPlace]) -> None:
-    """It is valid in a spec and is listed once."""
+    """Each anchor is valid in a spec and is listed once."""
     source = Source(path=Path("spec.yaml"), data={}, lines={})
     assert [AtModel(**one.at).location(source, ()) for one in listed] == [one.location for one in listed]
     file = parse_file("m.py", SOURCE, Path("x"))

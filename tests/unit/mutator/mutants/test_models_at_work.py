@@ -193,7 +193,7 @@ def test_a_return_is_not_repeated(toy: Make) -> None:
 
 
 def test_two_arguments_are_swapped(toy: Make) -> None:
-    """They may have keywords. The other arguments keep their order."""
+    """Arguments may have keywords. The other arguments keep their order."""
     source = "def f(x):\n    return dict(a=x, b=x + 1, c=(x == 1))\n"
     made = toy(source, AnchorKind.RESULT, "dict", "swapped_arguments", first=1, second=3)
     assert made.run(".x", lambda: 1) == [{"a": 1, "b": 2, "c": True}, {"a": True, "b": 2, "c": 1}]
@@ -232,7 +232,7 @@ def test_a_model_of_a_call_needs_a_call_anchor(toy: Make, model: str, kind: Anch
     ("holds", "taken"), [("inverted", [1, 2, 2]), ("always", [1, 1, 1]), ("never", [2, 2, 2])]
 )
 def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: list[int]) -> None:
-    """It is still evaluated."""
+    """The condition is still evaluated."""
     asked: list[int] = []
     source = "def f(x):\n    if ask(x):\n        return 1\n    return 2\n"
     made = toy(source, AnchorKind.CONDITION, "ask(x)", "wrong_branch", holds=holds)
@@ -252,7 +252,7 @@ def test_a_branch_condition_is_negated_or_fixed(toy: Make, holds: str, taken: li
     ],
 )
 def test_an_exception_is_raised_while_active(toy: Make, kind: AnchorKind, name: str) -> None:
-    """This works both at a statement and in an expression."""
+    """The anchor may be a statement or an expression."""
     made = toy("def f(x):\n    return x\n", kind, name, "exception", error="TimeoutError")
     assert made.run(".", lambda: 1) == [1]
     with pytest.raises(TimeoutError, match="injected fault"):
@@ -299,7 +299,6 @@ def test_the_drift_of_an_expression_grows(toy: Make) -> None:
 def test_contradicting_parameters_are_refused(
     toy: Make, model: str, params: dict[str, Value], said: str
 ) -> None:
-    """Each contradiction has its own message."""
     with pytest.raises(MutatorError, match=said):
         toy("def f(x):\n    return x\n", AnchorKind.RETURN_VALUE, "", model, **params)
 

@@ -30,7 +30,7 @@ def parsed(source: str = SOURCE) -> ParsedFile:
 
 
 def test_both_parsers_agree_on_places() -> None:
-    """It does not matter what precedes a statement on its line."""
+    """Anything may precede a statement on its line."""
     file = parsed()
     told = [f.place for functions in file.functions.values() for f in functions]
     told += [
@@ -57,7 +57,7 @@ def test_a_statement_at_another_line_is_refused(kind: AnchorKind, monkeypatch: p
 
 
 def test_a_line_that_libcst_loses_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """This does not depend on the check of the whole file's bytes."""
+    """The check of the whole file's bytes is left out."""
 
     def unchecked(data: bytes, where: Path) -> object:
         module = cst.parse_module(data)

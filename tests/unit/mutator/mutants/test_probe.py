@@ -201,7 +201,7 @@ def test_the_delay_becomes_constant(clone: Workspace) -> None:
 
 
 def test_stored_values_of_a_run_outlast_an_activation(clone: Workspace) -> None:
-    """They are separate from those of other injections, and are discarded at the end of the run."""
+    """Values of other injections are separate. All stored values are discarded at the end of the run."""
     fi = probe(clone)
     made = iter(range(10))
     seen = []
@@ -256,8 +256,8 @@ FLIPS = [
 
 @pytest.mark.parametrize(("value", "bit", "result"), FLIPS, ids=lambda one: str(getattr(one, "dtype", one)))
 def test_a_bit_flip_keeps_the_type(clone: Workspace, value: Any, bit: int, result: Any) -> None:
-    """It changes a number, or each number of an array. The original value is not modified, and a second flip
-    restores it."""
+    """A flip changes a number, or each number of an array. The original value is not modified, and a second
+    flip restores it."""
     fi, before = probe(clone), copy.deepcopy(value)
     flipped = fi.flip_bit(value, bit)
     assert np.array_equal(flipped, result)

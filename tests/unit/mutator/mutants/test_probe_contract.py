@@ -39,7 +39,6 @@ def see(fi: Any, *, near: bool) -> None:
 
 
 def test_the_evaluated_decision_agrees_with_observe(clone: Workspace) -> None:
-    """Both are asked in the first active step."""
     code = compile(source(clone), "_fi", "exec")
     armed_t, holds = contract.decision(code)
     module: dict[str, Any] = {}

@@ -105,7 +105,7 @@ def fault(value: Value, **location: object) -> Fault:
 
 
 def test_a_change_is_reused_for_another_number(toy: Workspace) -> None:
-    """It is not reused for another sign, another type or a non-finite value."""
+    """Another sign, another type or a non-finite value needs a new change."""
     manifest, models = toy.manifest("toy"), toy.fault_models()
     known = known_changes(manifest.tree, SENSOR)
     counts = []

@@ -35,7 +35,7 @@ def spliced(text: str | bytes, kind: AnchorKind, name: str = "x", *, guard: bool
 
 
 def test_lines_are_inserted_next_to_the_statement() -> None:
-    """They have its indentation and a tag each."""
+    """Lines have the statement's indentation and a tag each."""
     text = "def f(x):\n    # why\n    x = 1  # set\n    # then\n    return x\n"
     assert spliced(text, AnchorKind.AFTER_ASSIGN).decode() == (
         "def f(x):\n    # why\n    x = 1  # set\n"
@@ -98,7 +98,7 @@ def test_a_guard_indents_the_statement_it_wraps() -> None:
 
 
 def test_a_guard_does_not_indent_the_inside_of_a_string() -> None:
-    """This would change the string."""
+    """Indenting these lines would change the string."""
     text = 'def f(x):\n    g("""a\n    b""", f"""{x}\n""")\n'
     assert spliced(text, AnchorKind.BEFORE_CALL, "g", guard=True).decode() == (
         'def f(x):\n    if not _fi.active("ab12"):  # fi:ab12 guard:1\n'
@@ -179,7 +179,7 @@ def test_a_snippet_that_the_encoding_lacks_is_refused() -> None:
 
 
 def test_the_import_of_the_probe_is_tagged() -> None:
-    """It goes below the docstring and `__future__` imports."""
+    """The import goes below the docstring and `__future__` imports."""
     file = parsed('"""Doc."""\nfrom __future__ import annotations\n\nimport os\n')
     result = splicing.joined(splicing.apply_edits(file, [splicing.probe_import(file, "pack")]))
     assert result.decode() == (

@@ -68,7 +68,7 @@ def test_the_controllers_step_ranks_first() -> None:
 
 
 def test_required_arguments_are_listed() -> None:
-    """Those of the step and of the constructor are listed, keyword ones included."""
+    """Arguments of the step and of the constructor are listed, keyword ones included."""
     first, *_ = candidates(car=CAR)
     assert first.needs == ("speed", "wanted", "dt")
     assert first.builds == ("gain", "limit")

@@ -150,7 +150,7 @@ def test_the_message_names_the_line_or_the_reason() -> None:
 
 
 def test_an_intended_exception_is_a_crash() -> None:
-    """It does not excuse another injection."""
+    """The exception does not excuse another injection."""
     assert assign_blame(execution((INJECTED,)), FILES, ("0a1b2c3d",))[0] is Status.CRASHED
     assert assign_blame(execution((INJECTED,)), FILES, ("ffffffff",))[0] is Status.INVALID_MUTANT
     assert assign_blame(execution((PROBE, GUARD)), FILES, ("0a1b2c3d",))[0] is Status.HARNESS_ERROR
@@ -165,8 +165,7 @@ def test_a_fault_is_not_blamed_before_its_activation(status: Status, stacks: tup
 
 
 def test_a_run_without_an_exception_keeps_its_status() -> None:
-    """Such a run ends with a timeout or silently after the activation, or with a harness error at any
-    time."""
+    """A run may time out or end silently after the activation, or be a harness error at any time."""
     for status in (Status.CRASHED, Status.TIMEOUT):
         assert assign_blame(execution(status=status, probe=False), FILES, ()) == (status, "why")
     told = assign_blame(execution(status=Status.HARNESS_ERROR, active=False), FILES, ())
@@ -195,7 +194,7 @@ def test_a_missing_report_is_a_harness_error() -> None:
 
 
 def test_the_reported_position_is_the_targets_innermost_line() -> None:
-    """It is never a line of the probe."""
+    """The position is never a line of the probe."""
     error = error_of(execution((PROBE, INJECTED, ELSEWHERE)).raised)
     assert error == RunError(kind="ValueError", message="no", place="car/radar.py:5")
     assert error_of(None) is None

@@ -70,7 +70,7 @@ def test_deviation_columns_use_the_first_word_of_a_channel(channels: list[str], 
     ],
 )
 def test_names_are_read_as_text(column: str, text: bool) -> None:
-    """They may look like numbers. The columns that a target adds are numbers."""
+    """Names may look like numbers. The columns that a target adds are numbers."""
     assert is_text(column) is text
 
 
@@ -102,7 +102,7 @@ def test_a_hazard_with_an_existing_column_is_refused(toy: Workspace, hazards: st
     ],
 )
 def test_a_metric_with_an_existing_column_is_refused(toy: Workspace, metrics: list[str], at: str) -> None:
-    """It must not make another column look like a hazard, either."""
+    """A metric must not make another column look like a hazard, either."""
     path = toy.library / "targets" / "toy.yaml"
     lines = [f"  {name}: {{max: speed, unit: m/s, worse: higher, about: x}}" for name in metrics]
     path.write_text("\n".join([path.read_text().rstrip(), "metrics:", *lines, ""]))

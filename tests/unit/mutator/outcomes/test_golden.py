@@ -91,7 +91,7 @@ def test_without_a_tolerance_any_difference_counts(step: float, first: float) ->
 
 
 def test_a_difference_within_its_tolerance_does_not_count() -> None:
-    """Its size is stored."""
+    """The size of the difference is stored."""
     channel = Channel(name="gas", unit="-", tolerance=0.1)
     difference = compare(trace(gas=[1, 1, 1]), trace(gas=[1, 1.05, 1]), [channel], "t")
     assert difference.t_first is None
@@ -133,7 +133,7 @@ def test_trace_is_read(tmp_path: Path) -> None:
 
 
 def test_an_invalid_trace_is_a_bad_output(tmp_path: Path) -> None:
-    """It is missing, incomplete, without a channel, or of unequal lengths."""
+    """A trace is invalid if it is missing, incomplete, without a channel, or of unequal lengths."""
     path = tmp_path / "trace.npz"
     with pytest.raises(BadOutput):
         load_trace(MANIFEST, tmp_path)
@@ -154,7 +154,7 @@ def test_an_invalid_trace_is_a_bad_output(tmp_path: Path) -> None:
 
 
 def test_an_unusual_file_is_a_bad_output(tmp_path: Path) -> None:
-    """These are a file of a single array, a member with an invalid header, and a pipe."""
+    """A file of a single array, a member with an invalid header, and a pipe are bad outputs."""
     path = tmp_path / "trace.npz"
     with path.open("wb") as file:
         np.save(file, T)

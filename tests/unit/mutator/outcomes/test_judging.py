@@ -106,7 +106,7 @@ def test_a_hazard_occurs_when_its_condition_has_held_long_enough(
     ],
 )
 def test_metrics_end_with_the_first_terminal_hazard(write: Write, metric: str, value: float | None) -> None:
-    """Its step is included."""
+    """The step of the hazard is included."""
     what = metric.strip("{}")
     found = judged(
         write(

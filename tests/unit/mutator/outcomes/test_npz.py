@@ -45,7 +45,7 @@ def test_the_fast_reader_equals_numpy() -> None:
     ],
 )
 def test_unusual_files_are_left_to_numpy(data: bytes) -> None:
-    """They have compressed members, other orders or types, or are no .npz files."""
+    """Compressed members, other orders and types, and other kinds of files are unusual."""
     assert npz.members(data) is None
 
 

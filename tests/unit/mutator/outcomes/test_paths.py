@@ -267,7 +267,7 @@ def test_a_fault_outside_all_components_has_no_path() -> None:
 
 
 def test_without_a_structure_components_follow_by_role() -> None:
-    """Those with the same role keep the order of the manifest. The first one after those reached, which
+    """Components with the same role keep the order of the manifest. The first one after those reached, which
     stayed equal, stopped the fault."""
     ways = Ways(CHANNELS[::-1], None)
     found = path("eyes", ways=ways, outcome=Outcome.MASKED, angle=1.0)
@@ -297,7 +297,7 @@ def test_a_chain_has_feedback_too() -> None:
 
 
 def test_a_path_through_a_loop_has_each_component_once() -> None:
-    """It ends at the process."""
+    """The path ends at the process."""
     links: dict[str, Any] = {name: one.model_dump(by_alias=True) for name, one in STRUCTURE.links.items()}
     links["back"] = {"from": "speed", "to": "finder", "label": ""}
     circle = replace_links(links)

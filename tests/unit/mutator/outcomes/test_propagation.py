@@ -25,7 +25,7 @@ def left(golden: dict, faulty: dict, *channels: Channel, t_end: float | None = N
 
 
 def test_a_channel_leaves_golden_when_it_exceeds_its_tolerance() -> None:
-    """Its deviation is its largest difference."""
+    """The channel's deviation is its largest difference."""
     faulty = {"a": stepped(2, 0.5), "b": stepped(1, 0.3) + stepped(4), "c": ZEROS}
     found = left({"a": ZEROS, "b": ZEROS, "c": ZEROS}, faulty, *(channel(n, 0.5) for n in "abc"))
     assert found == (("b", T[4], 1.3),)

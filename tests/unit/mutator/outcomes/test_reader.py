@@ -79,7 +79,7 @@ def test_reading_tables_leaves_no_thread(run: Path) -> None:
 
 
 def test_columns_follow_the_targets_hazards_and_channels(run: Path) -> None:
-    """This holds for CSV, Parquet and frames."""
+    """The readers are CSV, Parquet and frames."""
     table = Results.up_to_date(run)
     columns = list(next(table.lines()))
     at = columns.index("t_manifest")
@@ -115,7 +115,7 @@ def test_numbers_have_the_units_of_their_metric_or_channel(
 
 
 def test_every_way_of_reading_gives_the_same_hazards(run: Path) -> None:
-    """Each has the same times for each experiment."""
+    """Hazards have the same times for each experiment."""
     table = Results.up_to_date(run)
     rows = table.rows()
     frame, statistics = table.frame(), load(run / "results.csv").set_index("experiment_id")
@@ -184,7 +184,7 @@ def test_a_missing_table_is_a_users_error(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "", "\xff"])
 def test_a_file_that_is_not_a_results_table_is_a_users_error(tmp_path: Path, text: str) -> None:
-    """Neither a KeyError nor a decoding error escapes."""
+    """No KeyError or decoding error escapes."""
     table = Results.of_run(tmp_path)
     table.path.write_bytes(text.encode("latin-1"))
     for read in (table.rows, table.texts):

@@ -33,7 +33,7 @@ MakeRecord = Callable[..., Record]
 
 
 def test_the_row_of_a_run_with_a_hazard(experiment: Callable[..., Experiment], record: MakeRecord) -> None:
-    """It has flags, simulation times, the alerts in order, and reaction times."""
+    """The row has flags, simulation times, the alerts in order, and reaction times."""
     one = experiment(24, method=Method.RANDOM, trigger="random/C2")
     kept = record(
         one.id,
@@ -147,7 +147,7 @@ def test_unknown_values_of_a_failed_run_are_empty(
     activation: bool,
     activated: int | None,
 ) -> None:
-    """They are never 0."""
+    """Unknown values are never 0."""
     given = {} if activation else {"activation": None}
     cells = result_rows.row(
         experiment(), record(status=status, outcome=None, detail="why", max_dev=(), **given), HAZARDS

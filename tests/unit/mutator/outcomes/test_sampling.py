@@ -93,7 +93,7 @@ def test_infinite_huge_and_missing_values_survive_rounding(
 
 
 def test_all_channels_are_stored_at_a_hazard(manifest: TargetManifest, record: Callable[..., Record]) -> None:
-    """This holds even if they equal golden there. A hazard after the end of either run has no such point."""
+    """Values that equal golden are stored, too. A hazard after the end of either run has no such point."""
     speed, gap = np.where(T < 2.0, T, 2 * T), 9.0 - T
     one = Sampler(manifest, trace(speed=T, gap=gap))
     hazards = (("H1", 2.52), ("H3", 3.0), ("H2", 7.0))  # there is already a sample at 3.00 s

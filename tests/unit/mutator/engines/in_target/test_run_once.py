@@ -177,7 +177,7 @@ def test_the_first_activation_is_reported(tmp_path: Path) -> None:
 
 
 def test_the_probes_report_is_passed_on() -> None:
-    """Its exception ends the run. Any other value is not a report."""
+    """An exception of the probe ends the run. Any other value is not a report."""
     probe = types.SimpleNamespace(report=lambda: {"mutant": "m"})
     assert asked(probe, TREE, "car._fi") == {"probe": {"mutant": "m"}}
     probe.report = lambda: object()

@@ -106,8 +106,8 @@ def functions(old: str, new: str) -> list[tuple[str, tuple[str, ...], types.Code
 def test_functions_of_every_form_run_the_new_code(
     loaded: types.ModuleType, word: str, call: Callable[[types.ModuleType], str]
 ) -> None:
-    """The forms are plain, wrapped, cached, static, class and private functions, methods and properties. They
-    run the new code even after many calls of the old code."""
+    """Plain, wrapped, cached, static, class and private functions, methods and properties run the new code,
+    even after many calls of the old code."""
     kept = call
     for _ in range(200):
         if word != "cached":

@@ -134,7 +134,7 @@ def test_a_late_piece_is_repeated_and_counts_once(folder: RunFolder, clock: Cloc
 def test_an_experiment_that_kills_workers_is_identified(
     folder: RunFolder, clock: Clock, ids: list[str]
 ) -> None:
-    """That experiment is given up; all others are done."""
+    """The experiment is given up; all others are done."""
     there, deadly, done = board(folder, clock), ids[17], Counter[str]()
     given_up: list[str] = []
     while not there.is_empty:

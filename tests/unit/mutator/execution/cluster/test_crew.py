@@ -57,7 +57,7 @@ def test_rates_are_reported_by_machine() -> None:
 
 
 def test_a_worker_reports_its_machine_and_versions() -> None:
-    """This includes the kernel of its BLAS."""
+    """The kernel of the worker's BLAS is reported, too."""
     assert describe("w", FACTS) == (
         f"w (alpha, AMD EPYC, CPython 3.11.7, mutator {VERSION}, openblas 0.3.31 (Zen))"
     )

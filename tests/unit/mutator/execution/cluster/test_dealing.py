@@ -206,7 +206,7 @@ def test_without_a_queue_a_refused_worker_ends_the_command(session: Any) -> None
 def test_no_experiment_is_given_up_while_results_are_written(
     session: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Both append to the same file."""
+    """Giving up and writing results both append to the same file."""
     inside, most = [0], [0]
 
     def slow(real: Callable[..., None]) -> Callable[..., None]:

@@ -163,7 +163,7 @@ def test_hosts_of_a_machine_share_golden_runs(
 def test_a_cached_golden_run_must_match_the_campaign(
     sent: tuple[Bundle, Piece], cache: Path, tmp_path: Path
 ) -> None:
-    """Its digest must be the campaign's, and its sources must be the same."""
+    """The digest must be the campaign's, and the sources must be the same."""
     run_once(sent, tmp_path / "a")
     bundle.lay_out(sent[0].data, tmp_path / "site")
     site = Site(tmp_path / "site")
