@@ -73,13 +73,13 @@ class Answer:
 
 
 class Workers:
-    """A substitute for a client of a scheduler with these workers, which answer after `seconds`."""
+    """A substitute for a client of a scheduler with these workers, which answer soon."""
 
     dashboard_link = None
 
     def __init__(self, **workers: Work) -> None:
         self.workers, self.scheduler, self.address = workers, self, "here"
-        self.seconds = dict.fromkeys(workers, 0.02)
+        self.seconds: dict[str, float] = {}  # how long a worker takes for a piece
         self.began: list[str] = []  # the worker of each piece that began
         self.cut_at = -1  # the number of pieces begun after which the scheduler forgets this client's tasks
         self._open: list[asyncio.Future[Any]] = []
@@ -96,7 +96,9 @@ class Workers:
         if function.__name__ == "work":
             name = workers[0].removeprefix("tcp://")
             self.began.append(name)
-            asyncio.get_running_loop().call_later(self.seconds[name], self._end, future, name, given[1])
+            asyncio.get_running_loop().call_later(
+                self.seconds.get(name, 0.02), self._end, future, name, given[1]
+            )
             if len(self.began) == self.cut_at:
                 for one in self._open:
                     if not one.done():
