@@ -1,7 +1,5 @@
-"""The statistics of a report, computed a second time in plain Python from formulas, without the harness.
-
-Rows are dicts as `made_up` draws them. Times that are missing are absent from the dict.
-"""
+"""The statistics of a report, computed a second time in plain Python from formulas, without the harness. Rows
+are the dicts that `made_up` draws, without the times that are missing."""
 
 import math
 import random
@@ -18,8 +16,8 @@ ALERTS = ("fcw", "steer_saturated", "driver_distracted")
 
 
 def made_up(seed: int) -> list[dict[str, Any]]:
-    """Draw a campaign of guided and random runs: faults in scenarios and context rows, some without a
-    partner, some crashed. Times are multiples of 0.1 s, so that there are ties."""
+    """Draw a campaign of guided and random runs, some without a partner, some crashed. Times are multiples of
+    0.1 s, so that there are ties."""
     draw = random.Random(seed)
     faults = draw.randint(4, 30)
     scenarios = list(ENDS)[: draw.randint(1, 3)]
@@ -104,7 +102,6 @@ Fourfold = tuple[int, int, int, int]  # guided with and without hazard, random w
 
 
 def fourfolds(rows: Sequence[Row], whole: str) -> dict[str, Fourfold]:
-    """The fourfold table of each fault type with runs of both methods."""
     found = {}
     for kind in sorted({kind_of(row) for row in rows}):
         cells: list[int] = []
@@ -190,7 +187,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
 
 
 def matched(rows: Iterable[Row]) -> list[tuple[Row, Row]]:
-    """The pairs of a guided run and its random partner."""
     by_key: dict[tuple[str, ...], dict[str, Row]] = {}
     for row in rows:
         key = (row["fault_id"], row["scenario"], row["trigger"].removeprefix("random/"))
@@ -225,7 +221,6 @@ def rate_difference(rows: Sequence[Row]) -> float:
 
 
 def spread(times: Sequence[float]) -> list[float]:
-    """Number, mean and quartiles."""
     if len(times) < 2:
         return [len(times), *(list(times) or [math.nan]) * 4]
     lower, median, upper = statistics.quantiles(times, n=4, method="inclusive")

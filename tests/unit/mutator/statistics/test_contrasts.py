@@ -44,18 +44,17 @@ def stratum(guided: tuple[int, int], random: tuple[int, int]) -> Stratum:
     )
 
 
-def test_the_pooled_odds_ratio_is_the_sum_over_strata_of_the_textbook() -> None:
-    """The Mantel-Haenszel ratio is the sum of a*d/n over the sum of b*c/n: (10*15/40 + 4*18/40) / (10*5/40
-    + 16*2/40)."""
+def test_the_pooled_odds_ratio_follows_the_textbook() -> None:
+    """The Mantel-Haenszel ratio is the sum of a*d/n over the sum of b*c/n: (10*15/40 + 4*18/40) / (10*5/40 +
+    16*2/40)."""
     pooled = contrasts.mantel_haenszel([stratum((10, 20), (5, 20)), stratum((4, 20), (2, 20))])
     assert pooled.odds_ratio == pytest.approx((150 + 72) / (50 + 32))
     assert pooled.low < 1 < pooled.odds_ratio < pooled.high
     assert 0.05 < pooled.p < 1
 
 
-def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
-    """A type without hazards does not affect the odds ratio. If no type has hazards, the result is
-    unknown."""
+def test_strata_without_hazards_do_not_affect_the_odds_ratio() -> None:
+    """If no type has hazards, the result is unknown."""
     one = stratum((10, 20), (5, 20))
     pooled = contrasts.mantel_haenszel([one, stratum((0, 9), (0, 9))])
     assert pooled.odds_ratio == pytest.approx(contrasts.mantel_haenszel([one]).odds_ratio)
@@ -63,14 +62,12 @@ def test_strata_without_any_hazard_do_not_break_the_pooling() -> None:
 
 
 def test_holm_adjusts_as_in_the_textbook() -> None:
-    """The smallest of three p-values is tripled and the next is doubled. No adjusted value is below an
-    earlier one."""
     assert contrasts.holm([0.01, 0.04, 0.03]) == pytest.approx((0.03, 0.06, 0.06))
     assert contrasts.holm([]) == ()
 
 
 def test_holm_adjusts_as_statsmodels_does() -> None:
-    """The result has the same bits for all p-values, including ties, 0, 1, and tests without a result."""
+    """The p-values include ties, 0, 1, and tests without a result."""
     draw = random.Random(1)
     for _ in range(20):  # a single one that takes 50 ms
         p_values = [
@@ -80,9 +77,8 @@ def test_holm_adjusts_as_statsmodels_does() -> None:
         np.testing.assert_array_equal(contrasts.holm(p_values), multipletests(p_values, method="holm")[1])
 
 
-def test_pairs_are_of_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
-    """Every guided run is paired with its random partner by the name of the context row. Runs without a
-    partner are left out."""
+def test_pairs_have_the_same_fault_scenario_and_row(frame: pd.DataFrame) -> None:
+    """Runs without a partner are left out."""
     found = contrasts.pairs(frame)
     assert list(found["fault_id"]) == ["a", "b", "c", "d", "e"]
     assert contrasts.mcnemar(found) == Matched(both=1, first_only=1, second_only=2, neither=1, p=1.0)
@@ -94,8 +90,7 @@ def test_mcnemar_is_exact() -> None:
     assert contrasts.mcnemar(contrasts.pairs(results(*made))).p == pytest.approx(2 * 0.5**8)
 
 
-def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.DataFrame) -> None:
-    """Both results are reported, in total and by fault type."""
+def test_pairs_per_injected_and_per_activated_guided_fault(frame: pd.DataFrame) -> None:
     lines = [line[:7] for line in pairs_sheet(frame).lines]
     assert lines == [
         ("all", "total", 5, 1, 1, 2, 1),
@@ -106,7 +101,7 @@ def test_pairs_per_injected_and_where_the_guided_one_was_activated(frame: pd.Dat
 
 
 def test_resampling_draws_whole_faults() -> None:
-    """Copies of a run in other scenarios add no information, so the interval is that of the faults."""
+    """Copies of a run in other scenarios add no information."""
     once = [row for i in range(12) for row in pair(str(i), HIT if i < 8 else RAN, HIT if i < 4 else RAN)]
     often = [row | {"scenario": s} for s in ("S1", "S2", "S3", "S4") for row in once]
     single, copied = (contrasts.resampled(results(*rows), "injected") for rows in (once, often))
@@ -115,9 +110,8 @@ def test_resampling_draws_whole_faults() -> None:
     assert single.low < 4 / 12 < single.high
 
 
-def test_faults_that_all_say_the_same_have_no_interval() -> None:
-    """Three faults that all did no harm, or harm only when guided, do not bound what other faults would
-    do. There is no interval."""
+def test_faults_that_all_agree_have_no_interval() -> None:
+    """Three faults do not bound what other faults would do."""
     for guided in (RAN, HIT):
         rows = [row for i in range(3) for row in pair(str(i), guided, RAN)]
         found = contrasts.resampled(results(*rows), "injected")
@@ -127,8 +121,7 @@ def test_faults_that_all_say_the_same_have_no_interval() -> None:
 
 @pytest.mark.filterwarnings("error")
 def test_an_interval_needs_both_methods_in_every_draw() -> None:
-    """If each fault has runs of one method only, some resamples have no difference, so there is no
-    interval."""
+    """If each fault has runs of one method only, some resamples have no difference."""
     found = contrasts.resampled(
         results(HIT | {"fault_id": "a"}, RAN | {"fault_id": "b", "method": "random"}), "activated"
     )

@@ -30,8 +30,8 @@ FRAME = pd.DataFrame(
 
 
 def test_the_spread_of_each_metric_by_fault_type() -> None:
-    """Median, worse quartile and worst value equal those computed by hand. Experiments without activation
-    or value are left out."""
+    """Median, worse quartile and worst value, as computed by hand. Experiments without activation or value
+    are left out."""
     sheet = metrics_sheet(FRAME, METRICS)
     told = [(*line[:6], *line[8:]) for line in sheet.lines]
     assert told == [
@@ -44,8 +44,7 @@ def test_the_spread_of_each_metric_by_fault_type() -> None:
     assert all(math.isnan(cell) for cell in sheet.lines[2][6:8] if isinstance(cell, float))  # of one run
 
 
-def test_without_a_value_there_is_no_line() -> None:
-    """A target without metrics has no such tables, nor has a run without values or hazards."""
+def test_without_values_there_is_no_table() -> None:
     frame = FRAME[FRAME["kind"] == "a/y"]
     assert metrics_sheet(frame, []).lines == ()
     assert tolerant_times_sheet(frame).lines == ()
@@ -53,7 +52,7 @@ def test_without_a_value_there_is_no_line() -> None:
 
 
 def test_classes_of_severity_by_fault_type() -> None:
-    """Each class is counted among the activated faults. The count of any contact comes before the classes."""
+    """The count of any contact comes before the classes."""
     rows = severity_sheet(FRAME).table().rows
     counts = [[row[0], *(cell.partition("(")[2].partition(";")[0] for cell in row[1:])] for row in rows]
     assert counts == [
@@ -64,8 +63,7 @@ def test_classes_of_severity_by_fault_type() -> None:
     assert rows[0][1] == "60.0 % (3/5; 23.1 to 88.2)"
 
 
-def test_times_to_the_hazard() -> None:
-    """Only an event before the hazard has a time to it. An alert at the same time has none."""
+def test_only_an_event_before_the_hazard_has_a_time_to_it() -> None:
     told = [line[:6] for line in tolerant_times_sheet(FRAME).lines]
     assert told == [
         ("a/x", "activation to hazard", 5, 1.0, 2.0, 3.0),
@@ -76,10 +74,10 @@ def test_times_to_the_hazard() -> None:
 
 
 @pytest.mark.parametrize("pairs", [False, True])
-def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
+def test_the_interval_of_a_median_resamples_whole_faults(
     pairs: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The interval equals that of a simple loop that copies the runs of each fault that is drawn."""
+    """It equals that of a simple loop that copies the runs of each fault that is drawn."""
     monkeypatch.setattr(medians, "RESAMPLES", 40)
     monkeypatch.setattr(medians, "_CELLS", 300)  # this takes several batches
     rng = np.random.default_rng(3)
@@ -100,8 +98,8 @@ def test_the_interval_of_a_median_is_that_of_whole_faults_drawn_anew(
         assert median_interval(second, cluster) == expected
 
 
-def test_where_nothing_can_be_said_of_a_median() -> None:
-    """For one fault, or for equal runs, there is no interval. Without pairs, there is no difference."""
+def test_a_median_of_one_fault_or_of_equal_runs_has_no_interval() -> None:
+    """Without pairs, there is no difference."""
     ones, faults = pd.Series([1.0, 1.0, 1.0]), pd.Series(["a", "b", "c"])
     assert all(map(math.isnan, median_interval(ones, faults)))
     assert all(map(math.isnan, median_interval(pd.Series([1.0, 2.0]), pd.Series(["a", "a"]))))

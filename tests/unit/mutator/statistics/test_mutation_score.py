@@ -1,4 +1,4 @@
-"""The mutation score of a closed loop, compared with counts by hand."""
+"""The mutation score of a closed loop."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -56,9 +56,8 @@ def test_a_mutant_counts_once_and_for_any_of_its_drives(faults: dict[str, Fault]
     assert found["pkg/radar.py::g", "mutants", "permanent"]["hazard"] == share(0, 0)
 
 
-def test_permanent_mutants_stand_beside_transient_ones(faults: dict[str, Fault]) -> None:
-    """A mutant that does harm only when permanent is harmless as a transient one. The total counts it
-    once."""
+def test_permanent_and_transient_mutants_have_their_own_lines(faults: dict[str, Fault]) -> None:
+    """The total counts a mutant once."""
     frame = results(drive("a", HIT), drive("a", ACTIVE, trigger="C1"), drive("b", ACTIVE, trigger="C1"))
     found = lines(score_sheet(frame, faults, GOLDEN))
     assert found["all", "mutants", "permanent"]["hazard"] == share(1, 1)
@@ -67,9 +66,8 @@ def test_permanent_mutants_stand_beside_transient_ones(faults: dict[str, Fault])
     assert not any(counted == "drives" for _, counted, _ in found)
 
 
-def test_an_alert_counts_if_golden_does_not_raise_it(faults: dict[str, Fault]) -> None:
-    """Alerts of the fault-free run are not attributed to a mutant. If these alerts are unknown, there is
-    no share."""
+def test_alerts_of_the_fault_free_run_are_not_attributed_to_a_mutant(faults: dict[str, Fault]) -> None:
+    """If these alerts are unknown, there is no share."""
     frame = results(
         drive("a", ACTIVE, alerts="own", t_alert="2.0"), drive("b", ACTIVE, alerts="own;brake", t_alert="2.0")
     )
@@ -84,8 +82,7 @@ def test_an_alert_counts_if_golden_does_not_raise_it(faults: dict[str, Fault]) -
 
 
 def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
-    """A mutant that has only harness errors appears only in the note. A crash counts as active and not as
-    a hazard."""
+    """A crash counts as active and not as a hazard."""
     frame = results(
         drive("a", CHANGED),
         drive("b", {}, status="crashed"),
@@ -101,9 +98,8 @@ def test_harness_errors_are_in_no_denominator(faults: dict[str, Fault]) -> None:
     assert "2 of 4 mutants have no result" in sheet.note
 
 
-def test_the_note_tells_of_several_draws(faults: dict[str, Fault]) -> None:
-    """If selections were drawn from populations of different sizes, the note says that the overall share
-    estimates none of them."""
+def test_the_note_warns_of_several_draws(faults: dict[str, Fault]) -> None:
+    """The overall share then estimates none of their populations."""
     small, large = "a: 4 draws of 9 mutants of operators", "b: 4 draws of 900 mutants of operators"
     frame = results(drive("a", HIT))
     assert "without weights" in score_sheet(frame, faults, GOLDEN, [small, large]).note

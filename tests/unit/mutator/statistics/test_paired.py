@@ -14,15 +14,14 @@ def flags(text: str) -> pd.Series:
     return pd.Series([letter == "1" for letter in text], dtype=bool)
 
 
-def test_mcnemar_looks_at_pairs_that_differ() -> None:
-    """The counts are those of the pairs. The p-value is the exact binomial one of the pairs that differ."""
+def test_mcnemar_uses_the_pairs_that_differ() -> None:
+    """The p-value is the exact binomial one."""
     found = mcnemar(flags("1111111100"), flags("1000000010"))
     assert (found.both, found.first_only, found.second_only, found.neither, found.pairs) == (1, 7, 1, 1, 10)
     assert found.p == pytest.approx(2 * (1 + 8) / 2**8)
 
 
-def test_nothing_differs() -> None:
-    """Equal flags have a p-value of 1 and a difference of 0, without an interval."""
+def test_equal_flags_have_a_p_value_of_one_and_no_interval() -> None:
     same = flags("1100")
     assert mcnemar(same, same) == Matched(both=2, first_only=0, second_only=0, neither=2, p=1.0)
     found = rate_difference(same, same, pd.Series(list("abcd")))
@@ -30,8 +29,8 @@ def test_nothing_differs() -> None:
     assert math.isnan(found.low) and math.isnan(found.high)
 
 
-def test_whole_faults_are_drawn_anew() -> None:
-    """With few faults, the interval is as wide as for few faults, even if each has ten equal pairs."""
+def test_whole_faults_are_resampled() -> None:
+    """The interval is as wide as for few faults, even if each has ten equal pairs."""
     first, second = flags("0" * 40), flags("1" * 10 + "0" * 30)
     alike = rate_difference(first, second, pd.Series([i // 10 for i in range(40)]))
     apart = rate_difference(first, second, pd.Series(range(40)))
@@ -46,8 +45,7 @@ def test_one_fault_has_no_interval() -> None:
     assert math.isnan(found.low)
 
 
-def test_times_of_pairs() -> None:
-    """The medians and their difference use only pairs with both times. The interval is exact."""
+def test_median_times_use_pairs_with_both_times() -> None:
     first = pd.Series([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, None, 9.0])
     second = first + pd.Series([0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.0, None])
     found = times(first, second)
@@ -65,7 +63,7 @@ def test_equal_and_missing_times() -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
+def test_the_interval_of_a_rate_equals_that_of_all_resamples(seed: int) -> None:
     """Five faults have 5^5 resamples. The interval ends between their percentiles near 2.5 and 97.5 %."""
     draw = np.random.default_rng(seed)
     cluster = pd.Series(np.repeat(range(5), [1, 2, 3, 5, 8]))
@@ -80,8 +78,8 @@ def test_the_interval_of_a_rate_is_that_of_all_resamples(seed: int) -> None:
 
 @pytest.mark.parametrize("size", [5, 6, 9, 10, 30])
 def test_the_median_difference_lies_between_order_statistics(size: int) -> None:
-    """The interval drops as many differences as 95 % coverage allows, as in a sign test by hand. With
-    fewer than six differences, there is none."""
+    """As in a sign test by hand, the interval drops as many differences as 95 % coverage allows. With fewer
+    than six, there is none."""
     change = pd.Series(np.random.default_rng(size).normal(0.3, 1.0, size))
     found = times(pd.Series(np.zeros(size)), change).median
     tails = [sum(math.comb(size, k) for k in range(i + 1)) / 2**size for i in range(size)]

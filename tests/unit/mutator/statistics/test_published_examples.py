@@ -16,7 +16,7 @@ from .results_frame import results
 
 
 def stratum(a: int, b: int, c: int, d: int) -> Stratum:
-    """The four counts: guided with and without hazard, random with and without hazard."""
+    """Guided with and without hazard, random with and without hazard."""
     return Stratum(kind="k", guided_hazards=a, guided=a + b, random_hazards=c, random=c + d)
 
 
@@ -25,8 +25,7 @@ def stratum(a: int, b: int, c: int, d: int) -> Stratum:
     [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
 )
 def test_wilson(count: int, of: int, low: float, high: float) -> None:
-    """Wilson's intervals equal those in Newcombe, Statistics in Medicine 17 (1998) 857-872, table I,
-    method 3."""
+    """The intervals are those in Newcombe, Statistics in Medicine 17 (1998) 857-872, table I, method 3."""
     found = share(count, of)
     assert (round(found.low, 4), round(found.high, 4)) == (low, high)
 
@@ -121,8 +120,8 @@ def test_student() -> None:
     assert (found.low, found.high) == pytest.approx((0.7001142, 2.4598858), abs=1e-6)
 
 
-def test_by_hand_gives_the_published_numbers_too() -> None:
-    """The second implementation, which checks the ten tables, gives the numbers in the literature."""
+def test_the_second_implementation_gives_the_published_numbers() -> None:
+    """It is the one that checks the ten tables."""
     odds = by_hand.pooled_odds(BERKELEY)
     assert (odds["odds ratio"], odds["low"]) == pytest.approx((0.9046968, 0.7719074), abs=1e-7)
     assert by_hand.fisher((3, 1, 1, 3)) == pytest.approx(0.4857, abs=5e-5)

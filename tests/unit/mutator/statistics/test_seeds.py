@@ -1,4 +1,4 @@
-"""The spread between seeds, for frames made by hand with known results."""
+"""The spread between seeds, for frames made by hand."""
 
 import math
 from typing import Any
@@ -25,14 +25,12 @@ def cells(sheet: Sheet, *names: str) -> dict[str, Any]:
 
 
 def test_one_seed_has_no_spread() -> None:
-    """A run with one seed has no line about seeds, whatever its results."""
     frame = results(*seed(7, 3))
     assert seeds_sheet(frame).lines == kinds_sheet(frame).lines == ()
 
 
-def test_the_least_and_the_largest_seed() -> None:
-    """The share over all seeds is shown with those of the lowest and the highest seed. In a tie, the seed
-    with the lower number is shown. Seeds sort as numbers."""
+def test_the_lowest_and_the_highest_seed_are_shown() -> None:
+    """In a tie, this is the seed with the lower number. Seeds sort as numbers."""
     frame = results(*seed(10, 1), *seed(9, 6, runs=20), *seed(2, 5), *seed(30, 1))
     assert seeds_of(frame) == ["2", "9", "10", "30"]
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
@@ -41,7 +39,7 @@ def test_the_least_and_the_largest_seed() -> None:
     assert cells(seeds_sheet(frame), "all", "H1", "injected") == found  # no other hazard occurred
 
 
-def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
+def test_the_interval_is_made_of_percentiles_of_resampled_seeds() -> None:
     """For two seeds of equal size with 0.2 and 0.6, a draw of two is 0.2, 0.4 or 0.6, in 1, 2 and 1 of 4
     cases. So the middle 95 % go from 0.2 to 0.6. The interval of twenty seeds equals that of numpy's
     draws."""
@@ -56,8 +54,8 @@ def test_the_interval_is_the_percentiles_of_seeds_drawn_anew() -> None:
     assert again == found  # the draws are seeded
 
 
-def test_seeds_that_say_the_same_have_no_interval() -> None:
-    """If all seeds agree, there is no interval. A seed with nothing to count does not enter a share."""
+def test_seeds_that_agree_have_no_interval() -> None:
+    """A seed with nothing to count does not enter a share."""
     frame = results(*seed(1, 4), *seed(2, 4), *seed(3, 0, t_activation=""))
     found = cells(seeds_sheet(frame), "all", "hazards", "activated")
     assert math.isnan(found["low"]) and math.isnan(found["high"])
@@ -66,8 +64,8 @@ def test_seeds_that_say_the_same_have_no_interval() -> None:
     assert (activated["least"], activated["its"], activated["seeds"]) == (0.0, 3, 3)
 
 
-def test_methods_and_fault_types_by_themselves() -> None:
-    """Each method and each fault type has its own lines. Without alerts, there are no lines about alerts."""
+def test_each_method_and_each_fault_type_has_its_own_lines() -> None:
+    """Without alerts, there are no lines about alerts."""
     frame = results(
         *seed(1, 2), *seed(2, 3), *seed(1, 8, method="random"), *seed(2, 9, method="random", fault_type="fog")
     )

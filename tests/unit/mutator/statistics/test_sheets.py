@@ -13,8 +13,7 @@ ALERTS = {"0": (("fcw", 8.0),), "1": ()}
 
 
 def test_a_run_of_both_methods_has_all_tables() -> None:
-    """With both methods, a run has a summary and coverage for each, the comparison, and the times. It has
-    alerts only if their records exist."""
+    """It has alerts only if their records exist."""
     expected = [
         *("summary_guided", "summary_random", "coverage_guided", "coverage_random"),
         *("guided_against_random", "guided_against_random_by_fault_type", "matched_pairs"),
@@ -28,13 +27,12 @@ def test_a_run_of_both_methods_has_all_tables() -> None:
     assert [sheet.name for sheet in run_sheets(frame, None, {}, None)] == expected
 
 
-def test_no_tables_where_they_say_nothing_more() -> None:
-    """With one method and without published numbers, only the tables of counts exist."""
+def test_one_method_without_published_numbers_has_only_counts() -> None:
     assert run_sheets(results(GUIDED), None, {}, {"S1": 30.0}) == ()
 
 
 def test_numbers_are_written_plainly() -> None:
-    """Unknown values are empty or a dash. A tiny p-value is not shown as zero, and is a number in the CSV."""
+    """Unknown values are empty or a dash. A tiny p-value is not shown as zero."""
     sheet = Sheet(name="n", title="T", note="N.", heads=("a", "b", "c"), lines=((math.nan, P(1e-20), None),))
     assert sheet.table().rows == [["-", "< 0.0001", "-"]]
     assert sheet.csv() == "a,b,c\n,1e-20,\n"

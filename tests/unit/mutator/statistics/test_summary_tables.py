@@ -16,15 +16,13 @@ HIT = {"t_activation": 7.0, "t_manifest": 7.1, "h1": 1, "t_h1": 18.0}
 
 
 def test_wilson_interval_of_a_published_example() -> None:
-    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3). The interval for none of 20
-    begins at zero."""
+    """81 of 263 gives 25.5 to 36.6 % (Newcombe 1998, table I, method 3)."""
     assert str(share(81, 263)) == "30.8 % (81/263; 25.5 to 36.6)"
     assert share(0, 20).low == 0
     assert str(share(0, 0)) == "- (0/0)"
 
 
 def test_a_table_without_published_counts_has_only_ours() -> None:
-    """Without published counts, the summary has no empty lines and does not mention a publication."""
     coverage = coverage_sheet("guided", by_kind(results(HIT)), None)
     assert [line[1] for line in coverage.lines] == ["here", "here"]
     summary = summary_sheet("guided", by_scenario(results(HIT)), None)
@@ -32,8 +30,8 @@ def test_a_table_without_published_counts_has_only_ours() -> None:
     assert "paper" not in coverage.markdown() + summary.markdown()
 
 
-def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
-    """Runs that say nothing about their fault are left out. A crash alone does not count as activated."""
+def test_crashes_count_as_injected_and_harness_errors_do_not() -> None:
+    """A crash alone does not count as activated."""
     frame = results(HIT, {"status": "harness_error"}, {"status": "invalid_mutant"}, {"status": "crashed"})
     assert by_scenario(frame)["guided", "S1"] == Tally(
         injected=2,
@@ -46,8 +44,7 @@ def test_harness_errors_are_in_no_count_and_crashes_are_injected() -> None:
     )
 
 
-def test_a_file_that_is_no_results_table_is_told(tmp_path: Path) -> None:
-    """A missing file or column is a user's error that gives the file's name."""
+def test_a_missing_file_or_column_is_reported(tmp_path: Path) -> None:
     with pytest.raises(MutatorError, match=r"results\.csv"):
         load(tmp_path / "results.csv")
     (tmp_path / "results.csv").write_text("experiment_id,fault_id\n1,2\n")

@@ -33,15 +33,16 @@ def reaction(sample: dict[str, Any], driver_s: float = 1.8) -> Reaction:
 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
-def test_the_curve_is_that_of_lifelines(sample: dict[str, Any]) -> None:
-    """The share of alerts without a hazard equals lifelines' Kaplan-Meier curve at each of its steps."""
+def test_the_curve_equals_that_of_lifelines(sample: dict[str, Any]) -> None:
     found = [reaction(sample, at).survival for at in sample["at"]]
     assert found == pytest.approx(sample["survival"], abs=1e-12)
     assert reaction(sample, sample["at"][0] / 2).survival == 1.0
 
 
 @pytest.mark.parametrize(("name", "sample"), LIFELINES.items(), ids=LIFELINES)
-def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: dict[str, Any]) -> None:
+def test_the_median_equals_that_of_lifelines_except_for_flat_halves(
+    name: str, sample: dict[str, Any]
+) -> None:
     """If the curve stays at one half for some time, lifelines returns the beginning of that time, and the
     report its middle."""
     found = reaction(sample)
@@ -53,13 +54,10 @@ def test_the_median_is_that_of_lifelines_but_for_flat_halves(name: str, sample: 
 
 
 @pytest.mark.parametrize("sample", LIFELINES.values(), ids=LIFELINES)
-def test_the_interval_of_the_median_is_that_of_lifelines(sample: dict[str, Any]) -> None:
+def test_the_interval_of_the_median_equals_that_of_lifelines(sample: dict[str, Any]) -> None:
     """The interval consists of the times at which lifelines' interval of the curve contains one half.
-
-    Lifelines uses (0, 0) as the interval where the curve is 0, so its interval for the median ends there
-    at the latest. With four times, this would bound the median, although all four are below it in one case
-    of sixteen. The report leaves the interval open, as R does.
-    """
+    Lifelines uses (0, 0) as the interval where the curve is 0, so its interval for the median ends there at
+    the latest. The report leaves the interval open, as R does."""
     found = reaction(sample)
     high = sample["median_high"]
     if high == sample["at"][-1] and sample["survival"][-1] == 0.0:
@@ -88,8 +86,7 @@ def test_the_published_medians_of_miller() -> None:
 
 
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 20, 21, 50, 51])
-def test_without_censoring_the_median_is_the_ordinary_one(size: int) -> None:
-    """For an even number of times, the median is the mean of the middle two."""
+def test_without_censoring_the_median_is_the_usual_one(size: int) -> None:
     drawn = np.random.default_rng(size).uniform(0.5, 9.0, size).round(3)
     sample = {"times": drawn, "status": [1] * size}
     assert reaction(sample).median == pytest.approx(np.median(drawn))
@@ -100,9 +97,7 @@ def test_a_curve_that_ends_at_one_half_has_the_median_where_it_came_there() -> N
 
 
 @pytest.mark.parametrize("name", ["ties", "large"])
-def test_the_curve_is_that_of_scipy(name: str) -> None:
-    """A second implementation gives the same steps and the same log-log intervals, for data with ties and
-    many steps."""
+def test_the_curve_equals_that_of_scipy(name: str) -> None:
     sample = LIFELINES[name]
     frame = pd.DataFrame({"time": sample["times"], "event": sample["status"]})
     known, cut = frame[frame["event"] == 1]["time"], frame[frame["event"] == 0]["time"]

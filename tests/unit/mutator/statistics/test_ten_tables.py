@@ -1,4 +1,4 @@
-"""Every number in the tables of a report is computed a second time by hand, for ten made-up campaigns."""
+"""Every number in a report's tables is computed a second time by hand, for ten made-up campaigns."""
 
 import math
 from collections import Counter
@@ -59,7 +59,7 @@ def made(request: pytest.FixtureRequest) -> Campaign:
 
 
 def same(found: Sequence[object], expected: Sequence[object]) -> bool:
-    """Cells are equal: texts and counts exactly, numbers to 9 digits, a share together with its interval."""
+    """Compare cells: texts and counts exactly, numbers to 9 digits, a share together with its interval."""
     assert len(found) == len(expected)
     for cell, wanted in zip(found, expected, strict=True):
         if isinstance(cell, Share):
@@ -75,7 +75,6 @@ def same(found: Sequence[object], expected: Sequence[object]) -> bool:
 
 @pytest.mark.slow
 def test_there_are_ten_campaigns_with_every_table() -> None:
-    """The campaigns are large and small, and each has all eleven tables of a report."""
     made = [campaign(seed) for seed in range(10)]
     assert all(len(one.sheets) == 11 for one in made)
     assert min(len(one.rows) for one in made) < 40 and max(len(one.rows) for one in made) > 200
@@ -83,7 +82,6 @@ def test_there_are_ten_campaigns_with_every_table() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_summary_by_scenario(made: Campaign, method: str) -> None:
-    """The counts of each measure and their Wilson intervals agree, by scenario and in total."""
     lines = made.lines(f"summary_{method}")
     scenarios = sorted({row["scenario"] for row in made.of(method)})
     groups = [by_hand.counts(made.of(method, scenario=s)) for s in scenarios]
@@ -95,8 +93,6 @@ def test_summary_by_scenario(made: Campaign, method: str) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
-    """The shares of activated faults, and of hazards per activated and per injected fault, agree by fault
-    type and in total."""
     kinds = sorted({by_hand.kind_of(row) for row in made.of(method)})
     for (name, _, *cells), kind in zip(made.lines(f"coverage_{method}"), [*kinds, "total"], strict=True):
         told = by_hand.counts([r for r in made.of(method) if kind in ("total", by_hand.kind_of(r))])
@@ -106,8 +102,7 @@ def test_coverage_by_fault_type(made: Campaign, method: str) -> None:
 
 
 def test_guided_against_random(made: Campaign) -> None:
-    """The rates, the Mantel-Haenszel odds ratios with intervals, and the tests by Cochran and by Breslow
-    and Day agree."""
+    """This includes the Mantel-Haenszel odds ratios and the tests by Cochran and by Breslow and Day."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         tables = by_hand.fourfolds(made.rows, whole)
         odds = by_hand.pooled_odds(tables.values())
@@ -117,8 +112,7 @@ def test_guided_against_random(made: Campaign) -> None:
 
 
 def test_resampled_difference_of_rates(made: Campaign) -> None:
-    """The difference agrees exactly. Its interval agrees as closely as another resampling of whole faults
-    can."""
+    """The interval agrees as closely as another resampling of whole faults can."""
     for line, whole in zip(made.lines("guided_against_random"), WHOLES, strict=True):
         rows = [row for row in made.rows if whole == "injected" or "t_activation" in row]
         faults = {row["fault_id"] for row in rows}
@@ -132,7 +126,6 @@ def test_resampled_difference_of_rates(made: Campaign) -> None:
 
 
 def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
-    """Fisher's exact p-value of each type agrees, and so does Holm's adjustment over the types."""
     lines = made.lines("guided_against_random_by_fault_type")
     expected: list[tuple[Any, ...]] = []
     for whole in WHOLES:
@@ -147,8 +140,8 @@ def test_fisher_and_holm_by_fault_type(made: Campaign) -> None:
 
 
 def test_matched_pairs(made: Campaign) -> None:
-    """The pairs with a hazard in both, one or neither run agree, with McNemar's exact p-value and Holm's
-    adjustment by fault type."""
+    """These are the pairs with a hazard in both, one or neither run, and McNemar's exact p-values with Holm's
+    adjustment."""
     pairs = by_hand.matched(made.rows)
     expected: list[list[Any]] = []
     for which, some in (
@@ -177,7 +170,6 @@ def _pair_counts(pairs: list[tuple[Row, Row]]) -> list[Any]:
 
 
 def test_propagation_times(made: Campaign) -> None:
-    """Number, mean and quartiles of each time agree, by method and scenario."""
     steps = {
         "activation to manifest": lambda r: _span(r, "t_activation", "t_manifest"),
         "activation to alert": lambda r: _span(r, "t_activation", "t_alert"),
@@ -193,8 +185,7 @@ def test_propagation_times(made: Campaign) -> None:
 
 
 def test_from_alert_to_hazard(made: Campaign) -> None:
-    """The Kaplan-Meier median, its interval, and the share after the driver's time agree, by method and
-    scenario."""
+    """These are the Kaplan-Meier median, its interval, and the share after the driver's time."""
     lines = iter(made.lines("alert_to_hazard"))
     for method, scenario, rows in _groups(made):
         alerted = [row for row in rows if "t_alert" in row and row["status"] == "ok"]
@@ -214,8 +205,6 @@ def test_from_alert_to_hazard(made: Campaign) -> None:
 
 
 def test_alerts_before_hazards(made: Campaign) -> None:
-    """The number of runs with a hazard agrees for those that each alert preceded, that any alert preceded,
-    and that none did."""
     expected: list[tuple[Any, ...]] = []
     for method, hazard in ((m, h) for m in METHODS for h in ("H1", "H3")):
         time = f"t_{hazard.lower()}"
@@ -231,7 +220,6 @@ def test_alerts_before_hazards(made: Campaign) -> None:
 
 
 def test_orders_of_hazards(made: Campaign) -> None:
-    """The number of runs agrees for one hazard, for both at once, and for one after the other."""
     counts: Counter[tuple[str, str, str]] = Counter()
     for row in made.rows:
         h1, h3 = row.get("t_h1"), row.get("t_h3")

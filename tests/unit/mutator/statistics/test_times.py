@@ -1,4 +1,4 @@
-"""Times from the activation, censored reaction times, alerts before hazards, and the order of hazards."""
+"""Times from the activation, censored reaction times, and the order of alerts and hazards."""
 
 import math
 from typing import Any
@@ -20,7 +20,6 @@ def run(alert: float | str = "", hazard: float | str = "", **more: Any) -> dict[
 
 
 def test_times_count_from_activation() -> None:
-    """Times of manifestation, alert and hazard count from the activation, if the event occurred."""
     found = times.propagation(results(run(7.0, 9.0, t_manifest=5.5), run(6.0, ""), run("", ""), {}))
     assert (found["activation to manifest"].n, found["activation to manifest"].mean) == (1, 0.5)
     assert (found["activation to alert"].n, found["activation to alert"].mean) == (2, 1.5)
@@ -52,9 +51,8 @@ def test_kaplan_meier_of_a_textbook_sample() -> None:
     assert (found.in_time.count, found.in_time.of) == (3, 4)
 
 
-def test_the_censored_lengthen_the_median() -> None:
-    """Alerts without a later hazard raise the median. Here it is beyond the observed times, so it is not
-    reached."""
+def test_censored_times_raise_the_median() -> None:
+    """Here it is beyond the observed times, so it is not reached."""
     few = [run(10.0, 11.0 + i) for i in range(3)]
     assert times.reaction(results(*few), ENDS, DRIVER_S).median == pytest.approx(2.0)
     many = times.reaction(results(*few, *[run(10.0, "")] * 7), ENDS, DRIVER_S)
@@ -68,19 +66,18 @@ def test_alerts_without_any_hazard_are_no_median() -> None:
     assert math.isnan(found.median)
 
 
-def test_runs_that_did_not_end_well_are_not_censored_at_the_end_of_others() -> None:
-    """A crashed run is left out, because it is unknown how long it would have been observed."""
+def test_crashed_runs_are_left_out_of_censored_times() -> None:
+    """It is unknown how long they would have been observed."""
     assert times.reaction(results(run(10.0, "", status="crashed")), ENDS, DRIVER_S).at_risk == 0
 
 
-def test_a_reaction_of_just_the_drivers_time_is_not_longer() -> None:
+def test_a_reaction_time_equal_to_the_drivers_is_not_longer() -> None:
     """11.8 - 10.0 is 1.8000000000000007 in floating point and counts as 1.8 s."""
     assert times.reaction(results(run(10.0, 11.8)), ENDS, DRIVER_S).in_time.count == 0
 
 
-def test_the_alerts_before_each_hazard() -> None:
-    """Each hazard of a run counts separately. An alert between two hazards came before the second one
-    only."""
+def test_alerts_are_counted_before_each_hazard() -> None:
+    """An alert between two hazards came before the second one only."""
     frame = results(run(8.0, 9.0), run(9.0, 10.0, t_h3=8.0), run("", "", t_h3=8.0), run("", 9.0))
     alerts = {
         "0": (("steer_saturated", 8.0), ("fcw", 8.5)),
@@ -99,8 +96,7 @@ def test_the_alerts_before_each_hazard() -> None:
     }
 
 
-def test_hazards_in_the_order_in_which_they_came() -> None:
-    """The table lists H1 alone, H3 before H1, and both at once. Runs without a hazard are not listed."""
+def test_the_orders_of_hazards_are_counted() -> None:
     frame = results(run("", 9.0), run("", 9.0, t_h3=7.0), run("", 9.0, t_h3=9.0), run())
     assert times.hazard_orders(frame) == {"H1": 1, "H1 with H3": 1, "H3 then H1": 1}
 

@@ -23,8 +23,7 @@ def keys(path: Path) -> list[str]:
     return [block.key for block in read_blocks(path).blocks]
 
 
-def test_blocks_come_back_in_order(file: Path) -> None:
-    """Blocks are read with their kinds and the offsets of their content."""
+def test_blocks_are_read_in_order(file: Path) -> None:
     found = read_blocks(file)
     assert [(one.kind, one.key, one.data) for one in found.blocks] == [
         (kind, key, data) for kind, (key, data) in enumerate(CONTENT.items())
@@ -34,8 +33,7 @@ def test_blocks_come_back_in_order(file: Path) -> None:
     assert not found.damaged
 
 
-def test_a_block_cut_short_is_no_damage(file: Path) -> None:
-    """If only a part of the last block was written, it counts as unfinished, not as damaged."""
+def test_a_truncated_last_block_is_unfinished_and_not_damaged(file: Path) -> None:
     whole = file.read_bytes()
     for length in range(len(whole) - len(as_block(2, "three", b"")), len(whole)):
         file.write_bytes(whole[:length])

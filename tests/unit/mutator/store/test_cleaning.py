@@ -25,9 +25,8 @@ def contents(folder: Path) -> set[Path]:
     return set(folder.rglob("*"))
 
 
-def test_all_that_a_run_wrote_goes(run: Path) -> None:
-    """A run folder is deleted completely, including half-written files left by a kill, and scratch folders
-    of any shape."""
+def test_everything_that_a_run_wrote_is_deleted(run: Path) -> None:
+    """This includes half-written files left by a kill, and scratch folders of any shape."""
     (run / "report" / "tables").mkdir(parents=True)
     (run / "report" / ".REPORT.md.4711").touch()
     odd = run / "work" / "1-x" / "out"
@@ -59,8 +58,7 @@ def test_all_that_a_run_wrote_goes(run: Path) -> None:
         "report/compare-old/notes.txt",
     ],
 )
-def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
-    """A run folder with any other file stays unchanged, and the error names that file."""
+def test_a_run_folder_with_another_file_stays(run: Path, stranger: str) -> None:
     path = run / stranger
     path.parent.mkdir(parents=True, exist_ok=True)
     path.mkdir() if stranger.endswith("/") else path.touch()
@@ -73,9 +71,8 @@ def test_what_no_run_writes_stays(run: Path, stranger: str) -> None:
     assert contents(run) == before
 
 
-def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
-    """A folder of other files that has a run.json stays unchanged, and so does a folder with another
-    schema."""
+def test_a_folder_of_other_files_stays_despite_its_run_json(tmp_path: Path) -> None:
+    """So does a folder with another schema."""
     for head, names in (
         ('{"schema":"run/1"}', ["a", "b", "c", "d", "e"]),
         ('{"schema":"run/99"}', []),
@@ -94,16 +91,14 @@ def test_a_head_makes_no_run_folder(tmp_path: Path) -> None:
         assert len(contents(folder)) == 1 + len(names)
 
 
-def test_a_folder_without_a_head_stays(tmp_path: Path) -> None:
-    """A folder that is not a run folder is reported as such, and nothing is written into it."""
+def test_a_folder_without_run_json_stays(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").touch()
     with pytest.raises(MutatorError, match="not a run folder"):
         clean(tmp_path)
     assert contents(tmp_path) == {tmp_path / "thesis.tex"}
 
 
-def test_the_reference_lists_what_may_be_in_it() -> None:
-    """The page about run folders lists the same names as cleaning does, folder by folder."""
+def test_the_docs_list_the_same_names_as_cleaning() -> None:
     [listed] = re.findall(r"^DIR/\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
     names = {name for line in listed.splitlines() for name in re.split(r" {2,}", line.strip())[0].split(", ")}
     inside = {name.partition("/")[0] for name in names if not name.startswith(".")}
@@ -130,8 +125,8 @@ def test_links_are_not_followed(run: Path, tmp_path: Path) -> None:
     assert (elsewhere / "S1" / "trace.npz").exists()
 
 
-def test_what_was_written_while_it_was_deleted_goes_too(run: Path) -> None:
-    """If another command is writing a report, it does not create the deleted folder again."""
+def test_a_deleted_folder_is_not_created_again(run: Path) -> None:
+    """Another command is writing a report while the folder is deleted."""
     assert not finish_deletion(run)
     clean(run)
     assert finish_deletion(run)

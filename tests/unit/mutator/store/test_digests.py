@@ -1,4 +1,4 @@
-"""The ledger of digests: which ledgers are valid, and that the folder can be opened after any kill."""
+"""The ledger of digests, also after kills."""
 
 import json
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from mutator.store.lines import LineWriter
 
 
 class Killed(BaseException):
-    """Raised in place of a kill of the process."""
+    """Raised instead of a kill of the process."""
 
 
 @pytest.fixture
@@ -42,17 +42,15 @@ def segment(run: Path, name: str, *values: int) -> Path:
     return writer.path
 
 
-def test_the_ledger_comes_back(run: Path) -> None:
-    """Files, announcements and the finished flag are read as they were written."""
+def test_a_ledger_is_read_as_written(run: Path) -> None:
     one = Digest(size=3, sha256="ab" * 32, lines=2)
     ledger = Ledger(files={"records/x.jsonl": one}, rewriting={"a": one, "b": None}, finished=True)
     digests.write(run, ledger)
     assert digests.read(run) == ledger
 
 
-def test_every_change_of_the_ledger_is_found(run: Path) -> None:
-    """Any changed byte is refused with a clear error, because the checksum does not match or the file is
-    not JSON."""
+def test_every_changed_byte_is_found(run: Path) -> None:
+    """The checksum does not match, or the file is not JSON."""
     path = run / digests.FILE
     data = path.read_bytes()
     for place in range(len(data)):
@@ -62,8 +60,8 @@ def test_every_change_of_the_ledger_is_found(run: Path) -> None:
 
 
 @pytest.mark.parametrize("content", ["{}", '{"schema": "digests/1"}', "[]", "", '{"schema": "digests/9"}'])
-def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
-    """A truncated file, a file of another kind, and one with a newer schema are user's errors."""
+def test_what_is_not_a_ledger_is_refused(run: Path, content: str) -> None:
+    """The file is truncated, or has another kind or a newer schema."""
     (run / digests.FILE).write_text(content)
     with pytest.raises(MutatorError, match=r"digests\.json"):
         digests.read(run)
@@ -72,8 +70,8 @@ def test_what_is_no_ledger_is_told(run: Path, content: str) -> None:
         digests.read(run)
 
 
-def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
-    """A file with a valid checksum is refused if its content is not a ledger."""
+def test_a_forged_ledger_is_refused(run: Path) -> None:
+    """Its checksum is valid, but its content is not that of a ledger."""
     data = {"schema": digests.SCHEMA, "finished": True, "files": [], "rewriting": {}}
     files.write_json(run / digests.FILE, data | {"sum": digests.digest(data)})
     with pytest.raises(MutatorError, match="not a ledger"):
@@ -81,8 +79,8 @@ def test_a_ledger_that_somebody_made_up_is_told(run: Path) -> None:
 
 
 def kills(run: Path, work: Callable[[], Any], monkeypatch: pytest.MonkeyPatch) -> int:
-    """Repeat `work` with a kill before its first, second, ... write, until it completes. After each kill,
-    check that the folder is valid. Return the number of kills."""
+    """Repeat `work` with a kill before its first, second, ... write, until it completes. Check the folder
+    after each kill. Return the number of kills."""
     for survived in range(100):
         left = survived
 
@@ -110,8 +108,7 @@ def test_a_kill_while_a_file_is_rewritten(run: Path, monkeypatch: pytest.MonkeyP
     assert digests.read(run).rewriting == {}
 
 
-def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """After a kill, a file may be either of two versions, and no other one."""
+def test_after_a_kill_a_file_is_old_or_new(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch, pytest.raises(Killed):
         patch.setattr(digests, "write_atomic", lambda path, data: (_ for _ in ()).throw(Killed))
         digests.rewrite(run, "a", b"new a")
@@ -120,8 +117,8 @@ def test_what_is_neither_old_nor_new_is_refused(run: Path, monkeypatch: pytest.M
     assert not accepted(run)
 
 
-def test_files_may_go(run: Path) -> None:
-    """A file that is announced for deletion may exist or not. After that, it is unknown."""
+def test_a_file_announced_for_deletion_may_be_missing(run: Path) -> None:
+    """After that, it is unknown."""
     with digests.rewriting(run, {"a": None}):
         assert accepted(run)
         (run / "a").unlink()
@@ -130,7 +127,7 @@ def test_files_may_go(run: Path) -> None:
 
 
 def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
-    """The entry covers the valid bytes. An incomplete last line is cut, and later additions are found."""
+    """An incomplete last line is cut, and later additions are found."""
     path = segment(run, "records/0001-gw0.jsonl", 1, 2)
     whole = path.read_bytes()
     path.write_bytes(whole + b'{"sum":"0123')
@@ -144,7 +141,6 @@ def test_segments_are_entered_when_they_are_closed(run: Path) -> None:
 
 
 def test_a_damaged_segment_is_not_entered(run: Path) -> None:
-    """If a line differs from what was written, its file is not entered."""
     path = segment(run, "proof/0001-gw0.jsonl", 1, 2)
     path.write_bytes(path.read_bytes().replace(b'"value":1', b'"value":3'))
     with pytest.raises(MutatorError, match=r"0001-gw0\.jsonl:2: a damaged line"):
@@ -152,7 +148,6 @@ def test_a_damaged_segment_is_not_entered(run: Path) -> None:
 
 
 def test_closing_twice_writes_once(run: Path) -> None:
-    """A complete ledger is not written again."""
     segment(run, "records/0001-gw0.jsonl", 1)
     digests.close_segments(run, finished=True)
     before = (run / digests.FILE).stat().st_mtime_ns

@@ -1,4 +1,4 @@
-"""The lines of files by experiment, read on request and verified immediately."""
+"""An index of lines by experiment, which are read on request."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ SCHEMA = "things/1"
 
 
 def things(folder: Path, **files: list[dict[str, Any]]) -> IndexedLines[dict[str, Any]]:
-    """An index of the newest line of each experiment in these files."""
+    """An index of each experiment's newest line in these files."""
     for name, lines in files.items():
         path = folder / f"{name}.jsonl"
         path.write_bytes(written(path, {"schema": SCHEMA}, lines))
@@ -25,9 +25,8 @@ def opened(folder: Path) -> IndexedLines[dict[str, Any]]:
     return IndexedLines(paths, SCHEMA, dict, lambda line, known: True, checksums=True)
 
 
-def test_the_newest_line_counts_in_the_place_of_the_first(tmp_path: Path) -> None:
-    """Experiments keep the order of their first lines, and each has its last line. Many files are read
-    with few of them open."""
+def test_the_newest_line_replaces_the_first(tmp_path: Path) -> None:
+    """Experiments keep the order of their first lines. Many files are read with few of them open."""
     told = {"note": '"experiment_id":"zz"', "within": ['{"experiment_id":"yy"}']}
     many = {f"f{i:02}": [{"experiment_id": f"e{i}", "n": i}] for i in range(30)}
     found = things(tmp_path, a=[{"experiment_id": "aa", "n": 0, **told}], b=[{"experiment_id": "bb"}], **many)
@@ -38,9 +37,8 @@ def test_the_newest_line_counts_in_the_place_of_the_first(tmp_path: Path) -> Non
     assert next(iter(again)) == "aa" and again["aa"]["n"] == 1
 
 
-def test_damage_is_told_before_anything_is_read(tmp_path: Path) -> None:
-    """A changed line is reported immediately with its number. A line that a kill cut off at the end is no
-    error."""
+def test_a_damaged_line_is_reported_before_any_is_read(tmp_path: Path) -> None:
+    """A line that a kill cut off at the end is no error."""
     things(tmp_path, a=[{"experiment_id": "aa", "n": 10}, {"experiment_id": "bb", "n": 20}])
     path = tmp_path / "a.jsonl"
     data = path.read_bytes()
@@ -51,9 +49,9 @@ def test_damage_is_told_before_anything_is_read(tmp_path: Path) -> None:
         opened(tmp_path)
 
 
-def test_a_line_that_is_nothing_of_the_kind(tmp_path: Path) -> None:
-    """A line without an experiment is an error immediately. A line with invalid content is an error when
-    it is read. Both errors have file and line."""
+def test_an_invalid_line_is_reported_with_file_and_line(tmp_path: Path) -> None:
+    """Without an experiment, the error comes immediately. With invalid content, it comes when the line is
+    read."""
     path = tmp_path / "a.jsonl"
     lines = LineWriter(path, {"schema": SCHEMA})
     lines.append({"experiment_id": "aa"})

@@ -1,4 +1,4 @@
-"""When a run folder is opened, exactly those files are reported that differ from what was written."""
+"""Opening a run folder reports exactly the files that differ from what was written."""
 
 import json
 import random
@@ -55,8 +55,7 @@ SEALED = (
 
 @pytest.mark.parametrize("name", [name for name in SEALED if name != "run.json"])
 @pytest.mark.parametrize("what", ["folder", "loop"])
-def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
-    """A folder or a link to itself in place of a file is reported by name."""
+def test_a_folder_or_link_in_place_of_a_file_is_reported(run: Path, name: str, what: str) -> None:
     (run / name).unlink()
     if what == "folder":
         (run / name).mkdir()
@@ -65,8 +64,7 @@ def test_what_is_no_file_is_told(run: Path, name: str, what: str) -> None:
     assert problem(run).where == str(run / name)
 
 
-def test_what_is_sealed_is_all_of_it(run: Path) -> None:
-    """The folder opens, and the tests below cover all of its files."""
+def test_the_seal_covers_all_files_of_these_tests(run: Path) -> None:
     folder = RunFolder.open(run)
     assert folder.verifiable and folder.finished and folder.problems() == []
     found = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
@@ -75,9 +73,7 @@ def test_what_is_sealed_is_all_of_it(run: Path) -> None:
 
 
 @pytest.mark.parametrize("name", SEALED)
-def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
-    """Files with flipped bits, missing or added ends, zeroed bytes, or no content are reported, and so is
-    a missing file."""
+def test_every_damaged_file_is_reported(run: Path, name: str) -> None:
     path = run / name
     data, draw = path.read_bytes(), random.Random(name)
     damaged = [data + b"\n", data + data, b"", data[: draw.randrange(len(data))]]
@@ -93,8 +89,7 @@ def test_every_damage_is_told_with_its_file(run: Path, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["records/0001-a.jsonl", plan_file.EXPERIMENTS, plan_file.FAULTS])
-def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
-    """One changed digit in the middle of a long file is reported with its line number."""
+def test_a_changed_line_is_reported_with_its_number(run: Path, name: str) -> None:
     path = run / name
     lines = path.read_bytes().splitlines(keepends=True)
     lines[2] = lines[2].replace(b"0", b"1", 1)
@@ -102,9 +97,8 @@ def test_a_changed_line_is_told_with_its_number(run: Path, name: str) -> None:
     assert (problem(run).where, problem(run).line) == (str(path), 3)
 
 
-def test_lost_lines_are_counted(run: Path) -> None:
-    """If a segment ends too early, at the end of a line, the error has the expected and the actual number
-    of lines."""
+def test_missing_lines_are_counted(run: Path) -> None:
+    """The segment ends too early, at the end of a line."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join(lines[:-2]))
@@ -122,8 +116,7 @@ def test_a_stranger_in_a_finished_run_is_told(run: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "name", ["timings/x.jsonl", "traces/a", "plots/a.svg", "report/index.html", "notes.txt"]
 )
-def test_what_is_outside_the_seal_is_left_alone(run: Path, name: str) -> None:
-    """Timings, images, reports and files of the user in the folder are not checked."""
+def test_files_outside_the_seal_are_not_checked(run: Path, name: str) -> None:
     (run / name).parent.mkdir(exist_ok=True)
     (run / name).write_text("anything")
     assert RunFolder.open(run).finished
@@ -138,7 +131,7 @@ def test_swapped_files_are_told(run: Path) -> None:
 
 
 def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> Path:
-    """The run as a killed session left it, with these lines in an unclosed segment."""
+    """A run that was killed, with these lines in an unclosed segment."""
     digests.close_segments(run, finished=False)
     head = {"schema": SCHEMA, "plan": plan or RunFolder.unverified(run).head["plan"]}
     writer = LineWriter(run / "records" / "0002-a.jsonl", head)
@@ -148,9 +141,8 @@ def unsealed(run: Path, *lines: dict[str, object], plan: str | None = None) -> P
     return writer.path
 
 
-def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
-    """The complete lines of the segment count, an incomplete last line does not, and a damaged line is
-    reported."""
+def test_an_unclosed_segment_is_read(run: Path) -> None:
+    """An incomplete last line is ignored, and a damaged line is reported."""
     again = {"experiment_id": next(plan_file.ids(run)), "status": "harness_error"}
     path = unsealed(run, again, again)
     path.write_bytes(path.read_bytes() + b'{"sum"')
@@ -159,8 +151,8 @@ def test_a_segment_that_a_kill_left_is_read(run: Path) -> None:
     assert (problem(run).where, problem(run).line) == (str(path), 2)
 
 
-def test_records_of_another_plan_are_told(run: Path) -> None:
-    """A segment of another run folder is refused, whatever its name."""
+def test_a_segment_of_another_run_is_refused(run: Path) -> None:
+    """Its name makes no difference."""
     path = unsealed(run, plan="0" * 64)
     assert str(problem(run)).startswith(f"{path}:1: records of plan 0000000000000000")
 
@@ -170,16 +162,16 @@ def test_a_record_of_nothing_planned_is_told(run: Path) -> None:
     assert str(problem(run)).startswith(f"{path}:2: a record of {'0' * 16}, which is not planned")
 
 
-def test_a_second_record_is_told(run: Path) -> None:
-    """An experiment has one final record. Harness errors are not final."""
+def test_a_second_record_is_reported(run: Path) -> None:
+    """Harness errors are not final, so they may have successors."""
     lines = (run / "records" / "0001-a.jsonl").read_text().splitlines()
     one = {k: v for k, v in json.loads(lines[1]).items() if k != "sum"}
     path = unsealed(run, one | {"status": Status.HARNESS_ERROR.value}, one)
     assert str(problem(run)).startswith(f"{path}:3: a second record of experiment {one['experiment_id']}")
 
 
-def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A record that was removed is reported, even if all digests were recomputed."""
+def test_a_missing_record_of_a_finished_run_is_reported(run: Path, reseal: Callable[[Path], None]) -> None:
+    """All digests were recomputed."""
     path = run / "records" / "0001-a.jsonl"
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:4], *lines[5:]]))
@@ -187,9 +179,8 @@ def test_a_finished_run_has_a_record_of_each(run: Path, reseal: Callable[[Path],
     assert f"no record of {json.loads(lines[4])['experiment_id']}" in str(problem(run))
 
 
-def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable[[Path], None]) -> None:
-    """A plan is refused if an experiment occurs twice, or if its chunks have a different number of
-    experiments."""
+def test_a_plan_with_a_duplicate_experiment_is_refused(run: Path, reseal: Callable[[Path], None]) -> None:
+    """So is a plan whose chunks have a different number of experiments."""
     path = run / plan_file.EXPERIMENTS
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join([*lines[:-1], lines[0]]))
@@ -200,8 +191,8 @@ def test_a_plan_that_has_an_experiment_twice_is_told(run: Path, reseal: Callable
     assert f"{path}: 23 experiments; expected 24" in str(problem(run))
 
 
-def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
-    """A folder made to look like one from before digests is refused, with or without the ledger."""
+def test_a_folder_without_its_digests_is_refused(run: Path) -> None:
+    """It was made to look like a folder of an older version."""
     head = run / "run.json"
     head.write_text(head.read_text().replace('"run/3"', '"run/1"'))
     assert "run/1 in a folder with digests.json" in str(problem(run))
@@ -212,9 +203,8 @@ def test_a_folder_cannot_be_made_an_older_one(run: Path) -> None:
         folder.records()
 
 
-def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A folder that is opened while its owner rewrites a file has the old or the new file, and is never
-    reported as damaged."""
+def test_a_folder_that_is_being_written_is_not_damaged(run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its owner rewrites a file while it is opened."""
     real, seen = integrity.problems, []
 
     def look(*arguments: object, **more: object) -> list[MutatorError]:
@@ -230,8 +220,8 @@ def test_a_folder_that_is_written_to_is_looked_at_again(run: Path, monkeypatch: 
 
 
 @pytest.mark.parametrize("key", ["limits", "goldens", "chunks", "sources", "choices", "provenance", "plan"])
-def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> None:
-    """An older version's run.json has no digest. Invalid values in it are still reported by key."""
+def test_an_invalid_value_in_an_old_run_json_is_reported_by_key(run: Path, key: str) -> None:
+    """It has no digest."""
     data = json.loads((run / "run.json").read_text()) | {"schema": "run/1"}
     (run / digests.FILE).unlink()
     for value in (3, [3], [[3]], {"a": [None]}):
@@ -244,9 +234,8 @@ def test_an_old_head_that_is_damaged_is_told_by_its_key(run: Path, key: str) -> 
 
 
 @pytest.mark.parametrize("key", [field.name for field in fields(Stretch)])
-def test_a_damaged_stretch_of_work_is_told(run: Path, key: str) -> None:
-    """Each stretch must have every key with a valid value, because an audit prints stretches before it
-    verifies anything."""
+def test_a_damaged_stretch_of_work_is_reported(run: Path, key: str) -> None:
+    """An audit prints stretches before it verifies anything."""
     data = json.loads((run / "run.json").read_text())
     [stretch] = data["stretches"]
     for value in (3, [3], {"a": [None]}, [{"library": "openblas"}], {"mutator": {"commit": "abc"}}):

@@ -1,4 +1,4 @@
-"""Checksummed lines: every written line can be read, and no other line is accepted."""
+"""Checksummed lines."""
 
 import errno
 import json
@@ -34,8 +34,8 @@ def values(segment: Segment) -> list[object]:
     return [line["value"] for _, line in segment.objects(SCHEMA)]
 
 
-def test_lines_come_back_as_they_were(tmp_path: Path) -> None:
-    """Any JSON value is read as it was appended, with its line number."""
+def test_lines_are_read_as_appended(tmp_path: Path) -> None:
+    """They can be any JSON values."""
     given = [1.5, float("inf"), None, 'ü\n"sum"', {"sum": "0" * 16}, [[], {}]]
     segment = read_segment(write(tmp_path / "records" / "a.jsonl", *given))
     assert values(segment) == given
@@ -49,8 +49,8 @@ def test_every_line_is_json_that_begins_with_its_checksum(path: Path) -> None:
 
 
 @pytest.mark.parametrize("bit", range(8))
-def test_every_flipped_bit_is_found_at_its_line(path: Path, bit: int) -> None:
-    """A flipped bit is reported with its line. In the file's last byte, it makes the last line incomplete."""
+def test_a_flipped_bit_is_reported_with_its_line(path: Path, bit: int) -> None:
+    """In the file's last byte, it makes the last line incomplete."""
     data = path.read_bytes()
     for place in range(len(data)):
         path.write_bytes(data[:place] + bytes([data[place] ^ 1 << bit]) + data[place + 1 :])
@@ -73,8 +73,8 @@ CHANGES: dict[str, tuple[Callable[[list[bytes]], list[bytes]], tuple[int, ...]]]
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_lines_that_are_not_where_they_were_are_found(path: Path, change: str) -> None:
-    """Only the damaged lines are lost. Later lines are still verified."""
+def test_only_damaged_lines_are_lost(path: Path, change: str) -> None:
+    """Later lines are still verified."""
     lines = path.read_bytes().splitlines(keepends=True)
     make, damaged = CHANGES[change]
     path.write_bytes(b"".join(make(lines)))
@@ -92,18 +92,18 @@ def test_a_torn_last_line_is_no_damage(path: Path, keep: int) -> None:
     assert values(segment) == [0, 1, 2, 3, 4] and segment.end == len(b"".join(lines[:-1]))
 
 
-def test_a_file_in_another_place_is_found(path: Path) -> None:
-    """A file contains its own name, so that renamed or swapped files are reported."""
+def test_a_renamed_file_is_reported(path: Path) -> None:
+    """A file contains its own name."""
     moved = path.rename(path.with_name("0002-gw0.jsonl"))
     with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:1: was written as records/0001-gw0\.jsonl"):
         values(read_segment(moved))
 
 
 @pytest.mark.parametrize("written", [0, 20])
-def test_a_line_that_does_not_fit_is_taken_back(
+def test_a_line_that_a_full_disk_cut_off_is_removed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: int
 ) -> None:
-    """If the disk is full in the middle of a line, only that line is lost, and an error is raised."""
+    """Only that line is lost, and an error is raised."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
     real, calls = os.write, []
@@ -123,8 +123,8 @@ def test_a_line_that_does_not_fit_is_taken_back(
     assert values(read_segment(writer.path)) == [1, 3]
 
 
-def test_a_full_disk_on_sync_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A file system with late allocation reports a full disk when it syncs. The record can still be read."""
+def test_a_full_disk_on_sync_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A file system with late allocation may report it only then. The record can still be read."""
     writer = LineWriter(tmp_path / "records" / "a.jsonl", HEAD)
     writer.append({"value": 1})
 
@@ -145,14 +145,13 @@ def test_records_are_synced_in_batches(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_a_file_is_never_shared(tmp_path: Path) -> None:
-    """Two writers cannot open the same file."""
     LineWriter(tmp_path / "a.jsonl", HEAD).close()
     with pytest.raises(FileExistsError):
         LineWriter(tmp_path / "a.jsonl", HEAD)
 
 
-def test_what_is_no_file_is_told(tmp_path: Path) -> None:
-    """A folder or a pipe in place of a segment is refused without waiting."""
+def test_a_folder_or_pipe_in_place_of_a_segment_is_refused(tmp_path: Path) -> None:
+    """Opening a pipe would wait."""
     os.mkfifo(tmp_path / "pipe.jsonl")
     (tmp_path / "folder.jsonl").mkdir()
     for name in ("pipe.jsonl", "folder.jsonl"):

@@ -1,4 +1,4 @@
-"""Packed patches, and the file in which a lost patch is searched."""
+"""Packed patches, and errors for a lost one."""
 
 from pathlib import Path
 
@@ -21,8 +21,7 @@ def test_a_patch_is_in_the_file_of_its_worker(run: Path) -> None:
     assert Patches(run).file("a" * 16, "0002-gw7") == run / "patches" / "0001-gw0.blocks"
 
 
-def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
-    """A flipped byte loses a patch. The error names the patch's file."""
+def test_the_error_for_a_lost_patch_names_its_file(run: Path) -> None:
     path = run / "patches" / "0001-gw1.blocks"
     data = bytearray(path.read_bytes())
     data[-1] ^= 1
@@ -32,8 +31,8 @@ def test_a_lost_patch_is_looked_for_in_a_damaged_file(run: Path) -> None:
     assert patches.file("b" * 16) == path
 
 
-def test_a_lost_file_is_that_of_the_worker(run: Path) -> None:
-    """If a whole file is missing, its name comes from the record. Without a record, the folder is named."""
+def test_the_error_for_a_lost_file_takes_its_name_from_the_record(run: Path) -> None:
+    """Without a record, the folder is named."""
     path = run / "patches" / "0001-gw1.blocks"
     path.unlink()
     assert Patches(run).file("b" * 16, "0001-gw1") == path

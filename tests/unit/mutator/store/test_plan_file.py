@@ -21,8 +21,7 @@ def lines(run: Path, name: str) -> list[dict[str, object]]:
     return [json.loads(line) for line in (run / "plan" / name).read_text().splitlines()]
 
 
-def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
-    """A plan is read back equal, with its ids, as a whole or chunk by chunk."""
+def test_a_plan_is_read_as_written(experiment: Make, tmp_path: Path) -> None:
     plan = tuple(experiment(value, changes=("no_lead",)) for value in (1.0, 2.5, 3.0))
     chunks = plan_file.write(tmp_path, plan, (2, 1))
     faults = plan_file.read_faults(tmp_path)
@@ -31,9 +30,8 @@ def test_what_is_written_is_read(experiment: Make, tmp_path: Path) -> None:
     assert [*plan_file.ids(tmp_path)] == [e.id for e in plan]
 
 
-def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> None:
-    """The fast path returns the same experiment as the slow one. It leaves any line with another format or
-    a wrong id to the slow one."""
+def test_a_line_in_the_usual_format_is_read_fast(experiment: Make) -> None:
+    """A line with another format or a wrong id is left to the slow path."""
     for planned in (
         experiment(),
         experiment(2.5, changes=("no_lead",)),
@@ -56,8 +54,7 @@ def test_a_line_as_it_is_written_is_read_from_its_bytes(experiment: Make) -> Non
     assert experiment_as_written(stopping, faults) is None
 
 
-def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
-    """A missing field that now has a default is read as that default."""
+def test_a_missing_field_of_an_older_plan_has_its_default(experiment: Make) -> None:
     planned = experiment()
     planned = replace(planned, trigger=replace(planned.trigger, armed_after_s=0.0))
     line = plan_file.to_plain(planned)
@@ -66,8 +63,8 @@ def test_a_plan_of_an_older_version_is_read(experiment: Make) -> None:
     assert (read.trigger.armed_after_s, read.trigger.hold_s, read.trigger.hold) == (0.0, None, Hold.WHILE)
 
 
-def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
-    """A pipe is refused, because opening it would wait for a writer for ever."""
+def test_a_pipe_in_place_of_a_plan_is_refused(tmp_path: Path) -> None:
+    """Opening it would wait for a writer for ever."""
     (tmp_path / "plan").mkdir()
     os.mkfifo(tmp_path / plan_file.EXPERIMENTS)
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read"):
@@ -75,8 +72,8 @@ def test_a_pipe_in_the_place_of_a_plan_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("where", ["experiment", "trigger", "fault", "injection", "anchor"])
-def test_a_plan_of_a_newer_version_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
-    """An unknown field is an error that names it, because it could change the experiment."""
+def test_an_unknown_field_of_a_newer_plan_is_refused(experiment: Make, tmp_path: Path, where: str) -> None:
+    """It could change the experiment."""
     plan_file.write(tmp_path, [experiment()], [1])
     [fault], [line] = lines(tmp_path, "faults.jsonl"), lines(tmp_path, "experiments.jsonl")
     injection = fault["injections"][0]  # type: ignore[index]

@@ -6,8 +6,8 @@ from mutator.store import progress
 from mutator.store.progress import Pace
 
 
-def test_a_stage_is_timed_from_its_own_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Steps finished before the stage count as progress, but not towards its rate."""
+def test_earlier_steps_do_not_count_towards_a_stages_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """They count as progress."""
     now = 100.0
     monkeypatch.setattr(progress.time, "monotonic", lambda: now)
     pace = Pace("proof", 23, done=3)

@@ -1,4 +1,4 @@
-"""Records on disk: every finished one can be read, and no half-written one is accepted."""
+"""Records on disk."""
 
 import json
 from collections.abc import Callable
@@ -26,8 +26,8 @@ def write(run: Path, name: str, *records: Record) -> Path:
     return writer.path
 
 
-def test_records_come_back_as_they_were(tmp_path: Path, record: MakeRecord) -> None:
-    """Every field is read back, including infinite deviations and missing activations."""
+def test_records_are_read_as_written(tmp_path: Path, record: MakeRecord) -> None:
+    """This includes infinite deviations and missing activations."""
     first = record(
         "a" * 16, max_dev=(("gas", float("inf")),), hazards=(("H1", 3.25),), alerts=(("fcw", 3.0),)
     )
@@ -46,7 +46,7 @@ def test_a_line_has_what_asdict_gives(record: MakeRecord) -> None:
 
 
 def test_a_record_without_an_error_has_no_such_key(tmp_path: Path, record: MakeRecord) -> None:
-    """The lines of runs that end well equal those that older versions wrote."""
+    """The line equals that of older versions."""
     writer = LineWriter(tmp_path / "records" / "0001-gw0.jsonl", HEAD)
     writer.append(record())
     writer.close()
@@ -85,10 +85,8 @@ def test_newer_schema_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("error_first", [True, False])
-def test_any_record_goes_before_a_harness_error(
-    tmp_path: Path, record: MakeRecord, error_first: bool
-) -> None:
-    """The record of a retried experiment is that of the successful try, whichever file it is in."""
+def test_any_record_replaces_a_harness_error(tmp_path: Path, record: MakeRecord, error_first: bool) -> None:
+    """The file that it is in makes no difference."""
     wrong = record(status=Status.HARNESS_ERROR, outcome=None, detail="killed from outside")
     good = record()
     write(tmp_path, "0001-gw0.jsonl", wrong if error_first else good)
@@ -103,17 +101,16 @@ def test_two_different_records_of_one_experiment_fail(tmp_path: Path, record: Ma
         read_records(tmp_path)
 
 
-def test_a_second_record_of_an_experiment_is_told(tmp_path: Path, record: MakeRecord) -> None:
-    """A finished experiment does not run again, so a second record is refused, even if it is equal."""
+def test_a_second_record_is_refused(tmp_path: Path, record: MakeRecord) -> None:
+    """A finished experiment does not run again."""
     write(tmp_path, "0001-gw0.jsonl", record())
     write(tmp_path, "0002-gw0.jsonl", record())
     with pytest.raises(MutatorError, match=r"0002-gw0\.jsonl:2: a second record of experiment e{16}"):
         read_records(tmp_path)
 
 
-def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record: MakeRecord) -> None:
-    """A folder with an earlier schema has plain lines, and the current schema requires checksums. Neither
-    accepts the other kind."""
+def test_records_of_the_earlier_schema_are_read(tmp_path: Path, record: MakeRecord) -> None:
+    """They have no checksums. Neither schema accepts the lines of the other."""
     path = write(tmp_path, "0001-gw0.jsonl", record())
     old = [{"schema": "records/1"}, {k: v for k, v in asdict(record()).items() if k != "patch"}]
     path.write_text("".join(f"{json.dumps(line)}\n" for line in old))
@@ -126,8 +123,8 @@ def test_records_of_before_there_were_checksums_are_read(tmp_path: Path, record:
         read_records(tmp_path, checksums=False)
 
 
-def test_tail_follows_what_is_appended(tmp_path: Path, record: MakeRecord) -> None:
-    """Progress counts the outcomes of complete lines as they arrive, and each experiment once."""
+def test_progress_counts_complete_lines_as_they_arrive(tmp_path: Path, record: MakeRecord) -> None:
+    """Each experiment is counted once."""
     write(tmp_path, "0001-gw0.jsonl", record("a" * 16))
     tail = Tail("experiments", tmp_path / "records", 4)
     assert (tail.poll().done, tail.poll().per_s, tail.poll().remaining_s) == (1, None, None)

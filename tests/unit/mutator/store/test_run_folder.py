@@ -46,8 +46,6 @@ def holder(folder: RunFolder, *words: str) -> "subprocess.Popen[str]":
 
 
 def test_provenance_says_what_a_run_depends_on(folder: RunFolder, toycar: Workspace) -> None:
-    """Provenance has mutator's version, the digests of target, templates and scenarios, the seed, the
-    reading, and the stretches of work."""
     found = folder.provenance
     assert found["mutator"]
     assert found["stretches"] == []
@@ -68,17 +66,15 @@ def test_no_run_folder(tmp_path: Path) -> None:
         RunFolder.open(tmp_path)
 
 
-def test_experiments_are_found_by_the_beginning_of_their_id(folder: RunFolder) -> None:
-    """The beginning of an id finds it if it is unique. No match, or several, is an error."""
+def test_a_unique_start_of_an_id_finds_the_experiment(folder: RunFolder) -> None:
     with pytest.raises(MutatorError, match="no experiment 'zz'"):
         folder.find("zz")
     with pytest.raises(MutatorError, match="24 experiments start with ''"):
         folder.find("")
 
 
-def test_one_owner(folder: RunFolder) -> None:
-    """While a command owns the folder, another command is refused with the owner's name. The lock of a
-    dead owner is released."""
+def test_a_run_folder_has_one_owner(folder: RunFolder) -> None:
+    """The lock of a dead owner is released."""
     process = holder(folder, "owner")
     try:
         for attempt in (lambda: locks.owned(folder.path).__enter__(), lambda: clean(folder.path)):
@@ -102,8 +98,8 @@ def test_workers_of_a_dead_command_are_waited_for(folder: RunFolder) -> None:
 
 
 @pytest.mark.parametrize("name", ["owner.lock", "workers/1"])
-def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
-    """A folder, pipe or link in place of a lock is named. Nothing is written to the link's target."""
+def test_a_lock_that_is_not_a_file_is_refused(folder: RunFolder, name: str) -> None:
+    """Nothing is written to a link's target."""
     place = folder.path / name
     place.unlink(missing_ok=True)
     place.parent.mkdir(exist_ok=True)
@@ -122,15 +118,13 @@ def test_what_is_no_lock_is_told(folder: RunFolder, name: str) -> None:
     assert (folder.path / "run.json").read_bytes() == head
 
 
-def test_a_damaged_folder_is_told(folder: RunFolder) -> None:
-    """A run folder without its plan gets a clear error."""
+def test_a_run_folder_without_its_plan_is_reported(folder: RunFolder) -> None:
     (folder.path / "plan" / "experiments.jsonl").unlink()
     with pytest.raises(MutatorError, match=r"experiments\.jsonl: cannot be read .*damaged"):
         folder.find("00")
 
 
 @pytest.mark.parametrize("place", ["/proc/nosuch/run", "/dev/null/run"])
-def test_a_place_that_cannot_be_written(toycar: Workspace, place: str) -> None:
-    """A folder that cannot be created gets a clear error."""
+def test_a_folder_that_cannot_be_created_is_reported(toycar: Workspace, place: str) -> None:
     with pytest.raises(MutatorError, match="cannot be written"):
         freeze(make_plan(toycar, "toy"), Path(place), toycar)

@@ -27,8 +27,8 @@ def bits(one: Series) -> list[list[int]]:
 
 
 @given(WORDS, WORDS, st.integers(1, 6))
-def test_all_values_come_back_bit_by_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
-    """Infinite and tiny values, both zeros and every NaN are read back, with any golden run, even a longer
+def test_all_values_are_read_bit_by_bit(one: np.ndarray, other: np.ndarray, count: int) -> None:
+    """This includes infinite and tiny values, both zeros and every NaN, with any golden run, even a longer
     one."""
     golden = series(one.view("<f4"))
     faulty = series(np.ascontiguousarray(other[:, :count]).view("<f4"))
@@ -40,8 +40,7 @@ def test_all_values_come_back_bit_by_bit(one: np.ndarray, other: np.ndarray, cou
     assert found.about == {"end": 1.0}
 
 
-def test_what_equals_golden_takes_no_room() -> None:
-    """The series of a run that equals golden in 20 channels needs only its head, however long the run is."""
+def test_values_equal_to_golden_take_no_space() -> None:
     values = np.random.default_rng(1).random((20, 600)).astype("<f4")
     golden = Series(t=np.arange(600) / 20, rows=list(values), every=[1] * 20, about={})
     assert len(encode(golden, golden)) < 100
@@ -57,8 +56,7 @@ def test_points_come_back() -> None:
 
 
 @pytest.mark.parametrize("place", [0, 15, -12, -1])
-def test_damage_is_found(place: int) -> None:
-    """A changed byte is an error. It never gives other values."""
+def test_a_changed_byte_is_an_error(place: int) -> None:
     data = bytearray(encode(series(np.ones((3, 6), dtype="<f4"))))
     data[place] ^= 0xFF
     with pytest.raises(MutatorError, match="damaged"):

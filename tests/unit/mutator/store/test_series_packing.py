@@ -1,4 +1,4 @@
-"""Packed series are the same files for any order of arrival, and stay within the budget."""
+"""Packed series."""
 
 import random
 from pathlib import Path
@@ -52,8 +52,6 @@ def packed(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
-    """The best series come first, equal golden runs are stored once, and the files of the workers are
-    deleted."""
     folder = SeriesFolder(packed)
     index = folder.index
     assert index is not None
@@ -70,11 +68,8 @@ def test_each_series_is_found_in_its_chunk(packed: Path) -> None:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
-    tmp_path: Path, packed: Path, seed: int
-) -> None:
-    """The bytes are the same if series are packed once or several times, by one or two workers, and if one
-    experiment ran twice."""
+def test_packed_bytes_do_not_depend_on_the_order_of_arrival(tmp_path: Path, packed: Path, seed: int) -> None:
+    """Series are packed once or several times, by one or two workers, and one experiment ran twice."""
     draw = random.Random(seed)
     order = draw.sample(IDS, len(IDS))
     cuts = sorted(draw.sample(range(1, len(IDS)), 2))
@@ -85,8 +80,8 @@ def test_the_order_of_finishing_workers_and_interruptions_do_not_matter(
     assert files(tmp_path) == files(packed)
 
 
-def test_the_budget_keeps_the_best_however_often_it_is_packed(tmp_path: Path) -> None:
-    """Series above the budget are left out and counted. Packing in two sessions keeps the same series."""
+def test_the_budget_keeps_the_best_series(tmp_path: Path) -> None:
+    """It makes no difference how often series are packed."""
     runs = [tmp_path / "once", tmp_path / "twice"]
     append(runs[0], "0001-main", IDS)
     pack(runs[0], "p", WORTH, 1)
@@ -111,9 +106,8 @@ def test_series_of_shards_make_those_of_one_run(tmp_path: Path, packed: Path) ->
     assert files(tmp_path / "whole") == files(packed)
 
 
-def test_golden_runs_that_are_the_same_bytes_stay_apart(tmp_path: Path) -> None:
-    """After packing again, an experiment keeps its series, whichever of the equal golden runs it refers
-    to."""
+def test_equal_golden_runs_stay_separate(tmp_path: Path) -> None:
+    """After packing again, each experiment keeps its series."""
     append(tmp_path, "0001-main", IDS[:2])
     for worker, names in (("0002-main", IDS[2:3]), ("0003-main", IDS[3:4])):
         pack(tmp_path, "p", WORTH, 500)
@@ -135,9 +129,8 @@ def test_a_torn_end_loses_what_was_in_flight_alone(tmp_path: Path) -> None:
     assert [*index.entries] == IDS[1::-1]
 
 
-def test_a_damaged_chunk_is_said_to_be_and_never_shown(tmp_path: Path) -> None:
-    """Experiments of a damaged chunk can be read again after they were rerun, each from a separate file.
-    The same holds for a damaged index."""
+def test_experiments_of_a_damaged_chunk_can_be_rerun(tmp_path: Path) -> None:
+    """Then each is read from a separate file. The same holds for a damaged index."""
     append(tmp_path, "0001-main", IDS[:3])
     pack(tmp_path, "p", WORTH, 500)
     index = SeriesFolder(tmp_path).index

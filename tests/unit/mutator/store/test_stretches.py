@@ -1,4 +1,4 @@
-"""Stretches of work: how they are read, compared and printed."""
+"""Stretches of work."""
 
 from dataclasses import asdict
 from typing import Any
@@ -18,13 +18,11 @@ BEFORE = Stretch(
 )
 
 
-def test_they_come_back_as_they_were_written() -> None:
-    """run.json stores every fact about a stretch."""
+def test_stretches_are_read_as_written() -> None:
     assert read_stretches({"stretches": [asdict(BEFORE)]}) == (BEFORE,)
 
 
-def test_an_old_head_has_what_it_was_planned_with() -> None:
-    """A folder of an older version has one stretch with the data that the version recorded."""
+def test_an_older_run_has_one_stretch() -> None:
     planned = {"python": "3.11.2", "machine": "Linux x86_64", "packages": {"numpy": "2.0"}}
     (found,) = read_stretches({"provenance": planned})
     assert (found.python, found.platform, found.packages) == ("3.11.2", "Linux x86_64", {"numpy": "2.0"})
@@ -32,14 +30,12 @@ def test_an_old_head_has_what_it_was_planned_with() -> None:
 
 
 @pytest.mark.parametrize("stretch", [{}, {"python": "3"}, asdict(BEFORE) | {"stranger": 1}, 7])
-def test_a_damaged_stretch_is_told(stretch: Any) -> None:
-    """Missing or unknown keys, or a value that is no object, get a clear error."""
+def test_a_damaged_stretch_is_reported(stretch: Any) -> None:
     with pytest.raises(MutatorError, match=r"run\.json: a damaged stretch of work"):
         read_stretches({"stretches": [stretch]})
 
 
 def test_every_difference_is_named() -> None:
-    """A different Python, a different version, a missing package and a new package are all named."""
     packages = {"numpy": "2.1.0", "old": None, "new": "3.0"}
     assert differences(BEFORE, "CPython 3.12.1", packages) == (
         "CPython 3.11.7, here CPython 3.12.1",
@@ -50,7 +46,7 @@ def test_every_difference_is_named() -> None:
     assert differences(BEFORE, BEFORE.python, BEFORE.packages | {"unused": None}) == ()
 
 
-def test_several_stretches_are_told_together() -> None:
+def test_several_stretches_are_printed_together() -> None:
     """Each value is listed once, oldest first. Differences that the user accepted are marked."""
     after = Stretch(
         python="CPython 3.12.1",

@@ -1,4 +1,4 @@
-"""A finished run that was verified on this machine before is verified by comparing its bytes."""
+"""A finished run that this machine verified before is verified by comparing its bytes."""
 
 import json
 from collections.abc import Callable
@@ -38,8 +38,9 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
-def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, Path], tmp_path: Path) -> None:
-    """Each record equals that of a run with only this seed. The equivalence check of the run passes."""
+def test_a_run_of_several_seeds_equals_a_run_of_each_seed(
+    made: tuple[Workspace, Path], tmp_path: Path
+) -> None:
     workspace, run = made
     several = RunFolder.open(run)
     path = workspace.campaign("small")
@@ -53,11 +54,10 @@ def test_a_run_of_several_seeds_has_the_results_of_each(made: tuple[Workspace, P
     assert several.finished
 
 
-def test_a_known_run_is_not_looked_into_again(
+def test_a_verified_run_is_only_compared_byte_for_byte(
     made: tuple[Workspace, Path], cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The second time, only the bytes of the run are compared, and the summary is the same. An audit
-    checks everything."""
+    """An audit still checks everything."""
     workspace, run = made
     first = run_campaign(workspace, "small", run)
     assert ended_before(RunFolder.open(run)) is not None
@@ -73,9 +73,8 @@ def test_a_known_run_is_not_looked_into_again(
         RunFolder.open(run).problems(anew=True)
 
 
-def test_no_other_byte_is_vouched_for(made: tuple[Workspace, Path], cache: Path) -> None:
-    """A changed patch is found, although the folder was verified before. A change with recomputed digests
-    is found, too, because it makes another run."""
+def test_a_change_after_verification_is_found(made: tuple[Workspace, Path], cache: Path) -> None:
+    """A change with recomputed digests makes another run."""
     run = made[1]
     RunFolder.open(run)
     patches = Patches(run)
@@ -103,8 +102,7 @@ def test_a_damaged_entry_vouches_for_nothing(made: tuple[Workspace, Path], cache
     assert verified_runs.recall(key) == {}
 
 
-def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Path) -> None:
-    """An unfinished run has no entry."""
+def test_an_unfinished_run_has_no_entry(made: tuple[Workspace, Path], cache: Path) -> None:
     run = made[1]
     ledger = digests.read(run)
     try:
@@ -115,11 +113,10 @@ def test_what_is_not_finished_has_no_key(made: tuple[Workspace, Path], cache: Pa
 
 
 @pytest.mark.slow
-def test_room_is_made_for_the_pictures_of_the_next_seed(
+def test_space_is_freed_for_the_images_of_the_next_seed(
     made: tuple[Workspace, Path], cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run of several seeds frees space after the golden runs, and each time a worker changes to another
-    seed."""
+    """This happens after the golden runs, and each time a worker changes to another seed."""
     asked = []
     monkeypatch.setattr(caches, "make_room", asked.append)
     run_campaign(made[0], "small", tmp_path / "run", choices=Choices(limit=4), engine="reference")
