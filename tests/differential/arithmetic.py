@@ -1,8 +1,5 @@
-"""Digests of everything that a run's bytes depend on: frames, detections and traces.
-
-`python tests/differential/arithmetic.py [FOLDER]` prints them as JSON for the current Python and processor.
-If FOLDER is given, it uses the compiled code there.
-"""
+"""Digests of everything that a run's bytes depend on. `python tests/differential/arithmetic.py [FOLDER]`
+prints them as JSON for the current Python and processor, with the compiled code in FOLDER if given."""
 
 import json
 import sys
@@ -56,7 +53,6 @@ def digests() -> Iterator[tuple[str, str]]:
 
 
 def roads() -> dict[str, np.ndarray]:
-    """Return rendered roads, one of them seen from another pose."""
     model = CameraModel()
     found = {
         name: RoadRenderer(model, look, seed=3).grey(31.0, 0.4, 0.02)
@@ -70,7 +66,7 @@ def roads() -> dict[str, np.ndarray]:
 
 
 def seen(detector: str, level: int) -> Iterator[tuple[str, str]]:
-    """Return what a detector sees through each effect up to that level, and the frames themselves."""
+    """Return the detections through each effect up to that level, and the frames themselves."""
     model = CameraModel()
     road = RoadRenderer(model, WORN, seed=3)
     frames = [road.grey(m.position, 0.3, 0.01) for m in MOMENTS]

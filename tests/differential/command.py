@@ -11,13 +11,12 @@ from pathlib import Path
 
 from mutator.workspace import Workspace
 
-LINGER_S = 5.0  # after a command ends, its other processes have this long to end
+LINGER_S = 5.0  # time for a command's other processes to end after it
 DERIVED = ("results.csv", "results.parquet", "propagation.parquet")
 Bytes = dict[str, bytes]
 
 
 def results(out: Path) -> Bytes:
-    """Return the results tables and the packed series of a run folder as bytes."""
     series = {path.name: path.read_bytes() for path in (out / "series").iterdir()}
     assert "index.js" in series
     return series | {name: (out / name).read_bytes() for name in DERIVED}
@@ -29,8 +28,6 @@ def pytest_words(out: Path, campaign: str | Path = "small", workers: int = 2) ->
 
 
 class Command:
-    """The command `python WORDS` and all processes that it starts."""
-
     def __init__(self, workspace: Workspace, out: Path, *words: str, **environment: str) -> None:
         self.out = out
         self.mark = f"MUTATOR_TEST={os.urandom(8).hex()}"
@@ -76,7 +73,6 @@ class Command:
                 continue
 
     def workers(self) -> list[int]:
-        """Return the command's living xdist workers."""
         registered = {path.name for path in (self.out / "workers").glob("[0-9]*")}
         return sorted(pid for pid, _ in self.others() if str(pid) in registered)
 
@@ -90,7 +86,6 @@ class Command:
         return printed
 
     def kill(self) -> None:
-        """Kill the command and everything it started, unconditionally."""
         self.process.kill()
         self.process.wait()
         while left := list(self.others()):

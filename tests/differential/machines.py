@@ -15,10 +15,8 @@ _QUIET = {"DASK_LOGGING__DISTRIBUTED": "error"}
 
 @dataclass
 class Machines:
-    """A scheduler, which starts at once, and workers, which start on request."""
-
     folder: Path
-    nanny: bool = True  # restarts a worker that died
+    nanny: bool = True  # restarts dead workers
     environment: Mapping[str, str] = field(default_factory=dict)
     workers: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
@@ -28,7 +26,6 @@ class Machines:
         self.start_scheduler()
 
     def start_scheduler(self) -> None:
-        """Start the scheduler at a free loopback port and wait until it has written its file."""
         self.file.unlink(missing_ok=True)
         words = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(self.file)]
         self.scheduler = self._started("scheduler", words)
@@ -64,7 +61,6 @@ class Machines:
         return found
 
     def children(self) -> list[int]:
-        """Return the processes that run pieces of work for any worker."""
         found = []
         for path in Path("/proc").glob("[0-9]*"):
             try:
@@ -77,7 +73,6 @@ class Machines:
         return found
 
     def end(self) -> None:
-        """Kill all processes and everything they started."""
         for process in (*self.workers.values(), self.scheduler):
             for number in (signal.SIGCONT, signal.SIGKILL):
                 try:

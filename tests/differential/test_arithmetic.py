@@ -22,11 +22,8 @@ PROCESSORS = {
 
 @pytest.mark.parametrize("processor", PROCESSORS)
 @pytest.mark.parametrize("code", ["plain", "compiled"])
-def test_bytes_are_those_that_were_recorded(processor: str, code: str, tmp_path: Path) -> None:
-    """The digests equal the recorded ones.
-
-    After an intended change of results, record them with `python tests/differential/arithmetic.py`.
-    """
+def test_digests_equal_the_recorded_ones(processor: str, code: str, tmp_path: Path) -> None:
+    """After an intended change of results, record them with `python tests/differential/arithmetic.py`."""
     command = [sys.executable, str(HERE / "arithmetic.py")]
     if code == "compiled":
         if not compiler():

@@ -1,4 +1,4 @@
-"""Every engine gives exactly the same reason why a run did not end well."""
+"""Every engine gives the same reason why a run did not end well."""
 
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -35,9 +35,9 @@ FROM_2_S = at_time(2.0)
 IN_ONE_STEP = Trigger(name="x", condition="t > 1.97 and t < 2.02")
 FIRST_ACTIVE_S = 2.0
 
-# What the target does when its sensor returns a text instead of a distance: `gap_of` does it, then continues
-# with a distance. In every step of a mutant it acts on the scenario's number; in the careful scenario it
-# notices a failing sensor.
+# When the sensor returns a text instead of a distance, `gap_of` calls the function of that name and returns a
+# distance. In scenario `earlyN`, a mutant calls one of four functions in every step. In `careful`, the target
+# reports a failing sensor.
 MOODS = """
 import ctypes, os, sys
 from contextlib import suppress
@@ -180,7 +180,6 @@ MODELS = {  # line of the template, more in the YAML
 
 
 def prepare(toy: Workspace) -> None:
-    """Build the toy with these misbehaviours and with fault models that inject raising lines."""
     tree = toy.library.parent / "tree" / "toycar"
     (tree / "moods.py").write_text(MOODS)
     for name, pairs in EDITS.items():
@@ -210,13 +209,10 @@ def at(anchor: Anchor) -> FaultLocation:
 
 
 def sensed(mood: str | None) -> Fault:
-    """Return what the sensor returns instead of a distance."""
     return at_gap("stuck", value=mood)
 
 
 class Blamed:
-    """The toy on every engine, and the records of its experiments."""
-
     def __init__(self, toy: Workspace, folder: Path) -> None:
         prepare(toy)
         self.toy = toy
@@ -292,11 +288,9 @@ def blamed(
         ("break_down", "killed by SIGSEGV", None),
     ],
 )
-def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, place: str | None) -> None:
-    """If the target raises, exits or ends the interpreter after the activation, the target has crashed.
-
-    The record keeps type, text and place of an exception.
-    """
+def test_a_target_that_ends_after_the_activation_has_crashed(
+    blamed: Blamed, mood: str | None, detail: str, place: str | None
+) -> None:
     record = blamed.record(sensed(mood))
     assert record.status is Status.CRASHED
     if place is None:
@@ -309,8 +303,8 @@ def test_the_targets_code_raises(blamed: Blamed, mood: str | None, detail: str, 
     assert record.activation.first == FIRST_ACTIVE_S
 
 
-def test_a_guarded_statement_raises(blamed: Blamed) -> None:
-    """A guarded statement belongs to the target, so an exception in it after the activation is a crash."""
+def test_an_exception_in_a_guarded_statement_is_a_crash(blamed: Blamed) -> None:
+    """A guarded statement belongs to the target."""
     left_out = fault(Injection(location=at(SEEN), model="omission"))
     record = blamed.record(left_out, IN_ONE_STEP)
     assert record.status is Status.CRASHED
@@ -347,8 +341,7 @@ def test_an_injected_line_raises(
     assert record.error is not None and record.activation is None
 
 
-def test_a_model_that_raises(blamed: Blamed) -> None:
-    """If the fault model declares that it raises, an exception in its line is a crash."""
+def test_an_exception_that_the_model_declares_is_a_crash(blamed: Blamed) -> None:
     record = blamed.record(at_gap("declared"))
     assert record.status is Status.CRASHED
     assert record.detail == "IndexError: list index out of range (toycar/sensing.py:15)"
@@ -358,13 +351,11 @@ def test_a_model_that_raises(blamed: Blamed) -> None:
     ("model", "params", "kind"),
     [("repetition", (), "KeyError"), ("exception", (("error", "TimeoutError"),), "TimeoutError")],
 )
-def test_a_statement_of_the_target_raises_once_more(
+def test_an_exception_in_a_repeated_statement_is_a_crash(
     blamed: Blamed, model: str, params: tuple[tuple[str, Value], ...], kind: str
 ) -> None:
-    """A repeated statement belongs to the target, so an exception at its second execution is a crash.
-
-    An exception that a model raises on purpose is also a crash.
-    """
+    """A repeated statement belongs to the target. An exception that a model raises on purpose is also a
+    crash."""
     seen = Anchor(kind=AnchorKind.AFTER_ASSIGN, name="self.seen")
     record = blamed.record(fault(Injection(location=at(seen), model=model, params=params)))
     assert record.status is Status.CRASHED
@@ -404,8 +395,7 @@ def test_a_hang_after_the_activation(blamed: Blamed) -> None:
         ("take_the_probe_apart", "the probe failed: AttributeError: 'NoneType' object has no attribute 't'"),
     ],
 )
-def test_a_mutant_overwrites_its_probe(blamed: Blamed, mood: str, detail: str) -> None:
-    """A broken probe or an invalid probe report is a harness error."""
+def test_a_damaged_probe_is_a_harness_error(blamed: Blamed, mood: str, detail: str) -> None:
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR
     assert record.detail.startswith(detail)
@@ -420,11 +410,9 @@ def test_a_damaged_report_costs_one_experiment(blamed: Blamed) -> None:
 
 
 @pytest.mark.parametrize("mood", ["stop_the_time", "observe_again_and_hide_it", "lose_the_lead"])
-def test_what_cannot_be_observed(blamed: Blamed, mood: str) -> None:
-    """Observing twice at one time, or a failed observation, is a probe error that names the place.
-
-    This holds even if the target catches the error.
-    """
+def test_a_failed_observation_is_a_probe_error(blamed: Blamed, mood: str) -> None:
+    """The error names the place, even if the target catches it. Observing twice at one time is an error,
+    too."""
     record = blamed.record(sensed(mood))
     assert record.status is Status.HARNESS_ERROR
     assert record.error is not None

@@ -24,7 +24,6 @@ TABLES = ("results.csv", "results.parquet", "propagation.parquet")
 def expected(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]
 ) -> dict[str, bytes]:
-    """The tables of a campaign on the reference engine."""
     folder = tmp_path_factory.mktemp("reference")
     run_campaign(copy_toycar(folder), "toy", folder / "run", engine="reference")
     return {name: (folder / "run" / name).read_bytes() for name in TABLES}
@@ -43,10 +42,9 @@ def test_every_engine_gives_the_same_tables(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("victim", ["fork_server", "worker"])
-def test_killed_again_and_again(
+def test_killing_servers_or_workers_changes_no_table(
     toy: Workspace, tmp_path: Path, expected: dict[str, bytes], victim: str
 ) -> None:
-    """If servers or workers are killed during a campaign, the tables stay the same."""
     out = tmp_path / "run"
     for _ in range(3):
         process = _begun(toy, out)
@@ -66,8 +64,10 @@ def test_killed_again_and_again(
 
 
 @pytest.mark.slow
-def test_a_proof_goes_on_after_kills(toy: Workspace, tmp_path: Path, expected: dict[str, bytes]) -> None:
-    """A campaign killed during its equivalence check resumes with the rest and checks none twice."""
+def test_an_equivalence_check_resumes_after_kills(
+    toy: Workspace, tmp_path: Path, expected: dict[str, bytes]
+) -> None:
+    """No experiment is checked twice."""
     out, proved = tmp_path / "run", 0
     for _ in range(3):
         process = _begun(toy, out)
@@ -85,7 +85,6 @@ def test_a_proof_goes_on_after_kills(toy: Workspace, tmp_path: Path, expected: d
 
 
 def _begun(toy: Workspace, out: Path) -> "subprocess.Popen[bytes]":
-    """The campaign on the fork engine, with two workers."""
     words = ("run", "toy", "--out", str(out), "-n", "2", "--engine", "fork")
     places = {"MUTATOR_LIBRARY": str(toy.library), "MUTATOR_TEMPLATES": str(toy.templates)}
     return subprocess.Popen(
@@ -97,7 +96,7 @@ def _begun(toy: Workspace, out: Path) -> "subprocess.Popen[bytes]":
 
 
 def _proved(out: Path) -> list[str]:
-    """Return the lines of the proof without the headers of their files."""
+    """Return the lines of the proof without file headers."""
     files = (out / "proof").glob("*.jsonl")
     return [line for path in files for line in path.read_text().splitlines()[1:]]
 

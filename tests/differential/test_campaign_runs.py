@@ -32,7 +32,7 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> Path:
-    """The small campaign, run in one process without a break. No test may write to its folder."""
+    """The small campaign, run in one process without interruption. No test may write to its folder."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run")
     assert (summary.exit_code, summary.done, summary.ran) == (0, 12, 12)
@@ -42,23 +42,22 @@ def whole(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> 
 
 @pytest.fixture(scope="module")
 def undisturbed(whole: Path) -> Bytes:
-    """The results of the uninterrupted run."""
     return results(whole)
 
 
 @pytest.mark.parametrize("workers", [pytest.param(1, marks=pytest.mark.slow), 2])
-def test_any_number_of_workers(toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int) -> None:
-    """One or two xdist workers give the same bytes as a run without workers."""
+def test_the_number_of_workers_changes_no_byte(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes, workers: int
+) -> None:
     summary = run_campaign(toy, "small", tmp_path / "run", workers=workers)
     assert summary.exit_code == 0
     assert len(list((tmp_path / "run" / "records").iterdir())) == workers
     assert results(tmp_path / "run") == undisturbed
 
 
-def test_any_order_in_any_number_of_sessions(
+def test_order_and_interruptions_change_no_byte(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A run with shuffled chunks that stops after every two chunks and resumes gives the same bytes."""
     prepare, draw = Session.prepare, random.Random(3)
     taken: list[int] = []
 
@@ -81,11 +80,8 @@ def test_any_order_in_any_number_of_sessions(
 def test_lost_records_run_again(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes, closed: bool
 ) -> None:
-    """If records at the end of a file are lost, only these are run again.
-
-    A kill cannot lose records of a file that a session has closed. Such a file is refused until it is
-    repaired.
-    """
+    """A kill cannot lose records of a file that a session has closed. Such a file is refused until it is
+    repaired."""
     out = shutil.copytree(whole, tmp_path / "run")
     [path] = (out / "records").iterdir()
     lines = path.read_bytes().splitlines(keepends=True)
@@ -103,10 +99,9 @@ def test_lost_records_run_again(
     assert results(out) == undisturbed
 
 
-def test_derived_files_can_be_made_again(
+def test_deleted_tables_are_rebuilt_from_records(
     toy: Workspace, tmp_path: Path, whole: Path, undisturbed: Bytes
 ) -> None:
-    """Tables deleted from a complete run are rebuilt from its records, byte for byte."""
     out = shutil.copytree(whole, tmp_path / "run")
     for name in DERIVED:
         (out / name).unlink()
@@ -117,14 +112,13 @@ def test_derived_files_can_be_made_again(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT], ids=lambda s: s.name)
-def test_killed_and_resumed(
+def test_a_killed_campaign_resumes_to_the_same_bytes(
     toy: Workspace, tmp_path: Path, undisturbed: Bytes, number: signal.Signals
 ) -> None:
-    """A killed command leaves no process. The same command then completes to the same bytes."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(4)
-    if number is signal.SIGINT:  # as a terminal does: the whole foreground group gets it
+    if number is signal.SIGINT:  # as a terminal signals the whole foreground group
         os.killpg(command.process.pid, number)
     else:
         command.process.send_signal(number)
@@ -138,12 +132,9 @@ def test_killed_and_resumed(
 
 
 @pytest.mark.slow
-def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """After a kill, pytest resumes what `mutator run` began and reaches the same bytes.
-
-    No process or registration of a killed worker is left. The killed worker below shows that `mutator run`
-    resumes what pytest left.
-    """
+def test_pytest_resumes_a_killed_run(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
+    """No process or registration of a killed worker is left. `test_a_killed_worker` shows that `mutator run`
+    resumes what pytest left."""
     out = tmp_path / "run"
     command = Command(toy, out, "-m", "mutator", "run", "small", "--out", str(out), "-n", "2")
     command.wait_for_records(4)
@@ -161,8 +152,9 @@ def test_killed_and_resumed_by_pytest(toy: Workspace, tmp_path: Path, undisturbe
 
 
 @pytest.mark.slow
-def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A command killed before its first experiment starts again and gives the same bytes."""
+def test_a_command_killed_during_its_checks_starts_again(
+    toycar: Workspace, tmp_path: Path, undisturbed: Bytes
+) -> None:
     out = tmp_path / "run"
     command = Command(toycar, out, *pytest_words(out))
     command.wait_for(out / "work" / "checks")
@@ -174,10 +166,7 @@ def test_killed_during_the_checks(toycar: Workspace, tmp_path: Path, undisturbed
 
 @pytest.mark.slow
 def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A killed worker loses its chunk, the rest is run and the exit code is 3.
-
-    A resume completes the campaign.
-    """
+    """A killed worker loses its chunk, the rest is run and the exit code is 3."""
     out = tmp_path / "run"
     command = Command(toy, out, *pytest_words(out))
     command.wait_for_records(2)
@@ -195,10 +184,10 @@ def test_a_killed_worker(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> 
     [["-m", "mutator", "run", "small", "-n", "1", "--out"], pytest.param(None, marks=pytest.mark.slow)],
     ids=["mutator", "pytest"],
 )
-def test_a_worker_dies_with_its_command_from_its_first_moment(
+def test_a_starting_worker_ends_when_its_command_is_killed(
     toy: Workspace, tmp_path: Path, words: list[str] | None
 ) -> None:
-    """If the command is killed, a worker that was stopped before it read anything ends."""
+    """The worker is stopped before it has read anything."""
     out = tmp_path / "run"
     command = Command(toy, out, *(pytest_words(out, workers=1) if words is None else [*words, str(out)]))
     while not (started := [pid for pid, line in command.others() if re.match("[^ ]+ -u -c .*stdin", line)]):
@@ -216,12 +205,13 @@ def test_a_worker_dies_with_its_command_from_its_first_moment(
         command.end()
 
 
-def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes) -> None:
-    """A second command in a folder in use is refused with the owner's name and disturbs nothing."""
+def test_a_second_command_in_a_folder_in_use_is_refused(
+    toy: Workspace, tmp_path: Path, undisturbed: Bytes
+) -> None:
     out = tmp_path / "run"
     first = Command(toy, out, *pytest_words(out, workers=0))
     first.wait_for_records(1)
-    first.process.send_signal(signal.SIGSTOP)  # so that it is not finished before the second begins
+    first.process.send_signal(signal.SIGSTOP)  # to keep it unfinished when the second starts
     try:
         second = Command(toy, out, *pytest_words(out))
         printed = second.process.communicate(timeout=60)[0]
@@ -237,14 +227,12 @@ def test_one_owner_at_a_time(toy: Workspace, tmp_path: Path, undisturbed: Bytes)
 
 @pytest.fixture(scope="module")
 def clone() -> Workspace:
-    """The shipped library, templates and controller."""
     return Workspace.find(root=Path(__file__).parents[2])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("reading", ["as_described", "as_coded"])
-def test_the_controller_that_ships(clone: Workspace, tmp_path: Path, reading: str) -> None:
-    """The shipped controller gives the same bytes with one worker, two, and after TERM, KILL and a resume."""
+def test_the_shipped_controller_gives_the_same_bytes(clone: Workspace, tmp_path: Path, reading: str) -> None:
     text = clone.campaign("quickstart").read_text()
     for old, new in (
         ("scenarios: [S1, S2, S3, S4, S5]", "scenarios: [S2]"),

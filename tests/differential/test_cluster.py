@@ -34,7 +34,6 @@ def toy(toy: Workspace, kept_checks: None) -> Workspace:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
-    """The small campaign's results and seal with the fork engine and two local workers."""
     folder = tmp_path_factory.mktemp("undisturbed")
     summary = run_campaign(copy_toycar(folder), "small", folder / "run", workers=2, engine="fork")
     assert (summary.exit_code, summary.done) == (0, 12)
@@ -44,7 +43,7 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToyca
 
 @pytest.fixture(scope="module")
 def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
-    """A scheduler with two workers. No test may harm them."""
+    """A scheduler with two workers. No test may stop them."""
     machines = Machines(tmp_path_factory.mktemp("two") / "machines", nanny=False)
     machines.add("alpha")
     machines.add("beta")
@@ -54,14 +53,12 @@ def two(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machines]:
 
 @pytest.fixture
 def machines(tmp_path: Path) -> Iterator[Machines]:
-    """A scheduler without workers."""
     found = Machines(tmp_path / "machines")
     yield found
     found.end()
 
 
 def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary:
-    """Run the small campaign on these machines."""
     deals = distributor(str(machines.file))
     return run_campaign(toy, "small", out, engine="fork", distributor=deals, **more)  # type: ignore[arg-type]
 
@@ -69,11 +66,7 @@ def on(machines: Machines, toy: Workspace, out: Path, **more: object) -> Summary
 def test_two_workers_give_the_same_bytes(
     toy: Workspace, tmp_path: Path, undisturbed: tuple[Bytes, str], two: Machines
 ) -> None:
-    """Two workers with separate folders give the tables, series and seal of a local run.
-
-    Each experiment has one record, the proof is complete, the machines are noted, and the workers keep no
-    files.
-    """
+    """The workers have separate folders and keep no files."""
     out = tmp_path / "run"
     summary = on(two, toy, out)
     assert (summary.exit_code, summary.problem, summary.done) == (0, "", 12)
@@ -98,13 +91,10 @@ def test_pytest_deals_out_to_a_cluster(
     assert tables["results.csv"] == undisturbed[0]["results.csv"]
 
 
-def test_a_worker_that_computes_otherwise_is_refused(
+def test_workers_that_do_not_reproduce_the_golden_run_are_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If no worker reproduces the golden run, the campaign ends with the reason.
-
-    Each worker is named with its versions.
-    """
+    """The error names each worker with its versions."""
     real = bundle.read_json
     monkeypatch.setattr(
         bundle,
@@ -121,7 +111,6 @@ def test_a_worker_that_computes_otherwise_is_refused(
 def test_a_worker_with_another_version_is_refused(
     toy: Workspace, tmp_path: Path, two: Machines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A worker with packages that cannot resume the run is refused by name, with the difference."""
     real = machine.versions
     monkeypatch.setattr(machine, "versions", lambda names=None: real(names) | {"numpy": "1.0"})
     with pytest.warns(MutatorWarning, match=r"worker beta.*gets no work: numpy 1\.0, there 2"):
@@ -131,7 +120,7 @@ def test_a_worker_with_another_version_is_refused(
 
 @pytest.mark.parametrize(("number", "code"), [(KILL, -KILL), (INT, 130)], ids=["KILL", "INT"])
 @pytest.mark.slow
-def test_a_dead_command_leaves_nothing_at_work(
+def test_workers_stop_when_their_command_dies(
     toy: Workspace,
     tmp_path: Path,
     two: Machines,
@@ -139,10 +128,7 @@ def test_a_dead_command_leaves_nothing_at_work(
     number: signal.Signals,
     code: int,
 ) -> None:
-    """When the command is killed or interrupted, all processes of the workers' work end within 10 s.
-
-    The rest then runs to the same bytes.
-    """
+    """All processes of the workers' jobs end within 10 s."""
     out = tmp_path / "run"
     words = ["-m", "mutator", "run", "small", "--out", str(out)]
     words += ["--engine", "fork", "--cluster", str(two.file)]
@@ -166,7 +152,7 @@ KILLS = [(number, seed) for seed in range(5) for number in (INT, TERM, KILL, STO
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("number", "seed"), KILLS, ids=[f"{n.name}-{s}" for n, s in KILLS])
-def test_workers_struck_at_random(
+def test_workers_killed_at_random_change_no_byte(
     toy: Workspace,
     tmp_path: Path,
     machines: Machines,
@@ -174,7 +160,6 @@ def test_workers_struck_at_random(
     seed: int,
     whole_toy: tuple[Bytes, str],
 ) -> None:
-    """With workers killed at random, and one that joins late, a campaign gives the same bytes."""
     draw = random.Random(f"{number} {seed}")
     for name in ("alpha", "beta"):
         machines.add(name)
@@ -202,7 +187,6 @@ def test_workers_struck_at_random(
 
 @pytest.fixture(scope="module")
 def whole_toy(tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar) -> tuple[Bytes, str]:
-    """The results of the campaign `toy` with two local workers."""
     folder = tmp_path_factory.mktemp("whole")
     summary = run_campaign(copy_toycar(folder), "toy", folder / "run", workers=2, engine="fork")
     assert summary.exit_code == 0
@@ -230,13 +214,9 @@ _OTHER = "import mutator._common.version as version\nversion.VERSION = '0.0.1'\n
     ],
     ids=["arithmetic", "version"],
 )
-def test_a_refused_worker_is_told_and_the_others_do_its_work(
+def test_the_others_do_the_work_of_a_refused_worker(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str], code: str, why: str
 ) -> None:
-    """A worker with other arithmetic or another version is refused by name.
-
-    The others complete the campaign.
-    """
     (tmp_path / "site").mkdir()
     (tmp_path / "site" / "sitecustomize.py").write_text(code)
     machines.add("alpha")
@@ -252,13 +232,9 @@ def test_a_refused_worker_is_told_and_the_others_do_its_work(
 
 
 @pytest.mark.slow
-def test_the_scheduler_dies(
+def test_a_campaign_resumes_with_a_new_scheduler(
     toy: Workspace, tmp_path: Path, machines: Machines, whole_toy: tuple[Bytes, str]
 ) -> None:
-    """If the scheduler dies, the command ends and says what to do.
-
-    With a new scheduler, the same command repeats nothing and reaches the same bytes.
-    """
     machines.add("alpha")
     out = tmp_path / "run"
 
@@ -284,7 +260,7 @@ def test_the_scheduler_dies(
 @pytest.mark.slow
 @pytest.mark.parametrize("campaign", ["quickstart", "paper_smoke"])
 def test_shipped_campaigns_on_three_workers(tmp_path: Path, machines: Machines, campaign: str) -> None:
-    """Shipped campaigns give the same bytes on three workers as on two local ones."""
+    """Shipped campaigns give the same bytes as with two local workers."""
     shipped = Workspace.find(CLONE)
     here = run_campaign(shipped, campaign, tmp_path / "here", workers=2)
     assert here.exit_code == 0

@@ -106,8 +106,6 @@ def fault(model: str, anchor: Anchor, params: dict[str, Value]) -> Fault:
 
 
 class Engines:
-    """The three engines on one toy, and jobs for them."""
-
     def __init__(self, toy: Workspace, folder: Path, limits: Limits = LIMITS) -> None:
         self.toy = toy
         self.folder = folder
@@ -149,7 +147,6 @@ class Engines:
         )
 
     def run(self, name: str, job: Job) -> tuple[Execution, dict[str, bytes]]:
-        """Return the result of a job and the files that it left."""
         ((_, execution),) = [
             (job, replace(done, log=done.log)) for job, done in self._kept(self.made[name], [job])
         ]
@@ -175,7 +172,6 @@ def three(
 
 
 def values(three: Engines, path: str) -> list[FaultLocation]:
-    """Return every anchor of every value in a file of the toy."""
     found, seen = [], Counter[tuple[str, AnchorKind, str, str | None]]()
     for function, known in parsed(three.manifest.tree, path).expressions.items():
         for kind, name, which in (role for one in known for role in dict.fromkeys(one.roles)):
@@ -191,10 +187,8 @@ def fault_at(place: FaultLocation, model: str, params: dict[str, Value]) -> Faul
 
 
 def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Execution:
-    """Check that status, messages, probe report and files equal the reference engine's.
-
-    Return the fork engine's execution.
-    """
+    """Check that status, messages, probe report and files equal the reference engine's. Return the fork
+    engine's execution."""
     expected, files = three.run("reference", job)
     for name in ("warm", "fork"):
         execution, found = three.run(name, job)
@@ -211,8 +205,8 @@ def check_same(three: Engines, job: Job, how: RunMode | None = None) -> Executio
 
 
 @pytest.mark.parametrize("model", ["offset", "omission", "image_effect", "reordering", "slow_call"])
-def test_same_bytes(three: Engines, model: str) -> None:
-    """A fault that is active in a context gives the reference engine's bytes without a fresh interpreter."""
+def test_a_fault_in_a_context_is_forked(three: Engines, model: str) -> None:
+    """The fork gives the reference engine's bytes."""
     execution = check_same(three, three.job(fault(*MODELS[model]), TRIGGERS["in a context"]), RunMode.FORK)
     assert execution.start > 20
 
@@ -221,10 +215,7 @@ def test_same_bytes(three: Engines, model: str) -> None:
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("model", MODELS)
 def test_every_model_under_every_trigger(three: Engines, model: str, trigger: str) -> None:
-    """Every fault model under every kind of trigger gives the reference engine's bytes.
-
-    A trigger that never holds gives them without a run.
-    """
+    """A trigger that never holds gives the reference engine's bytes without a run."""
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     for scenario in ("A", "B"):
         check_same(
@@ -235,7 +226,6 @@ def test_every_model_under_every_trigger(three: Engines, model: str, trigger: st
 
 
 def test_a_changed_value_is_forked(three: Engines) -> None:
-    """A value changed in place gives the reference engine's bytes without a fresh interpreter."""
     anchor = Anchor(kind=AnchorKind.ASSIGNED_VALUE, name="closing")
     place = FaultLocation(path="toycar/sensing.py", function="Sensor.sense", anchor=anchor)
     check_same(
@@ -247,9 +237,7 @@ def test_a_changed_value_is_forked(three: Engines) -> None:
 @pytest.mark.parametrize("trigger", ["always", "for 1 s", "off and on"])
 @pytest.mark.parametrize("path", ["toycar/sensing.py", "toycar/driver.py"])
 def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str) -> None:
-    """For every value of the toy and each of its anchors, changed by a model that fits or fails, every engine
-    gives the reference engine's bytes or message.
-    """
+    """Every value, at each of its anchors, is changed by a model that fits or fails."""
     places = values(three, path)
     assert len(places) > 10
     changes: tuple[tuple[str, dict[str, Value]], ...] = (
@@ -263,17 +251,13 @@ def test_every_value_under_some_triggers(three: Engines, path: str, trigger: str
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ENDS)
-def test_every_bad_end(three: Engines, model: str) -> None:
-    """A run that crashes, hangs, exhausts memory, exits or breaks the interpreter ends with the
-    same message.
-    """
+def test_every_bad_end_has_the_same_message(three: Engines, model: str) -> None:
     execution = check_same(three, three.job(fault(model, GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"]))
     assert execution.status is (Status.TIMEOUT if model == "hang" else Status.CRASHED)
     check_same(three, three.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"]), RunMode.FORK)
 
 
-def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
-    """The reference engine reruns what does not end well. The engine's server continues."""
+def test_the_reference_engine_reruns_a_crash(three: Engines) -> None:
     job = three.job(fault("crash", GAP, {"target": "gap"}), TRIGGERS["from 2.01 s"])
     execution, _ = three.run("fork", job)
     assert (execution.status, execution.mode) == (Status.CRASHED, RunMode.REFERENCE)
@@ -283,10 +267,10 @@ def test_a_crash_is_told_by_the_reference_engine(three: Engines) -> None:
     assert (execution.mode, execution.status) == (RunMode.FORK, Status.OK)
 
 
-def test_the_limit_of_steps_counts_golden_ones(
+def test_the_step_limit_includes_golden_steps(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace]
 ) -> None:
-    """A fork that exceeds the limit of steps times out after as many steps as in any other engine."""
+    """A fork times out after as many steps as in any other engine."""
     few = Engines(copy_toycar(tmp_path), tmp_path, replace(LIMITS, steps=100))
     try:
         job = few.job(fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])

@@ -1,4 +1,5 @@
-"""On the shipped controller, the engines give the same records and leave no run to the reference engine."""
+"""On the shipped controller, the engines give the same records, and no run falls back to the reference
+engine."""
 
 from collections import Counter
 from pathlib import Path
@@ -21,10 +22,6 @@ CLONE = Path(__file__).parents[2]
 @pytest.mark.slow
 @pytest.mark.parametrize(("campaign", "limit"), [("quickstart", 26), ("paper", 8)])
 def test_same_records(tmp_path: Path, campaign: str, limit: int) -> None:
-    """Experiments of every kind have the same records and trace digests, with ideal vision and with frames.
-
-    They are forked, not run in full.
-    """
     clone = Workspace.find(root=CLONE)
     plan = make_plan(clone, campaign, Choices(limit=limit))
     manifest, models = clone.manifest("openpilot"), clone.fault_models()

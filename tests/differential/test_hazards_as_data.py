@@ -13,7 +13,7 @@ from mutator.outcomes.judging import judge_run
 from mutator.targets.manifest import TargetManifest
 from mutator.workspace import Workspace
 
-# the checker's thresholds, and values on both sides of them
+# the checker's thresholds and their neighbours
 NEAR = [0.0, 0.3, 0.5 * (3.7 - 1.8), 0.5 * (3.7 + 1.8), 100.0, 200.0]
 NUMBERS = st.one_of(
     *(st.sampled_from([at, np.nextafter(at, -np.inf), np.nextafter(at, np.inf), -at]) for at in NEAR)
@@ -31,7 +31,6 @@ def manifest() -> TargetManifest:
 def test_the_manifest_finds_what_the_checker_finds(
     manifest: TargetManifest, steps: list[tuple[float, float, float]]
 ) -> None:
-    """For any distances, speeds and offsets, each hazard occurs in the same step, or in neither."""
     monitor = HazardMonitor()
     t = np.arange(len(steps)) * 0.01
     for at, (d_rel, v_ego, offset) in zip(t, steps, strict=True):

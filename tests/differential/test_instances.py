@@ -48,11 +48,8 @@ def fault(*injections: Injection) -> Fault:
     return Fault("s", "m", "f", "as_described", None, "", "H1", injections)
 
 
-def test_all_at_once(three: Engines) -> None:
-    """A mutant with limited injections is forked, gives the reference engine's bytes and counts activations.
-
-    They are limited to one instance, to some executions, and to both.
-    """
+def test_all_limits_in_one_mutant(three: Engines) -> None:
+    """The injections are limited to one instance, to some executions, and to both."""
     execution = check_same(three, three.job(fault(*INJECTIONS), TRIGGERS["for 1 s"]), RunMode.FORK)
     assert execution.probe is not None
     counts = [told["count"] for told in execution.probe["injections"].values()]
@@ -64,7 +61,6 @@ def test_all_at_once(three: Engines) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("trigger", TRIGGERS)
 @pytest.mark.parametrize("injection", INJECTIONS, ids=["instance", "value", "guard"])
-def test_each_under_every_trigger(three: Engines, injection: Injection, trigger: str) -> None:
-    """Each limited injection, under every kind of trigger, gives the reference engine's bytes."""
+def test_each_limit_under_every_trigger(three: Engines, injection: Injection, trigger: str) -> None:
     how = RunMode.GOLDEN if trigger == "never" else RunMode.FORK
     check_same(three, three.job(fault(injection), TRIGGERS[trigger]), how)

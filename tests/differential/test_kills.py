@@ -58,7 +58,6 @@ def results_digest(out: Path) -> str:
 
 
 def stage(out: Path) -> str:
-    """Return how far a run is: `start`, `checks`, `experiments` or `results`."""
     if (out / "results.csv").exists():
         return "results"
     if any((out / "records").glob("*.jsonl")):
@@ -81,16 +80,14 @@ class Campaign:
         self.longest_s = time.monotonic() - began
 
     def kill_and_resume(self, kills: Sequence[Kill]) -> None:
-        """Run in new folders, each with its own checks, until all kills have happened."""
+        """Use new folders, each with its own checks, until all kills have happened."""
         left, number = list(kills), count()
         while left:
             assert self.finish(self.folder / f"killed{next(number)}", left) == self.results
 
     def finish(self, out: Path, kills: list[Kill]) -> str:
-        """Repeat the command until it completes, killing it with the remaining `kills`.
-
-        Return the digest of the results.
-        """
+        """Repeat the command until it completes, with the remaining `kills`. Return the digest of the
+        results."""
         done = False
         while not done:
             command = Command(
@@ -100,29 +97,26 @@ class Campaign:
             if hit:
                 self.stages.append(stage(out))
                 kills.pop(0)
-            printed = command.end()  # and that of every process it started
+            printed = command.end()  # with all processes it started
             done = command.process.returncode == 0
             assert done or hit, printed
             assert contents(self.tree) == self.before
-            if done or command.process.returncode == 130:  # it was asked to stop, and cleaned up
+            if done or command.process.returncode == 130:  # stopped by a signal, and cleaned up
                 assert not scratch(out), printed
         return results_digest(out)
 
 
 def test_twenty_kills(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> None:
-    """Killed 20 times, as a whole or one worker, the campaign gives the same results.
-
-    The signals are INT, TERM and KILL. Nothing is left behind.
-    """
+    """INT, TERM and KILL are sent to the command or to one worker."""
     words = ["-m", "mutator", "run", "small", "-n", "2"]
     campaign = Campaign(copy_toycar(tmp_path), tmp_path, words, seed=5)
     campaign.kill_and_resume(random.Random(5).sample(EVERY * 4, 20))
     assert len(campaign.stages) == 20
-    assert len(set(campaign.stages)) > 1  # not all of them before the first experiment
+    assert len(set(campaign.stages)) > 1  # not all before the first experiment
 
 
-def test_kills_on_the_controller_that_ships(tmp_path: Path) -> None:
-    """The same holds for the shipped controller: 30 experiments without frames, killed six times."""
+def test_kills_on_the_shipped_controller(tmp_path: Path) -> None:
+    """A run of 30 experiments without frames is killed six times."""
     for name in ("fault_library", "templates", "target"):
         shutil.copytree(CLONE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
     words = ["-m", "mutator", "run", "paper_reference", "-n", "2", "--limit", "30"]

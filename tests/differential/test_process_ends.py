@@ -28,10 +28,7 @@ ACTIVE = (fault(*MODELS["offset"]), TRIGGERS["from 2.01 s"])
 
 
 def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: Limits) -> Engines:
-    """Engines on the toy with a mutant that executes the code `trouble`.
-
-    `head` runs when the target is loaded.
-    """
+    """Engines on the toy with a mutant that executes `trouble`. `head` runs when the target is loaded."""
     package = toy.library.parent / "tree" / "toycar"
     go = (package / "go.py").read_text()
     assert MEET_TROUBLE in go
@@ -42,10 +39,8 @@ def with_trouble(toy: Workspace, folder: Path, trouble: str, head: str, limits: 
 
 @pytest.fixture
 def misbehave(tmp_path: Path, copy_toycar: Callable[[Path], Workspace]) -> Iterator[Misbehave]:
-    """Run a mutant that executes the code `trouble` in its output folder, in each engine.
-
-    Return the result and the files. `head` is more code of the target, run when it is loaded.
-    """
+    """Run a mutant that executes `trouble` in its output folder, in each engine. `head` runs when the target
+    is loaded."""
     made: list[Engines] = []
 
     def run(
@@ -108,11 +103,8 @@ def lives(pid: int) -> bool:
     return state != "Z"
 
 
-def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
-    """Ten daemons of a mutant are all gone after the run, in any engine.
-
-    They are in separate sessions and ignore signals. Some have children, and some fork repeatedly.
-    """
+def test_ten_daemons_end_with_the_run(misbehave: Misbehave, tmp_path: Path) -> None:
+    """The daemons have separate sessions and ignore signals. Some have children, and some fork repeatedly."""
     notes = tmp_path / "notes"
     notes.mkdir()
     told = misbehave(DAEMONS.format(notes=str(notes)))
@@ -125,10 +117,9 @@ def test_ten_daemons(misbehave: Misbehave, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_daemons_of_a_killed_engine(
+def test_daemons_end_with_a_killed_engine(
     tmp_path: Path, copy_toycar: Callable[[Path], Workspace], name: str
 ) -> None:
-    """If an engine's process is killed during a run, the run's daemons end, too."""
     notes = tmp_path / "notes"
     notes.mkdir()
     trouble = DAEMONS.format(notes=str(notes)) + "\n(NOTES.parent / 'all').touch()\ntime.sleep(60)\n"
@@ -175,10 +166,7 @@ scratch = tempfile.TemporaryDirectory(dir=".")
 """
 
 
-def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
-    """`atexit` handlers, finalizers and open files leave the same bytes in the output folder in
-    each engine.
-    """
+def test_exit_handlers_leave_the_same_bytes(misbehave: Misbehave) -> None:
     told = misbehave(LATE_WORDS)
     expected = {
         "late.txt": b"last registered\nfirst registered\nfinalized\n",
@@ -192,11 +180,8 @@ def test_what_is_done_at_the_end(misbehave: Misbehave) -> None:
         assert files == reference
 
 
-def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) -> None:
-    """An `atexit` handler of the loaded target runs once in each run, in the run's output folder.
-
-    It never runs in the waiting processes.
-    """
+def test_an_exit_handler_of_the_target_runs_once_per_run(misbehave: Misbehave, tmp_path: Path) -> None:
+    """The handler never runs in the waiting processes."""
     calls = tmp_path / "calls"
     head = (
         "import atexit, os\n"
@@ -209,29 +194,26 @@ def test_a_handler_of_the_loaded_target(misbehave: Misbehave, tmp_path: Path) ->
     assert folders == ["out"] * 5  # the golden run, three mutants, the golden run's observations
 
 
-def test_a_handler_that_does_not_end(misbehave: Misbehave) -> None:
-    """In each engine, a run with an `atexit` handler that never returns is a timeout."""
+def test_an_exit_handler_that_never_returns_is_a_timeout(misbehave: Misbehave) -> None:
     waits = "import atexit, time\natexit.register(time.sleep, 100)"
     told = misbehave(waits, limits=replace(LIMITS, wall_s=2))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "wall time limit of 2 s")}
     assert [e.mode for e, _ in told.values()] == list(ENGINES)
 
 
-def test_a_handler_that_fails(misbehave: Misbehave) -> None:
-    """A failure at the end of a run that has already reported is not a crash, in any engine."""
+def test_a_failure_after_the_report_is_no_crash(misbehave: Misbehave) -> None:
     told = misbehave("import atexit, os\natexit.register(os._exit, 3)")
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 
-def test_a_kill_from_outside_at_the_end(misbehave: Misbehave) -> None:
-    """A run that is killed after its report counts as failed, because its files may be incomplete."""
+def test_a_run_killed_after_its_report_has_failed(misbehave: Misbehave) -> None:
+    """A run that is killed so late may have incomplete files."""
     told = misbehave("import atexit, os\natexit.register(os.kill, os.getpid(), 9)")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.HARNESS_ERROR, "killed from outside by SIGKILL")}
 
 
-def test_a_thread_that_outlives_its_run(misbehave: Misbehave) -> None:
-    """A thread that the interpreter waits for may finish its work in each engine."""
+def test_a_thread_may_finish_after_the_run(misbehave: Misbehave) -> None:
     thread = (
         "import threading, time\nfrom pathlib import Path\nhere = Path.cwd()\n"
         "def work():\n    time.sleep(0.5)\n    (here / 'thread.txt').write_text('done')\n"
@@ -273,17 +255,13 @@ SLOW_TO_FILL = "without end in folders"
 @pytest.mark.parametrize(
     "how", [pytest.param(how, marks=pytest.mark.slow) if how == SLOW_TO_FILL else how for how in FULL]
 )
-def test_a_limit_of_space(misbehave: Misbehave, how: str) -> None:
-    """A run that exceeds its space in the output folder and TMPDIR is a timeout in each engine.
-
-    The message names the limit.
-    """
+def test_exceeding_the_space_limit_is_a_timeout(misbehave: Misbehave, how: str) -> None:
     told = misbehave(FULL[how], limits=replace(LIMITS, disk_mb=3))
     assert {(e.status, e.detail) for e, _ in told.values()} == {(Status.TIMEOUT, "disk limit of 3 MiB")}
 
 
-def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
-    """A run may write almost up to its limit. Existing files and holes do not count."""
+def test_a_run_may_use_almost_all_its_space(misbehave: Misbehave) -> None:
+    """Existing files and holes do not count."""
     body = (
         "f = open('x', 'wb')\nf.write(bytes(2 << 20))\nf.close()\nimport os\nos.truncate('x', (3 << 20) - 1)"
     )
@@ -291,8 +269,7 @@ def test_what_stays_below_the_limit_of_space(misbehave: Misbehave) -> None:
     assert [(e.status, e.mode) for e, _ in told.values()] == [(Status.OK, RunMode(name)) for name in ENGINES]
 
 
-def test_a_file_that_is_too_large(misbehave: Misbehave) -> None:
-    """A single file above the limit, with or without holes, raises an error in the run, which crashes."""
+def test_a_file_above_the_space_limit_is_a_crash(misbehave: Misbehave) -> None:
     told = misbehave("f = open('x', 'wb')\nf.seek(1 << 40)\nf.write(b'x')\nf.flush()")
     ends = {(e.status, e.detail) for e, _ in told.values()}
     assert ends == {(Status.CRASHED, "OSError: [Errno 27] File too large (toycar/trouble.py:4)")}

@@ -32,7 +32,6 @@ DERIVED = ("results.csv", "results.parquet", "propagation.parquet", "plan.csv", 
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory, copy_toycar: Callable[[Path], Workspace]) -> Runs:
-    """The small campaign as a whole (`whole`) and as two shards (`1/2`, `2/2`) in separate folders."""
     folder = tmp_path_factory.mktemp("shards")
     toy = copy_toycar(folder)
     made = {"whole": folder / "whole", "1/2": folder / "one", "2/2": folder / "two"}
@@ -54,8 +53,7 @@ def change_head(run: Path, **values: object) -> None:
     (run / "run.json").write_text(json.dumps(head | values))
 
 
-def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """Results, plan, patches and series equal the single run's byte for byte, in any order of shards."""
+def test_merged_shards_equal_the_single_run(runs: Runs, tmp_path: Path) -> None:
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     for name in DERIVED:
         assert (tmp_path / "out" / name).read_bytes() == (runs["whole"] / name).read_bytes()
@@ -76,10 +74,8 @@ def test_merged_is_the_whole(runs: Runs, tmp_path: Path) -> None:
     assert len(stretches[0]) == 2 and same == [same[0]] * 3
 
 
-def test_a_merged_run_folder_has_series_from_the_first(
-    runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A merge killed once its folder is a run folder has lost no series, since nothing would rebuild them."""
+def test_a_killed_merge_loses_no_series(runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing could rebuild the series of a merged run folder."""
     seen: list[int] = []
 
     def build(run: Path) -> Path:
@@ -91,26 +87,21 @@ def test_a_merged_run_folder_has_series_from_the_first(
     assert seen == [3]
 
 
-def test_merged_has_the_seal_of_the_whole(runs: Runs, tmp_path: Path) -> None:
-    """The seal does not depend on the number of machines. A shard has a different seal."""
+def test_merged_shards_have_the_seal_of_the_single_run(runs: Runs, tmp_path: Path) -> None:
     merge([runs["2/2"], runs["1/2"]], tmp_path / "out")
     seals = [seal_of(RunFolder.open(path)) for path in (runs["whole"], tmp_path / "out", runs["1/2"])]
     assert seals[0] is not None and seals[0] == seals[1] != seals[2]
 
 
-def test_shards_have_the_engine_of_the_whole(
+def test_the_whole_plan_decides_the_engine_of_a_shard(
     runs: Runs, toy: Workspace, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If the whole plan is large enough to fork, every shard is forked, however small.
-
-    The merged run has the proof and the seal of the whole run.
-    """
+    """A plan that is large enough to fork is forked in every shard, however small."""
     monkeypatch.setattr(registry, "WORTH_IT", RunFolder.open(runs["whole"]).planned)
     assert {Session(toy, RunFolder.open(path)).engine for path in runs.values()} == {"fork"}
 
 
-def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
-    """The merged run lists an approval if every shard has it."""
+def test_an_approval_that_every_shard_has_is_merged(copies: Runs, tmp_path: Path) -> None:
     said = {"schema": gate.SCHEMA, "target": "toycar", "groups": [{"group": "0" * 12, "by": "Jane Doe"}]}
     shards = [copies["1/2"], copies["2/2"]]
     gate.write_approvals(shards[0], said)
@@ -121,24 +112,22 @@ def test_who_approved_is_merged(copies: Runs, tmp_path: Path) -> None:
     assert gate.approval_summary(tmp_path / "out") == "all of 1 group approved, by Jane Doe (1)"
 
 
-def test_shards_are_disjoint_and_all(runs: Runs) -> None:
-    """Every experiment is run by exactly one shard. The shards' plan digest is that of the whole run."""
+def test_each_experiment_is_in_exactly_one_shard(runs: Runs) -> None:
     one, two, whole = (set(read_records(runs[name])) for name in ("1/2", "2/2", "whole"))
     assert not one & two
     assert one | two == whole
     assert len({RunFolder.open(path).head["plan"] for path in runs.values()}) == 1
 
 
-def test_a_shard_goes_on_as_what_it_was(copies: Runs, toy: Workspace) -> None:
-    """A shard resumes without naming it again. Its folder refuses another shard."""
+def test_a_shard_resumes_without_its_option(copies: Runs, toy: Workspace) -> None:
+    """The folder refuses any other shard."""
     summary = run_campaign(toy, "small", copies["1/2"])
     assert (summary.ran, summary.done) == (0, RunFolder.open(copies["1/2"]).planned)
     with pytest.raises(MutatorError, match="shard 2/2"):
         run_campaign(toy, "small", copies["1/2"], choices=Choices(shard="2/2"))
 
 
-def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
-    """A merged folder is complete: running its campaign there finds nothing to do."""
+def test_nothing_is_left_to_run_in_a_merged_folder(runs: Runs, toy: Workspace, tmp_path: Path) -> None:
     merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
     summary = run_campaign(toy, "small", tmp_path / "out")
     assert (summary.exit_code, summary.ran, summary.done) == (0, 0, 12)
@@ -152,17 +141,17 @@ def test_a_merged_run_is_a_run(runs: Runs, toy: Workspace, tmp_path: Path) -> No
         (("1/2", "whole"), "a whole run, not a shard"),
     ],
 )
-def test_wrong_shards_are_told(runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str) -> None:
-    """A missing shard, a duplicate shard or a whole run is refused, and nothing is written."""
+def test_missing_duplicate_and_whole_shards_are_refused(
+    runs: Runs, tmp_path: Path, given: tuple[str, ...], told: str
+) -> None:
     with pytest.raises(MutatorError, match=told):
         merge([runs[name] for name in given], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
-def test_shards_of_something_else_are_told(
+def test_shards_of_other_plans_or_sources_are_refused(
     copies: Runs, toy: Workspace, tmp_path: Path, reseal: Reseal
 ) -> None:
-    """Another plan, other sources or another number of shards is refused. The error names the folder."""
     two = copies["2/2"]
     head = json.loads((two / "run.json").read_text())
     for change, told in (
@@ -179,8 +168,7 @@ def test_shards_of_something_else_are_told(
         merge([copies["1/2"], third], tmp_path / "out")
 
 
-def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
-    """A shard that lacks a record, or has one of another shard, is refused with the reason."""
+def test_an_unfinished_or_foreign_shard_is_refused(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
     one, two = copies["1/2"], copies["2/2"]
     path = next((one / "records").iterdir())
     lines = path.read_bytes().splitlines(keepends=True)
@@ -196,8 +184,7 @@ def test_an_unfinished_or_foreign_shard_is_told(copies: Runs, tmp_path: Path, re
         merge([one, two], tmp_path / "out")
 
 
-def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
-    """Shards with different fault-free runs are not merged."""
+def test_shards_with_different_golden_runs_are_refused(copies: Runs, tmp_path: Path, reseal: Reseal) -> None:
     path = copies["2/2"] / "checks.json"
     checks = json.loads(path.read_text())
     path.write_text(json.dumps(checks | {"goldens": {"A": "0" * 64}}))
@@ -207,13 +194,9 @@ def test_machines_that_drive_otherwise_are_told(copies: Runs, tmp_path: Path, re
 
 
 @pytest.mark.parametrize("broken", ["1/2", "2/2"])
-def test_a_shard_whose_proof_failed_is_told(
+def test_a_shard_with_a_failed_equivalence_check_is_refused(
     copies: Runs, tmp_path: Path, broken: str, reseal: Reseal
 ) -> None:
-    """If the reference engine contradicts an experiment of any shard, nothing is merged.
-
-    The error names experiment and folder.
-    """
     for path in (copies["1/2"], copies["2/2"]):
         shutil.copytree(path / "records", path / "proof")
         reseal(path)
@@ -238,8 +221,8 @@ def test_a_folder_with_a_run_is_not_merged_into(runs: Runs, tmp_path: Path) -> N
     assert (runs["whole"] / "results.csv").read_bytes() == before
 
 
-def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
-    """The same command completes a merge killed at any stage, and deletes no other files."""
+def test_the_same_command_completes_a_killed_merge(runs: Runs, tmp_path: Path) -> None:
+    """The command deletes no other files."""
     out, shards = tmp_path / "out", [runs["1/2"], runs["2/2"]]
     for name in (".run.json.1", "owner.lock", "golden/A/log.npz", "records/0001-a.jsonl", "thesis.tex"):
         (out / name).parent.mkdir(parents=True, exist_ok=True)
@@ -254,10 +237,9 @@ def test_what_a_killed_merge_left_goes(runs: Runs, tmp_path: Path) -> None:
     assert not list(out.glob(".*"))
 
 
-def test_a_merge_that_fails_leaves_nothing(
+def test_a_failed_merge_leaves_nothing_and_can_be_repeated(
     runs: Runs, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """If results cannot be built, no files are left and the command can be repeated."""
     with monkeypatch.context() as patch, pytest.raises(RuntimeError):
         patch.setattr("mutator.outcomes.results.build", fail)
         merge([runs["1/2"], runs["2/2"]], tmp_path / "out")
@@ -270,15 +252,14 @@ def fail(run: Path) -> Path:
 
 
 @pytest.mark.parametrize("shard", ["0/3", "4/3", "1", "a/b", "1/0", "-1/3", "1/7"])
-def test_a_shard_that_cannot_be(toy: Workspace, shard: str) -> None:
-    """An invalid shard, or more shards than chunks, is refused before anything runs."""
+def test_impossible_shards_are_refused(toy: Workspace, shard: str) -> None:
+    """More shards than chunks are refused, too."""
     with pytest.raises(MutatorError, match=f"shard:? '?{shard}"):
         make_plan(toy, "small", Choices(shard=shard))
 
 
 @pytest.mark.slow
-def test_shards_of_the_controller_that_ships(tmp_path: Path) -> None:
-    """On the shipped controller, one worker, two workers, and three merged shards give the same bytes."""
+def test_shards_of_the_shipped_controller(tmp_path: Path) -> None:
     clone = Workspace.find(root=Path(__file__).parents[2])
 
     def ran(name: str, workers: int, shard: str | None = None) -> Path:

@@ -1,4 +1,4 @@
-"""Runs common to several scenarios run once, count in each, and are first proved to be equal."""
+"""Runs shared by several scenarios run once, count in each, and are first proved to be equal."""
 
 import csv
 import json
@@ -39,8 +39,7 @@ def edit(path: Path, old: str, new: str) -> None:
 
 def two_scenarios(toy: Workspace, changes: str) -> Workspace:
     """The faults of the small campaign that need the other car gone, on A and C, which differ only in that
-    car.
-    """
+    car."""
     scenarios = toy.library / "scenarios"
     (scenarios / "C.yaml").write_text((scenarios / "A.yaml").read_text().replace("0.8", "0.1"))
     edit(toy.library / "targets" / "toycar.yaml", ALONE, changes)
@@ -52,7 +51,6 @@ def two_scenarios(toy: Workspace, changes: str) -> Workspace:
 
 @pytest.fixture(scope="module")
 def driven() -> dict[str, list[str]]:
-    """Return the names of the runs that were run for each of `runs`, including the checks' runs."""
     return {"shared": [], "apart": []}
 
 
@@ -60,7 +58,6 @@ def driven() -> dict[str, list[str]]:
 def runs(
     tmp_path_factory: pytest.TempPathFactory, copy_toycar: CopyToycar, driven: dict[str, list[str]]
 ) -> tuple[Path, Path]:
-    """The campaign with shared runs, and with every experiment run separately."""
     execute = ReferenceEngine.execute
 
     def counted(self: ReferenceEngine, job, scratch):  # type: ignore[no-untyped-def]
@@ -79,11 +76,7 @@ def runs(
     return made[0], made[1]
 
 
-def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
-    """With shared runs, the results equal those of running everything, byte for byte.
-
-    Each scenario has its row.
-    """
+def test_shared_runs_give_the_bytes_of_separate_runs(runs: tuple[Path, Path]) -> None:
     shared, apart = runs
     for name in ("results.csv", "results.parquet"):
         assert (shared / name).read_bytes() == (apart / name).read_bytes()
@@ -93,8 +86,7 @@ def test_shared_is_as_if_each_were_run(runs: tuple[Path, Path]) -> None:
     assert sum(row["scenario"] == "C" for row in rows) == 4
 
 
-def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
-    """Two guided runs are shared by two scenarios each. Random runs have separate times."""
+def test_plan_and_folder_report_the_shared_runs(runs: tuple[Path, Path]) -> None:
     shared, apart = (load_plan(RunFolder.open(run)) for run in runs)
     assert (len(shared.experiments), shared.runs) == (8, 6)
     assert (len(apart.experiments), apart.runs) == (8, 8)
@@ -103,24 +95,20 @@ def test_plan_and_folder_say_how_many(runs: tuple[Path, Path]) -> None:
     assert {e.id for e in shared.experiments} == {e.id for e in apart.experiments}
 
 
-def test_they_are_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]) -> None:
-    """Apart from the checks, only as many runs are run as the plan says."""
+def test_shared_runs_run_once(runs: tuple[Path, Path], driven: dict[str, list[str]]) -> None:
     ids = {e.id for e in load_plan(RunFolder.open(runs[0])).experiments}
     counts = {which: sum(name in ids for name in names) for which, names in driven.items()}
     assert counts == {"shared": 6, "apart": 8}
 
 
-def test_the_checks_prove_it(runs: tuple[Path, Path]) -> None:
-    """The fault-free runs of scenarios declared equal are compared. The check is kept."""
+def test_checks_compare_scenarios_declared_equal(runs: tuple[Path, Path]) -> None:
     checks = json.loads((runs[0] / "checks.json").read_text())["results"]
     assert [c["passed"] for c in checks if c["name"] == "same A+C+alone"] == [True]
 
 
 def test_part_of_a_shared_run_is_run_on_a_cluster(runs: tuple[Path, Path], tmp_path: Path) -> None:
-    """If one experiment of a shared run is left, a worker runs its own golden run and keeps its record.
-
-    A kill or a split of the work can leave one experiment.
-    """
+    """A kill or a split of the work can leave one experiment of a shared run. Then a worker runs its own
+    golden run."""
     folder = RunFolder.open(runs[0])
     toy = Workspace(
         library=runs[0].parent / "toy" / "fault_library", templates=runs[0].parent / "toy" / "templates"
@@ -140,8 +128,7 @@ def _scenarios(folder: RunFolder, chunk: Pending) -> list[str]:
     return [json.loads(line)["scenario"] for line in lines]
 
 
-def test_what_is_not_the_same_does_not_start(toy: Workspace, tmp_path: Path) -> None:
-    """A manifest that declares different scenarios equal is refused with their names before any run."""
+def test_different_scenarios_declared_equal_are_refused(toy: Workspace, tmp_path: Path) -> None:
     two_scenarios(toy, SHARED)
     edit(toy.library / "scenarios" / "C.yaml", "speed: 20", "speed: 21")
     folder = freeze(make_plan(toy, "small"), tmp_path / "run", toy)
